@@ -11,19 +11,24 @@ import gc
 import hashlib
 import os
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TypeVar
 
 import numba
-from numba.core.caching import IndexDataCacheFile
+from numba.core.caching import Cache, IndexDataCacheFile
+from numba.core.ccallback import CFunc
 from numba.core.compiler_lock import global_compiler_lock
+from numba.core.dispatcher import Dispatcher
 
 from rom.places import PACKAGE
 from rom.process.child import lasting_scratch, trusted
 from rom.process.patience import Patience, Turns
 
+T = TypeVar("T")
+Function = Callable[..., object]  # in Python
+Compiler = Callable[[Function], Dispatcher]  # a decorator of Numba
 IMPORTS = re.compile(rb"^from (rom[.\w]*) import (\([^)]*\)|.*)", re.MULTILINE)
 NAMES, OWNERS = re.compile(rb"(\w+)(?: as (\w+))?"), re.compile(rb"\b(\w+)\.[A-Z][A-Z\d_]*\b")
 # in sources of kernels, and the folders of what they contain and are made by
@@ -32,9 +37,9 @@ COMPILE_RATE = 2.5e-4  # [s] of compiling per byte of functions in Python; 2.3e-
 COMPILE_TURNS, COMPILE_PATIENCE = Turns(), Patience(COMPILE_RATE)
 AHEAD_HINT = "rom doctor --compile compiles all ahead"
 WAIT_SENTENCE = "another process compiles what this one needs: waiting for it"
-CODE_FILES: dict[Any, "CodeFiles"] = {}  # of the functions in Python
-EXPECTED_FUNCTIONS: set[Any] = set()  # those that will be called, as far as is known
-COMPILED_FUNCTIONS: list[Any] = []  # by this process, none taken from a file
+CODE_FILES: dict[Function, "CodeFiles"] = {}  # of the functions in Python
+EXPECTED_FUNCTIONS: set[Function] = set()  # those that will be called, as far as is known
+COMPILED_FUNCTIONS: list[Function] = []  # by this process, none taken from a file
 
 
 class CodeFiles(IndexDataCacheFile):  # type: ignore[misc]
@@ -45,23 +50,23 @@ class CodeFiles(IndexDataCacheFile):  # type: ignore[misc]
     sources. Here no two codes share a name, and an index names only what is there.
     """
 
-    def __init__(self, cache: Any, function: Any):
+    def __init__(self, cache: Cache, function: Function):
         made_of = f"Numba {numba.__version__}, {digest(Path(function.__code__.co_filename))}"
         name = f"{cache._impl.filename_base}.numba-{numba.__version__}"
         super().__init__(cache._cache_path, name, made_of)
         self._version = made_of  # compared before anything else is read
         self.path, self.function = Path(self._index_path), function
 
-    def _load_index(self) -> dict[Any, str]:
+    def _load_index(self) -> dict[object, str]:
         safe = trusted(self.path.parent) and trusted(self.path)
         return super()._load_index() if safe else {}
 
-    def _load_data(self, name: str) -> Any:
+    def _load_data(self, name: str) -> object:
         if not trusted(self.path.parent / name):
             raise PermissionError(f"others may have written {name}")  # Numba compiles it anew
         return super()._load_data(name)
 
-    def load(self, key: Any) -> Any:
+    def load(self, key: object) -> object:
         """Compiled code, if need be of a process that makes it just now; None to make it."""
         found = super().load(key)
         if found is not None:
@@ -76,7 +81,7 @@ class CodeFiles(IndexDataCacheFile):  # type: ignore[misc]
             COMPILE_TURNS.end(self.path)
         return found
 
-    def save(self, key: Any, data: Any) -> None:
+    def save(self, key: object, data: object) -> None:
         """Keep compiled code, and drop that of other sources."""
         known = self._load_index()
         made_of = hashlib.sha256(f"{self._source_stamp} {key}".encode()).hexdigest()
@@ -108,7 +113,7 @@ class CodeFiles(IndexDataCacheFile):  # type: ignore[misc]
         return f"compiling {package} for this machine takes about {seconds} s more, {often}"
 
 
-def kept(compiler: Callable[[Any], Any], *, entry: bool = False) -> Callable[[Any], Any]:
+def kept(compiler: Compiler, *, entry: bool = False) -> Compiler:
     """A decorator of Numba whose cache knows the sources that a function is made of.
 
     Args:
@@ -116,7 +121,7 @@ def kept(compiler: Callable[[Any], Any], *, entry: bool = False) -> Callable[[An
         entry: whether its functions are called wherever mechanisms are.
     """
 
-    def compiled(function: Any) -> Any:
+    def compiled(function: Function) -> Dispatcher:
         dispatcher = _with_a_place(compiler, function)
         if not numba.config.DISABLE_JIT:
             guard(dispatcher, function)
@@ -127,7 +132,7 @@ def kept(compiler: Callable[[Any], Any], *, entry: bool = False) -> Callable[[An
     return compiled
 
 
-def _with_a_place(compiler: Callable[[Any], Any], function: Any) -> Any:
+def _with_a_place(compiler: Compiler, function: Function) -> Dispatcher:
     """What Numba compiles a function by; where no safe folder can be written, code is not kept."""
     try:
         made = compiler(function)
@@ -139,16 +144,11 @@ def _with_a_place(compiler: Callable[[Any], Any], function: Any) -> Any:
         return compiler(function)
 
 
-def guard(made: Any, function: Any) -> None:
-    """Let Numba load only what the present sources and version of Numba have made of a function.
-
-    Args:
-        made: what Numba compiles it by, with a cache.
-        function: in Python.
-    """
+def guard(made: Dispatcher | CFunc, function: Function) -> None:
+    """Let Numba load only what the present sources and version of Numba have made of a function."""
     compile_it = made.compile
 
-    def in_turn(*signature: Any) -> Any:
+    def in_turn(*signature: object) -> object:
         with _at_work(function):
             return compile_it(*signature)
 
@@ -156,11 +156,11 @@ def guard(made: Any, function: Any) -> None:
     CODE_FILES[function] = made._cache._cache_file = CodeFiles(made._cache, function)
 
 
-_under_way: list[Any] = []  # functions that are compiled, each for the one before it
+_under_way: list[Function] = []  # functions that are compiled, each for the one before it
 
 
 @contextmanager
-def _at_work(function: Any) -> Iterator[None]:
+def _at_work(function: Function) -> Iterator[None]:
     """Around a compilation, within which others may be; when all have ended, nothing is held.
 
     Numba makes many small objects and no circles of them: to look for such takes 2 s of 15.
@@ -180,55 +180,41 @@ def _at_work(function: Any) -> Iterator[None]:
                 COMPILE_PATIENCE.end()
 
 
-def _size(function: Any) -> int:
+def _size(function: Function) -> int:
     """What the time to compile a function grows with: its code in Python, and what it takes in."""
-    found: set[Any] = set()
-    _collect_inner(function, found)
-    return sum(len(one.__code__.co_code) for one in found)
-
-
-def _collect_inner(function: Any, found: set[Any]) -> None:
-    """The function, and those it calls that are compiled with it each time."""
-    found.add(function)
-    for called in _called(function):
-        if called not in CODE_FILES and called not in found:
-            _collect_inner(called, found)
+    taken_in = _reached([function], lambda one: [x for x in _called(one) if x not in CODE_FILES])
+    return sum(len(one.__code__.co_code) for one in taken_in)
 
 
 def _size_of_rest() -> int:
     """Of all functions that are expected, and those they call, what no process has compiled."""
-    found: set[Any] = set()
-    for function in (*EXPECTED_FUNCTIONS, *_under_way):
-        _collect_called(function, found)
+    found = _reached([*EXPECTED_FUNCTIONS, *_under_way], _called)
     return sum(_size(f) for f in found if f in CODE_FILES and not CODE_FILES[f].full())
 
 
-def _collect_called(function: Any, found: set[Any]) -> None:
-    found.add(function)
-    for called in _called(function):
-        if called not in found:
-            _collect_called(called, found)
+def _reached(first: list[T], near: Callable[[T], Iterable[T]]) -> set[T]:
+    """What steps to what is near lead to, and where they begin."""
+    found: set[T] = set()
+    while first:
+        one = first.pop()
+        if one not in found:
+            found.add(one)
+            first += near(one)
+    return found
 
 
-def _called(function: Any) -> list[Any]:
+def _called(function: Function) -> list[Function]:
     """The compiled functions that a function names, as Python knows them."""
-    named = (function.__globals__.get(name) for name in function.__code__.co_names)
+    known = function.__globals__
+    named = (known[name] for name in function.__code__.co_names if name in known)
     return [x.py_func for x in named if hasattr(x, "py_func")]
 
 
 @functools.cache
 def digest(source: Path) -> str:
     """Of a source and all that its kernels are made of."""
-    found: set[Path] = set()
-    _collect(source, found)
-    return hashlib.sha256(b"".join(_read(path)[0] for path in sorted(found))).hexdigest()
-
-
-def _collect(source: Path, found: set[Path]) -> None:
-    found.add(source)
-    for path in _read(source)[1]:
-        if path not in found:
-            _collect(path, found)
+    found = sorted(_reached([source], lambda path: _read(path)[1]))
+    return hashlib.sha256(b"".join(_read(path)[0] for path in found)).hexdigest()
 
 
 @functools.cache

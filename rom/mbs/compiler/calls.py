@@ -1,31 +1,42 @@
 """Calls from compiled code through addresses, and addresses of compiled code."""
 
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import TypeAlias
 
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
+from numba.core.base import BaseContext
 from numba.core.ccallback import CFunc
 from numba.core.compiler_lock import global_compiler_lock
+from numba.core.dispatcher import Dispatcher
 from numba.core.errors import TypingError
 from numba.core.sigutils import normalize_signature
+from numba.core.typing import Signature as Signature
 from numba.core.typing.templates import AbstractTemplate, infer_global
 from numba.extending import lower_builtin
 
-from rom.mbs.compiler.cache import guard
+from rom.mbs.compiler.cache import Function, guard
+
+Context: TypeAlias = BaseContext  # of a compilation
+Builder: TypeAlias = ir.IRBuilder
+Value: TypeAlias = ir.Value
+Values = Sequence[Value]
+# what a call becomes
+Build = Callable[[Context, Builder, Signature, Values], Value]
 
 
-def let_kernels_call(thing: Any, name: str, signature: Any, build: Any) -> None:
+def let_kernels_call(thing: object, name: str, signature: Signature, build: Build) -> None:
     """Make an object of Python callable in kernels.
 
     Args:
         thing: the object.
         name: what the compiler calls it.
         signature: types of its result and arguments.
-        build: (context, builder, signature, values) -> what a call becomes.
+        build: what a call becomes.
     """
 
-    def typed(template: Any, given: Any, _: Any) -> Any:
+    def typed(template: AbstractTemplate, given: Sequence[types.Type], _: object) -> Signature:
         for kind, asked in zip(given, signature.args, strict=True):
             if template.context.can_convert(kind, asked) is None:
                 raise TypingError(f"{name} takes {asked}, not {kind}.")
@@ -36,7 +47,7 @@ def let_kernels_call(thing: Any, name: str, signature: Any, build: Any) -> None:
     lower_builtin(thing, types.VarArg(types.Any))(build)
 
 
-def address_of(kernel: Any, signature: Any) -> int:
+def address_of(kernel: Dispatcher, signature: Signature) -> int:
     """Address of the compiled form of a kernel, which takes no other types from then on."""
     with global_compiler_lock:  # of two threads the second finds it compiled
         if signature.args not in kernel.overloads:
@@ -46,7 +57,9 @@ def address_of(kernel: Any, signature: Any) -> int:
     return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name))
 
 
-def call_at(context: Any, builder: Any, signature: Any, address: Any, values: Any) -> Any:
+def call_at(
+    context: Context, builder: Builder, signature: Signature, address: Value, values: Values
+) -> Value:
     """What a call of the kernel at an address becomes: its answer, 0 if the address is 0."""
     result, arguments = signature.return_type, signature.args
     kind = context.call_conv.get_function_type(result, arguments)
@@ -58,13 +71,13 @@ def call_at(context: Any, builder: Any, signature: Any, address: Any, values: An
     return builder.load(answer)
 
 
-def called(signature: Any) -> tuple[Any, Any]:
+def called(signature: Signature) -> tuple[Signature, Build]:
     """What an intrinsic gives back that calls the function of C at its first argument.
 
     Numbers are handed on as they are, arrays by the address of their first number.
     """
 
-    def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    def build(context: Context, builder: Builder, signature: Signature, arguments: Values) -> Value:
         kinds, given = [], []
         for kind, value in zip(signature.args[1:], arguments[1:], strict=True):
             array = isinstance(kind, types.Array)
@@ -79,7 +92,7 @@ def called(signature: Any) -> tuple[Any, Any]:
     return signature, build
 
 
-def c_function(function: Any, types: str, options: dict[str, Any]) -> Any:
+def c_function(function: Function, types: str, options: dict[str, object]) -> CFunc:
     """A function of C, compiled and kept, with attribute ``address``.
 
     Args:

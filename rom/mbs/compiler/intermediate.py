@@ -5,19 +5,18 @@ all its callers, and optimised there once more: that took more than a third of t
 function stays as it is written, until a caller that runs takes it in.
 """
 
-from typing import Any
-
+from llvmlite import ir
 from numba._dynfunc import make_function
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import CompilerBase, DefaultPassBuilder
-from numba.core.compiler_machinery import register_pass
+from numba.core.compiler import CompilerBase, DefaultPassBuilder, StateDict
+from numba.core.compiler_machinery import PassManager, register_pass
 from numba.core.typed_passes import NativeLowering
 
 
 class IntermediateCode(JITCodeLibrary):
     """Code that becomes part of other code, and is optimised and made executable there."""
 
-    def _optimize_functions(self, module: Any) -> None:
+    def _optimize_functions(self, module: ir.Module) -> None:
         module.data_layout = self._codegen._data_layout
 
     def finalize(self) -> None:
@@ -31,7 +30,7 @@ class IntermediateLowering(NativeLowering):
 
     _name = "intermediate_lowering"
 
-    def run_pass(self, state: Any) -> bool:
+    def run_pass(self, state: StateDict) -> bool:
         """Make the code of a function, and let others call it."""
         context = state.targetctx
         state.flags.no_compile = True
@@ -48,7 +47,7 @@ class IntermediateLowering(NativeLowering):
 class IntermediateCompiler(CompilerBase):
     """A compiler of functions that only compiled code calls."""
 
-    def define_pipelines(self) -> list[Any]:
+    def define_pipelines(self) -> list[PassManager]:
         """The passes of all functions but for the last one."""
         passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
         last = {NativeLowering: IntermediateLowering}

@@ -1,10 +1,13 @@
 """How compiled code reads a table: one pointer to words, see `rom.mbs.kernels.tables`."""
 
 import operator
+from collections.abc import Callable
 from typing import Any, ClassVar
 
 from llvmlite import ir
 from numba import types
+from numba.core.base import BaseContext
+from numba.core.datamodel import DataModelManager
 from numba.core.imputils import lower_getattr_generic
 from numba.core.typing.arraydecl import GetItemBuffer, SetItemBuffer
 from numba.core.typing.templates import AttributeTemplate, infer_getattr, infer_global
@@ -23,17 +26,17 @@ class TableType(types.Type):
         super().__init__(f"{cls.__module__}.{cls.__qualname__}")
 
 
-def number(value: int) -> Any:
+def number(value: int) -> ir.Constant:
     """A whole number in compiled code."""
     return ir.Constant(TABLE_WORD, value)
 
 
-def pointer(builder: Any, address: Any) -> Any:
+def pointer(builder: ir.IRBuilder, address: ir.Value) -> ir.Value:
     """The table at an address."""
     return builder.inttoptr(address, TABLE_WORD.as_pointer())
 
 
-def word(builder: Any, table: Any, at: Any) -> Any:
+def word(builder: ir.IRBuilder, table: ir.Value, at: ir.Value) -> ir.Value:
     """A word of a table, at a place that compiled code has."""
     return builder.load(builder.gep(table, [at]))
 
@@ -52,12 +55,12 @@ class _NewEntry(SetItemBuffer):
 
 @register_model(TableType)
 class _Pointer(models.PrimitiveModel):
-    def __init__(self, manager: Any, kind: Any):
+    def __init__(self, manager: DataModelManager, kind: TableType):
         super().__init__(manager, kind, TABLE_WORD.as_pointer())
 
 
 @unbox(TableType)
-def _unbox(kind: Any, value: Any, c: Any) -> Any:
+def _unbox(kind: TableType, value: ir.Value, c: Any) -> NativeValue:
     found = c.pyapi.object_getattr_string(value, "_address")
     address = c.pyapi.long_as_longlong(found)
     c.pyapi.decref(found)
@@ -68,15 +71,17 @@ def _unbox(kind: Any, value: Any, c: Any) -> Any:
 class _Fields(AttributeTemplate):
     key = TableType
 
-    def generic_resolve(self, kind: Any, name: str) -> Any:
+    def generic_resolve(self, kind: TableType, name: str) -> types.Type | None:
         return kind.cls._layout[name][1] if name in kind.cls._layout else None
 
 
 @lower_getattr_generic(TableType)
-def _field(context: Any, builder: Any, kind: Any, value: Any, name: str) -> Any:
+def _field(
+    context: BaseContext, builder: ir.IRBuilder, kind: TableType, value: ir.Value, name: str
+) -> ir.Value:
     at, field = kind.cls._layout[name]
 
-    def read(k: int) -> Any:
+    def read(k: int) -> ir.Value:
         found = word(builder, value, number(at + k))
         # the words never change while a kernel runs: they are read once, before its loops
         found.set_metadata("invariant.load", builder.module.add_metadata([]))
@@ -89,7 +94,9 @@ def _field(context: Any, builder: Any, kind: Any, value: Any, name: str) -> Any:
     return _array(context, builder, field, read)
 
 
-def _array(context: Any, builder: Any, kind: Any, read: Any) -> Any:
+def _array(
+    context: BaseContext, builder: ir.IRBuilder, kind: types.Array, read: Callable[[int], ir.Value]
+) -> ir.Value:
     """The view of an array whose address and shape are told."""
     array = context.make_array(kind)(context, builder)
     shape = [read(1 + k) for k in range(kind.ndim)]

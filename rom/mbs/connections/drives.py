@@ -1,23 +1,11 @@
 """Joint coordinates that are prescribed in time, and couplings between two of them."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 from rom.errors import ConfigError
 from rom.mbs.connections.ends import not_zero
-from rom.mbs.kernels.system import COUPLING
-from rom.mbs.parts.joints import (
-    NO_VECTOR,
-    Coordinate,
-    Joint,
-    Row,
-    Whole,
-    coordinate_of,
-    joint_with_axis,
-)
-
-TimeFunction = Callable[[float], Any]
+from rom.mbs.parts.joints import Coordinate, Joint, Whole, coordinate_of, coupling, joint_with_axis
+from rom.mbs.parts.signals import TimeFunction
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,12 +71,11 @@ def gear(
     """
     self.check_new(name)
     names, wanted = (joint1, joint2), (coordinate1, coordinate2)
-    rows = tuple(
+    one, two = (
         coordinate_of(self.joints, j, c, "gear") for j, c in zip(names, wanted, strict=True)
     )
-    if rows[0] is rows[1]:
+    if one is two:
         raise ConfigError(f"gear {name!r} couples {joint1!r} with itself; give two coordinates.")
-    terms = ((rows[1], 1.0), (rows[0], -not_zero("ratio", ratio)))
-    row = Row(COUPLING, NO_VECTOR, NO_VECTOR, NO_VECTOR, terms=terms)
+    row = coupling((two, 1.0), (one, -not_zero("ratio", ratio)))
     markers = (*self.joints[joint2].markers, *self.joints[joint1].markers)
     self.joints[name] = Joint(name, "coupling", markers, (row,))

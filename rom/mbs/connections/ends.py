@@ -45,11 +45,7 @@ class Ends:
 
 
 def ends_of(whole: Whole, name: str, m1: Marker, m2: Marker) -> Ends:
-    """The ends of a new joint.
-
-    Raises:
-        ConfigError: for a name in use, markers that do not exist, or one body with itself.
-    """
+    """The ends of a new joint, whose name and markers are checked."""
     whole.check_new(name)
     whole.check_apart(name, m1, m2)
     A1, A2 = (rotation.matrix(whole.part(m.body).p) for m in (m1, m2))
@@ -57,12 +53,7 @@ def ends_of(whole: Whole, name: str, m1: Marker, m2: Marker) -> Ends:
 
 
 def enter(whole: Whole, joint: Joint) -> None:
-    """Let the mechanism have a joint.
-
-    Raises:
-        ModelError: if it transmits moments to free-free modes, which carry none to an interface,
-            or holds a body that spins beside its axis.
-    """
+    """Let the mechanism have a joint, unless a body has no shapes for it, or spins beside it."""
     for marker in joint.markers:
         whole.part(marker.body).check_on_axis(joint.name, marker)
     for marker in joint.markers if joint.kind not in MOMENT_FREE else ():

@@ -6,9 +6,8 @@ import numpy as np
 
 from rom.arguments import Direction, Number
 from rom.mbs.connections.ends import Ends, ends_of, enter, not_zero
-from rom.mbs.kernels.system import COUPLING
 from rom.mbs.parts.bodies import Marker
-from rom.mbs.parts.joints import NO_VECTOR, Joint, Row, Whole, coincidence
+from rom.mbs.parts.joints import NO_VECTOR, Joint, Row, Triad, Whole, coincidence, coupling
 from rom.model import Array
 
 FULL_TURN = 2 * np.pi
@@ -55,15 +54,16 @@ def cylindrical(self: Whole, name: str, m1: Marker, m2: Marker, *, axis: Directi
         ModelError: if a body has free-free modes only, which carry no moment to an interface.
     """
     ends = ends_of(self, name, m1, m2)
-    rows, angle, displacement = _coaxial(ends, ends.direction("axis", axis))
+    t, rows, displacement = _coaxial(ends, ends.direction("axis", axis))
+    angle = t.angle()
     enter(self, Joint(name, "cylindrical", ends.markers, rows, angle, angle, displacement))
 
 
-def _coaxial(ends: Ends, axis: Array) -> tuple[tuple[Row, ...], Row, Row]:
-    """Rows of one axis in common, on which the second point lies; angle and way along it."""
+def _coaxial(ends: Ends, axis: Array) -> tuple[Triad, tuple[Row, ...], Row]:
+    """Axes with one in common, on which the second point lies; rows of that, and way along it."""
     t = ends.triad(axis)
     rows = (t.along(0, NO_VECTOR), t.along(1, NO_VECTOR), t.normal(0, 2), t.normal(1, 2))
-    return rows, t.angle(), t.along(2, ends.gap_of_first)
+    return t, rows, t.along(2, ends.gap_of_first)
 
 
 def screw(
@@ -93,10 +93,9 @@ def screw(
     """
     pitch = not_zero("pitch", pitch)
     ends = ends_of(self, name, m1, m2)
-    rows, angle, displacement = _coaxial(ends, ends.direction("axis", axis))
-    terms = ((displacement, 1.0), (angle, -pitch / FULL_TURN))
-    lead = Row(COUPLING, NO_VECTOR, NO_VECTOR, NO_VECTOR, terms=terms)
-    rows = (*rows, lead)
+    t, rows, displacement = _coaxial(ends, ends.direction("axis", axis))
+    angle = t.angle()
+    rows = (*rows, coupling((displacement, 1.0), (angle, -pitch / FULL_TURN)))
     enter(self, Joint(name, "screw", ends.markers, rows, angle, angle, displacement))
 
 
@@ -114,10 +113,8 @@ def prismatic(self: Whole, name: str, m1: Marker, m2: Marker, *, axis: Direction
         ModelError: if a body has free-free modes only, which carry no moment to an interface.
     """
     ends = ends_of(self, name, m1, m2)
-    t = ends.triad(ends.direction("axis", axis))
-    displacement = t.along(2, ends.gap_of_first)
-    rows = (t.along(0, NO_VECTOR), t.along(1, NO_VECTOR),
-            t.normal(0, 2), t.normal(1, 2), t.normal(0, 1))  # fmt: skip
+    t, rows, displacement = _coaxial(ends, ends.direction("axis", axis))
+    rows = (*rows, t.normal(0, 1))
     enter(self, Joint(name, "prismatic", ends.markers, rows, displacement, None, displacement))
 
 

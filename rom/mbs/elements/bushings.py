@@ -6,9 +6,9 @@ has a potential whatever the rotation.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
@@ -101,7 +101,7 @@ def bushing(  # noqa: PLR0913  one keyword per property
     self.add(name, Bushing(m1, m2, frames, world.T @ gap, K, C, tables), BUSHINGS_FAMILY)
 
 
-def _matrix66(name: str, value: Any) -> Array:
+def _matrix66(name: str, value: npt.ArrayLike) -> Array:
     """Symmetric, not negative (6, 6) matrix from itself or its diagonal."""
     A = finite(name, np.diag(value) if np.shape(value) == (6,) else value, (6, 6))
     size = np.abs(A).max()
@@ -116,7 +116,9 @@ def _matrix66(name: str, value: Any) -> Array:
     return 0.5 * (A + A.T)
 
 
-def _curve(name: str, direction: str, table: Any) -> tuple[int, Array]:
+def _curve(
+    name: str, direction: str, table: tuple[npt.ArrayLike, npt.ArrayLike]
+) -> tuple[int, Array]:
     """Direction and pieces (n, 7) of a tabulated force, see `Bushings`."""
     one_of(f"curve of bushing {name!r}", direction, DIRECTIONS)
     n = np.size(table[0])
@@ -159,7 +161,7 @@ class Bushings(Table):
     piece: Array2
 
 
-def pack(bushings: Any, places: Places) -> Bushings:
+def pack(bushings: Mapping[str, Bushing], places: Places) -> Bushings:
     """Bushings with the pieces of their curves."""
     found = list(bushings.values())
     curve, pieces = np.full((len(found), 6), -1), np.zeros((len(found), 6))
@@ -374,7 +376,5 @@ def turned_over(name: str, bushing: Bushing, t: Array, axes: Callable[[str], Arr
     )
 
 
-BUSHINGS_FAMILY = Family(
-    "bushings", Bushing, pack, bushing_wrenches, bushing_tangents, bushing_energy,
-    hooks=Hooks(beyond=turned_over),
-)  # fmt: skip
+KERNELS = bushing_wrenches, bushing_tangents, bushing_energy
+BUSHINGS_FAMILY = Family("bushings", Bushing, pack, *KERNELS, hooks=Hooks(beyond=turned_over))

@@ -13,21 +13,25 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
+import numpy.typing as npt
 
 from rom.mbs.kernels.element_calls import ElementKernel, row_of
 from rom.mbs.kernels.system import Coordinates
 from rom.mbs.kernels.tables import Table
 from rom.mbs.kernels.work import Work
 from rom.mbs.parts.bodies import GROUND, Marker
-from rom.mbs.parts.joints import Row
-from rom.mbs.parts.signals import Signal
+from rom.mbs.parts.joints import Joint, Row
+from rom.mbs.parts.signals import Signal, TimeFunction
 from rom.model import Array, Index
+
+Element = Any  # a record, of the class that a family has
+Filled = Any  # a table, likewise
 
 
 class Asked(Protocol):
     """A law that stays in Python, asked whenever the forces are."""
 
-    def apply(self, W: Any, t: float, *, slopes: bool) -> None:
+    def apply(self, W: Work, t: float, *, slopes: bool) -> None:
         """Put the answer at time t, and its derivatives, where the kernels of its family look."""
 
 
@@ -40,12 +44,12 @@ def apply_laws(forces: Laws, W: Work, t: float, *, slopes: bool = False) -> None
         law.apply(W, t, slopes=slopes)
 
 
-def on_joint(_: Any) -> tuple[Marker, ...]:
+def on_joint(_: object) -> tuple[Marker, ...]:
     """None of its own: the joint has them."""
     return ()
 
 
-def from_outside(_: Any) -> bool:
+def from_outside(_: object) -> bool:
     """It pushes bodies without pushing others back."""
     return True
 
@@ -55,22 +59,22 @@ def never(_: Table) -> bool:
     return False
 
 
-def apart(_table: Any, _body: Index) -> Iterable[Sequence[int]]:
+def apart(_table: object, _body: Index) -> Iterable[Sequence[int]]:
     """No bodies that a joint or a marker does not couple already."""
     return ()
 
 
-def integers(values: Any) -> Index:
+def integers(values: Iterable[object]) -> Index:
     """Whole numbers as an array, empty ones too."""
     return np.array(list(values), dtype=np.int64)
 
 
-def starts(lengths: Any) -> Index:
+def starts(lengths: npt.ArrayLike) -> Index:
     """Positions of pieces that follow each other, and the end."""
     return np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
 
 
-def rows_of(values: Any, *shape: int) -> Array:
+def rows_of(values: Iterable[npt.ArrayLike], *shape: int) -> Array:
     """Numbers as an array of rows of this shape, empty ones too."""
     return np.array(list(values), dtype=float).reshape(-1, *shape)
 
@@ -94,7 +98,7 @@ class Places:
 
     body: Mapping[str, int]
     marker: Mapping[Marker, int]
-    joints: Mapping[str, Any]
+    joints: Mapping[str, Joint]
     R: int = 0
     owners: list[str] = field(default_factory=list)
     signals: list[Signal] = field(default_factory=list)
@@ -120,11 +124,11 @@ class Places:
         self.coordinates.append(((markers[0], markers[1]), row))
         return len(self.coordinates) - 1
 
-    def signal(self, name: str, function: Callable[[float], Any] | None) -> int:
+    def signal(self, name: str, function: TimeFunction | None) -> int:
         """Number of a function of time with values (3,), -1 for none."""
         return -1 if function is None else self._follow(Signal(name, function, width=3))
 
-    def motion(self, name: str, function: Callable[[float], Any] | None) -> int:
+    def motion(self, name: str, function: TimeFunction | None) -> int:
         """Number of a prescribed length and its rate, -1 for none; it must not jump."""
         return -1 if function is None else self._follow(Signal(name, function))
 
@@ -209,17 +213,17 @@ class Hooks:
             motions that repeat [1].
     """
 
-    asked: Callable[[Mapping[str, Any], Any, int], Sequence[Asked]] | None = None
-    answers: Callable[[Any], Sequence[Any]] | None = None
+    asked: Callable[[Mapping[str, Element], Filled, int], Sequence[Asked]] | None = None
+    answers: Callable[[Filled], Sequence[npt.ArrayLike]] | None = None
     lost: str = "the law of {} gives no finite number"
     potential: bool = True
-    loaded_rows: Callable[[Any], Index] | None = None
-    room: Callable[[Any], Array] | None = None
-    eased: Callable[[Any], AbstractContextManager[bool]] | None = None
-    remembers: Callable[[Any], Array] | None = None
-    kept: Callable[[Any, Array], Array] | None = None
-    beyond: Callable[[str, Any, Array, Callable[[str], Array]], str] | None = None
-    phases: Callable[[Any, Any], Array] | None = None
+    loaded_rows: Callable[[Filled], Index] | None = None
+    room: Callable[[Filled], Array] | None = None
+    eased: Callable[[Filled], AbstractContextManager[bool]] | None = None
+    remembers: Callable[[Filled], Array] | None = None
+    kept: Callable[[Filled, Array], Array] | None = None
+    beyond: Callable[[str, Element, Array, Callable[[str], Array]], str] | None = None
+    phases: Callable[[Filled, Work], Array] | None = None
 
 
 NO_HOOKS = Hooks()
@@ -247,18 +251,18 @@ class Family:
 
     name: str
     record: type
-    pack: Callable[[Mapping[str, Any], Places], Table]
+    pack: Callable[[Mapping[str, Element], Places], Table]
     residuals: ElementKernel
     tangents: ElementKernel | None = None
     energy: ElementKernel | None = None
     multiplier_columns: ElementKernel | None = None
     pair_tangents: ElementKernel | None = None
-    ends: Callable[[Any], tuple[Marker, ...]] = lambda element: (element.i, element.j)
-    outside: Callable[[Any], bool] = lambda _: False
-    couples: Callable[[Any, Index], Iterable[Sequence[int]]] = lambda table, body: np.column_stack(
-        [body[table.i], body[table.j]]
+    ends: Callable[[Element], tuple[Marker, ...]] = lambda element: (element.i, element.j)
+    outside: Callable[[Element], bool] = lambda _: False
+    couples: Callable[[Filled, Index], Iterable[Sequence[int]]] = lambda table, body: (
+        np.column_stack([body[table.i], body[table.j]])
     )
-    by_rate: Callable[[Any], bool] = lambda _: True
+    by_rate: Callable[[Filled], bool] = lambda _: True
     hooks: Hooks = NO_HOOKS
 
     @property
@@ -276,6 +280,6 @@ class Family:
         forces = self.residuals, self.tangents, self.energy
         return *forces, self.multiplier_columns, self.pair_tangents
 
-    def pushes(self, element: Any) -> bool:
+    def pushes(self, element: Element) -> bool:
         """Whether an element changes the momentum of all bodies together."""
         return self.outside(element) or any(m.body == GROUND for m in self.ends(element))

@@ -6,16 +6,25 @@ and by the load of the joint; the power lost; the energy stored.
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import partial
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from numba import types
 from numba.extending import intrinsic
 
 from rom.mbs.compiler.calls import called
-from rom.mbs.elements.family import Family, Places, apart, integers, on_joint, rows_of, starts
+from rom.mbs.elements.family import (
+    Element,
+    Family,
+    Places,
+    apart,
+    integers,
+    on_joint,
+    rows_of,
+    starts,
+)
 from rom.mbs.elements.law_calls import DIFFERENCE_STEP
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.constraints import column_of
@@ -89,7 +98,7 @@ class Motors(JointForces):
 
 
 def pack(
-    made: type[JointForces], kind: int, elements: Mapping[str, Any], places: Places
+    made: type[JointForces], kind: int, elements: Mapping[str, Element], places: Places
 ) -> JointForces:
     """The table, of class ``made``, of all forces with a kind of laws.
 
@@ -278,9 +287,8 @@ def add_gradient(s, W, at, c, row):
 
 
 def joint_family(
-    name: str, record: type, kind: int, made: type[JointForces] = JointForces, **more: Any
+    name: str, record: type, kind: int, made: type[JointForces] = JointForces, **more: object
 ) -> Family:
     """The family of a kind of forces, see `pack`; ``more`` is as of all families."""
-    packed: Callable[[Any, Places], JointForces] = partial(pack, made, kind)
-    kernels = joint_wrenches, joint_tangents
-    return Family(name, record, packed, *kernels, ends=on_joint, couples=apart, **more)
+    given = partial(pack, made, kind), joint_wrenches, joint_tangents
+    return Family(name, record, *given, ends=on_joint, couples=apart, **more)

@@ -109,10 +109,11 @@ def stop(
     law = checked_law(name, law)
     places = [(-1, lower), (1, upper)]
     limits = [(side, float(x)) for side, x in places if x is not None]
-    if not limits:
-        raise ConfigError(f"stop {name!r} has no limit.", hint="Give lower or upper.")
-    if len(limits) == 2 and limits[0][1] > limits[1][1]:
-        raise ConfigError(f"stop {name!r}: lower = {lower:g} must be at most upper = {upper:g}.")
+    if not limits or limits[0][1] > limits[-1][1]:
+        raise ConfigError(
+            f"stop {name!r} has no limit or no room: give lower = {lower} or upper = {upper}, and "
+            "lower at most upper."
+        )
     self.add(name, Stop(joint, row, tuple(limits), law), STOPS_FAMILY)
 
 
@@ -172,18 +173,21 @@ def friction(  # noqa: PLR0913  one keyword per property
     """
     row = coordinate_of(self.joints, joint, coordinate, "friction")
     turns = row is self.joints[joint].turn
-    if mu and turns and radius is None:
-        raise ConfigError(f"friction {name!r} with mu on an angle needs the radius of the pin.")
-    if radius is not None and not turns:
-        raise ConfigError(f"friction {name!r} acts along a displacement; leave radius out.")
-    if static > 1.0 and stribeck_speed is None:
-        raise ConfigError(f"static = {static:g} of friction {name!r} needs stribeck_speed.")
+    faults = {
+        "with mu on an angle needs the radius of the pin": mu and turns and radius is None,
+        "acts along a displacement; leave radius out": radius is not None and not turns,
+        f"has static = {static:g}: it needs stribeck_speed": static > 1.0 and not stribeck_speed,
+    }
+    for fault, found in faults.items():
+        if found:
+            raise ConfigError(f"friction {name!r} {fault}.")
     level, fade = mu * (1.0 if radius is None else radius), stribeck_speed or 1.0
     numbers = (coulomb, level, static - 1.0, fade, viscous, transition_speed)
     self.add(name, Friction(joint, row, numbers), FRICTIONS_FAMILY)
 
 
-FRICTIONS_FAMILY = joint_family(
-    "frictions", Friction, FRICTION, Frictions, multiplier_columns=load_columns,
-    hooks=Hooks(loaded_rows=lambda frictions: frictions.load_first[frictions.law[:, 1] != 0.0]),
-)  # fmt: skip
+BY_LOAD = {
+    "multiplier_columns": load_columns,
+    "hooks": Hooks(loaded_rows=lambda found: found.load_first[found.law[:, 1] != 0.0]),
+}
+FRICTIONS_FAMILY = joint_family("frictions", Friction, FRICTION, Frictions, **BY_LOAD)

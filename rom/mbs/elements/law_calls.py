@@ -15,8 +15,12 @@ from rom import rotation
 from rom.mbs.compiler.calls import c_function
 from rom.mbs.compiler.intermediate import INTERMEDIATE_OPTIONS
 from rom.mbs.kernels.compiled import OPTIONS
-from rom.mbs.parts.foreign import ask, compiled_function, numbers
+from rom.mbs.kernels.work import Work
+from rom.mbs.parts.foreign import Entry, Function, ask, compiled_function, numbers
 from rom.model import Array
+
+Pointer = int  # of C, as a law in C gets it
+Sizes = tuple[int, int, int, int]  # numbers of parameters, markers, remembered numbers, outputs
 
 MOTION_SIZE = 18  # numbers of the motion of a marker
 ENERGY_SIZE = 2  # stored energy, lost power
@@ -37,10 +41,10 @@ class Motion(NamedTuple):
         omega: (K, 3) angular velocity [rad/s].
     """
 
-    position: Any
-    axes: Any
-    velocity: Any
-    omega: Any
+    position: Array
+    axes: Array
+    velocity: Array
+    omega: Array
 
 
 class Answer(NamedTuple):
@@ -55,15 +59,15 @@ class Answer(NamedTuple):
         outputs: (o,) values for the record.
     """
 
-    force: Any
-    moment: Any
-    energy: Any
-    lost: Any
-    memory: Any
-    outputs: Any
+    force: Array
+    moment: Array
+    energy: Array
+    lost: Array
+    memory: Array
+    outputs: Array
 
 
-def motion_of(flat: Any, n: int) -> Motion:
+def motion_of(flat: Array, n: int) -> Motion:
     """The fields of the motion of n markers in a vector (18 n,)."""
     return Motion(
         flat[: 3 * n].reshape(n, 3),
@@ -73,7 +77,7 @@ def motion_of(flat: Any, n: int) -> Motion:
     )
 
 
-def answer_of(flat: Any, n: int, n_memory: int) -> Answer:
+def answer_of(flat: Array, n: int, n_memory: int) -> Answer:
     """The fields of the answer of a law of n markers in a vector."""
     at = 6 * n + ENERGY_SIZE
     return Answer(
@@ -92,44 +96,41 @@ _taken_in = numba.njit(**INTERMEDIATE_OPTIONS)
 _motion_of, _answer_of = map(_taken_in, (motion_of, answer_of))
 
 
-def entries(name: str, laws: Any, sizes: Any, wanted: bool | None) -> tuple[Any, Any]:
+def entries(
+    name: str, laws: tuple[Function, Function | None], sizes: Sizes, wanted: bool | None
+) -> tuple[Entry | None, Entry | None]:
     """Law and tangents as functions of C; None for what is missing or left to Python."""
-    function, slopes = laws
-    entry = _compiled(name, function, sizes, wanted)
-    if slopes is None or entry is None:
+
+    def compiled(function: Function, insists: bool | None, *, tangents: bool) -> Entry | None:
+        def make(python: Function) -> Entry:
+            return entry_of(_taken_in(python), sizes, tangents=tangents)
+
+        if hasattr(function, "address"):
+            return function
+        hint = "Use numbers and arrays of NumPy only, or compiled=False."
+        return compiled_function(f"law {name!r}", function, make, insists, hint)
+
+    entry = compiled(laws[0], wanted, tangents=False)
+    if laws[1] is None or entry is None:
         return entry, None
-    return entry, _compiled(name, slopes, sizes, True, tangents=True)
+    return entry, compiled(laws[1], True, tangents=True)
 
 
-def _compiled(
-    name: str, function: Any, sizes: Any, wanted: bool | None, *, tangents: bool = False
-) -> Any:
-    if hasattr(function, "address"):
-        return function
-
-    def make(python: Any) -> Any:
-        return entry_of(_taken_in(python), sizes, tangents=tangents)
-
-    hint = "Use numbers and arrays of NumPy only, or compiled=False."
-    return compiled_function(f"law {name!r}", function, make, wanted, hint)
-
-
-def entry_of(function: Any, sizes: tuple[int, int, int, int], *, tangents: bool = False) -> Any:
-    """A function of C that calls a compiled law, or its tangents, with arguments in their shapes.
-
-    Sizes are the numbers of parameters, markers, remembered numbers, outputs.
-    """
+def entry_of(function: Function, sizes: Sizes, *, tangents: bool) -> Entry:
+    """A function of C: it calls a compiled law, or its tangents, with arguments in their shapes."""
     p, n, m, o = sizes
     taken, answered = _motion_of, _answer_of
     n_motion, n_answer, n_rows = MOTION_SIZE * n, 6 * n + ENERGY_SIZE + m + o, 6 * n
     carray = numba.carray
 
-    def law(t: Any, parameters: Any, motion: Any, memory: Any, out: Any) -> None:
+    def law(t: float, parameters: Pointer, motion: Pointer, memory: Pointer, out: Pointer) -> None:
         given, kept = carray(parameters, p), carray(memory, m)
         moved = taken(carray(motion, n_motion), n)
         function(t, given, moved, kept, answered(carray(out, n_answer), n, m))
 
-    def slopes(t: Any, parameters: Any, motion: Any, memory: Any, out: Any) -> None:
+    def slopes(
+        t: float, parameters: Pointer, motion: Pointer, memory: Pointer, out: Pointer
+    ) -> None:
         given, kept = carray(parameters, p), carray(memory, m)
         moved, D = taken(carray(motion, n_motion), n), carray(out, (2, n_rows, n_rows))
         function(t, given, moved, kept, D[0], D[1])
@@ -137,7 +138,7 @@ def entry_of(function: Any, sizes: tuple[int, int, int, int], *, tangents: bool 
     return numba.cfunc(LAW_TYPES)(slopes if tangents else law)
 
 
-def compiled_entry(function: Any, types: str) -> Any:
+def compiled_entry(function: Callable[..., None], types: str) -> Entry:
     """A function of C, compiled of one of a module and kept; it makes arrays of pointers."""
     options = {name: value for name, value in OPTIONS.items() if name != "cache"} | {"_nrt": True}
     return c_function(function, types, options)
@@ -175,7 +176,7 @@ class AskedLaw:
         """What it is, by name."""
         return f"law {self.name!r}"
 
-    def apply(self, W: Any, t: float, *, slopes: bool) -> None:
+    def apply(self, W: Work, t: float, *, slopes: bool) -> None:
         """Let it answer for the motion at hand, and tell its derivatives."""
         laws, e, n = self.laws, self.e, len(self.law.markers)
         begin, at = self.followed + laws.memory_at[e], laws.marker[e, :n]

@@ -57,6 +57,7 @@ from rom.mbs.kernels.tables import (
     table,
 )
 from rom.mbs.parts.bodies import Marker
+from rom.mbs.parts.foreign import Entry, Function
 from rom.mbs.parts.joints import Whole
 from rom.model import Array, Index
 
@@ -75,14 +76,14 @@ class Law:
         compiled: entries in C with attribute ``address``, None where Python is asked.
     """
 
-    function: Callable[..., Any]
-    tangents: Callable[..., Any] | None
+    function: Function
+    tangents: Function | None
     markers: tuple[Marker, ...]
     parameters: Array
     memory: Array
     outputs: tuple[str, ...]
     stores: bool
-    compiled: tuple[Any, Any]
+    compiled: tuple[Entry | None, Entry | None]
 
     @property
     def sizes(self) -> tuple[int, int, int]:
@@ -130,10 +131,8 @@ def law(  # noqa: PLR0913  one keyword per property
     Raises:
         ConfigError: for no marker, or a law that cannot be compiled although it must.
     """
-    for what, one in (
-        ("function", function),
-        ("tangents", function if tangents is None else tangents),
-    ):
+    given = {"function": function, "tangents": function if tangents is None else tangents}
+    for what, one in given.items():
         if not callable(one) and not hasattr(one, "address"):
             raise ConfigError(f"{what} = {shortened(one)} of {name!r} must be a function.")
     numbers = finite(f"parameters of {name}", parameters, (np.size(parameters),))
@@ -409,12 +408,14 @@ def _outside(law: Law) -> bool:
     return not isinstance(law, UserForce) or len(law.markers) == 1
 
 
-def _couples(laws: Any, body: Index) -> list[Index]:
+def _couples(laws: Laws, body: Index) -> list[Index]:
     return [body[at[:n]] for at, n in zip(laws.marker, laws.count, strict=True)]
 
 
-LAWS_FAMILY = Family(
-    "laws", Law, pack, law_wrenches, law_tangents, law_energy, ends=lambda law: law.markers,
-    outside=_outside, couples=_couples, hooks=Hooks(
-        asked=asked, answers=lambda laws: [laws.answer[i:j] for i, j in pairwise(laws.answer_at)]),
-)  # fmt: skip
+def _answers(laws: Laws) -> list[Array]:
+    return [laws.answer[i:j] for i, j in pairwise(laws.answer_at)]
+
+
+KERNELS, HOOKS = (law_wrenches, law_tangents, law_energy), Hooks(asked=asked, answers=_answers)
+KNOWN = {"ends": lambda law: law.markers, "outside": _outside, "couples": _couples}
+LAWS_FAMILY = Family("laws", Law, pack, *KERNELS, hooks=HOOKS, **KNOWN)

@@ -1,10 +1,11 @@
 """Forces and torques on markers, loads spread over bodies: constant, or functions of time."""
 
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
+import numpy.typing as npt
 
 from rom.arguments import finite, number
 from rom.errors import ConfigError
@@ -42,10 +43,12 @@ from rom.mbs.kernels.markers import own_block
 from rom.mbs.kernels.tables import Array1, Array2, Array3, Index1, Scratch2, Table, table
 from rom.mbs.parts.bodies import Marker, Part
 from rom.mbs.parts.joints import Whole
+from rom.mbs.parts.signals import TimeFunction
 from rom.model import Array
 from rom.rotation import skew
 
 Axes = Literal["world", "body"]
+Given = npt.ArrayLike | TimeFunction  # constant or not
 # kinds of loads
 FORCE_WORLD, FORCE_BODY, TORQUE_WORLD, TORQUE_BODY = 0, 1, 2, 3
 
@@ -57,7 +60,7 @@ class Load:
     marker: Marker
     kind: int
     vector: Array
-    function: Callable[[float], Any] | None
+    function: TimeFunction | None
 
 
 def force(self: Whole, name: str, marker: Marker, vector: Any, *, frame: Axes = "world") -> None:
@@ -78,7 +81,7 @@ def torque(self: Whole, name: str, marker: Marker, vector: Any, *, frame: Axes =
     _load(self, name, marker, vector, frame, TORQUE_WORLD)
 
 
-def _load(self: Whole, name: str, marker: Marker, vector: Any, frame: str, kind: int) -> None:
+def _load(self: Whole, name: str, marker: Marker, vector: Given, frame: str, kind: int) -> None:
     function = vector if callable(vector) else None
     constant = np.zeros(3) if function else finite(f"vector of {name}", vector, (3,))
     self.add(name, Load(marker, kind + (frame == "body"), constant, function), LOADS_FAMILY)
@@ -101,7 +104,7 @@ class Loads(Table):
     signal: Index1
 
 
-def pack(loads: Any, places: Places) -> Loads:
+def pack(loads: Mapping[str, Load], places: Places) -> Loads:
     """The loads as arrays."""
     return Loads(
         integers(places.marker[load.marker] for load in loads.values()),
@@ -145,10 +148,10 @@ def load_tangents(s, W, loads, _lam, ck, _cc):
             pair_stiffness(s, W, m, m, W.Kt)
 
 
+OUTSIDE = {"outside": from_outside, "couples": apart, "by_rate": never}
 LOADS_FAMILY = Family(
-    "loads", Load, pack, load_wrenches, load_tangents, ends=lambda load: (load.marker,),
-    outside=from_outside, couples=apart, by_rate=never,
-)  # fmt: skip
+    "loads", Load, pack, load_wrenches, load_tangents, ends=lambda load: (load.marker,), **OUTSIDE
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,7 +163,7 @@ class Spread:
     first: Array
     shapes: Array
     amplitude: float
-    function: Callable[[float], Any] | None
+    function: TimeFunction | None
     world: int
 
 
@@ -208,9 +211,8 @@ def _by_the_frame(part: Part, load: Any) -> Array:
     """(r, 3, 3) what the sums of shapes and forces gain from the frame that is integrated."""
     if part.own_frame is None:
         return np.zeros((part.r, 3, 3))
-    move, turn = part.shapes(part.own_frame)
-    return np.array([np.outer(t, load.force) + skew(w) @ load.first
-                     for t, w in zip(move.T, turn.T, strict=True)])  # fmt: skip
+    moves = zip(*(shape.T for shape in part.shapes(part.own_frame)), strict=True)
+    return np.array([np.outer(t, load.force) + skew(w) @ load.first for t, w in moves])
 
 
 @table
@@ -236,7 +238,7 @@ class SpreadLoads(Table):
     arm: Scratch2
 
 
-def pack_spread(loads: Any, places: Places) -> SpreadLoads:
+def pack_spread(loads: Mapping[str, Spread], places: Places) -> SpreadLoads:
     """The spread loads as arrays."""
     found = loads.values()
     shapes = np.zeros((len(found), places.R, 9))
@@ -249,12 +251,14 @@ def pack_spread(loads: Any, places: Places) -> SpreadLoads:
         rows_of((load.first.ravel() for load in found), 9),
         shapes,
         np.array([load.amplitude for load in found], dtype=float),
-        integers(
-            places.signal(name, f and (lambda t, f=f: (f(t), 0.0, 0.0)))  # of three components
-            for name, f in ((name, load.function) for name, load in loads.items())
-        ),
+        integers(places.signal(name, _first_of(load.function)) for name, load in loads.items()),
         np.zeros((len(found), 9)),
     )
+
+
+def _first_of(function: TimeFunction | None) -> TimeFunction | None:
+    """A vector with a number over time as its first component."""
+    return function and (lambda t: (function(t), 0.0, 0.0))
 
 
 @inner
@@ -280,16 +284,13 @@ def seen(x, A, world):
 @inner
 def spread_arm(s, W, loads, k, q):
     """Sum [a, b] of positions and forces of load k, of the deformed body, axes of the body."""
-    b, world = loads.body[k], loads.world[k]
-    N = seen(loads.first[k], W.A[b], world)
-    for j in range(s.bodies.r[b]):
-        x = seen(loads.shapes[k, j], W.A[b], world)
-        f = q[s.bodies.q_at[b] + 7 + j]
-        N = (
-            N[0] + f * x[0], N[1] + f * x[1], N[2] + f * x[2],
-            N[3] + f * x[3], N[4] + f * x[4], N[5] + f * x[5],
-            N[6] + f * x[6], N[7] + f * x[7], N[8] + f * x[8],
-        )  # fmt: skip
+    body, world = loads.body[k], loads.world[k]
+    A, at, N = W.A[body], s.bodies.q_at[body] + 7, seen(loads.first[k], W.A[body], world)
+    for j in range(s.bodies.r[body]):
+        x, f = seen(loads.shapes[k, j], A, world), q[at + j]
+        a, b, c = N[0] + f * x[0], N[1] + f * x[1], N[2] + f * x[2]
+        d, e, g = N[3] + f * x[3], N[4] + f * x[4], N[5] + f * x[5]
+        N = a, b, c, d, e, g, N[6] + f * x[6], N[7] + f * x[7], N[8] + f * x[8]
     return N
 
 
@@ -335,7 +336,7 @@ def spread_tangents(s, W, loads, _lam, ck, _cc):
                 place_row(block, 6 + j, 3, ca, dual(x, 0))
 
 
+KERNELS = spread_residuals, spread_tangents
 SPREAD_LOADS_FAMILY = Family(
-    "spread_loads", Spread, pack_spread, spread_residuals, spread_tangents, ends=on_joint,
-    outside=from_outside, couples=apart, by_rate=never,
-)  # fmt: skip
+    "spread_loads", Spread, pack_spread, *KERNELS, ends=on_joint, **OUTSIDE
+)

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numba
 import numpy as np
@@ -11,7 +10,8 @@ from rom.mbs.elements.family import Hooks
 from rom.mbs.elements.formulas.programs import Formula
 from rom.mbs.elements.joint_forces import MOTOR, NO_PROGRAM, Motors, joint_family
 from rom.mbs.elements.law_calls import DIFFERENCE_STEP
-from rom.mbs.parts.foreign import ask, compiled_function, numbers
+from rom.mbs.kernels.work import Work
+from rom.mbs.parts.foreign import Entry, Function, ask, compiled_function, numbers
 from rom.mbs.parts.joints import Coordinate, Row, Whole, coordinate_of
 from rom.model import Array
 
@@ -23,7 +23,7 @@ class Motor:
     joint: str
     row: Row
     law: Callable[[float, float, float], float]
-    compiled: Any
+    compiled: Entry | None
 
     @property
     def laws(self) -> tuple[tuple[float, ...], ...]:
@@ -74,7 +74,7 @@ def motor(
     self.add(name, Motor(joint, row, law, _compiled(name, law, compiled)), MOTORS_FAMILY)
 
 
-def _compiled(name: str, law: Any, wanted: bool | None) -> Any:
+def _compiled(name: str, law: Function, wanted: bool | None) -> Entry | None:
     """The law as a C function of three doubles, None when it is left to Python."""
     if isinstance(law, Formula):
         return law
@@ -88,16 +88,16 @@ class MotorLaw:
     """A motor whose law stays in Python: its number."""
 
     name: str
-    law: Any
+    law: Function
     k: int
     motors: Motors
 
-    def apply(self, W: Any, t: float, *, slopes: bool) -> None:
+    def apply(self, W: Work, t: float, *, slopes: bool) -> None:
         """Set the force of the motor, and its slopes."""
         at, motors, what = self.motors.at[self.k], self.motors, f"the law of motor {self.name!r}"
         x, rate = float(W.x[at]), float(W.xd[at])
 
-        def force(x: float, rate: float) -> Any:
+        def force(x: float, rate: float) -> Array:
             return numbers(what, t, ask(what, t, self.law, t, x, rate), (), "a number")
 
         motors.answer[self.k] = force(x, rate)
@@ -116,7 +116,5 @@ def asked(motors: Mapping[str, Motor], packed: Motors, _followed: int) -> Sequen
     ]
 
 
-MOTORS_FAMILY = joint_family(
-    "motors", Motor, MOTOR, Motors,
-    hooks=Hooks(asked=asked, answers=lambda motors: motors.answer),
-)  # fmt: skip
+HOOKS = Hooks(asked=asked, answers=lambda motors: motors.answer)
+MOTORS_FAMILY = joint_family("motors", Motor, MOTOR, Motors, hooks=HOOKS)

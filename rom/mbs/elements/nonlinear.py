@@ -19,10 +19,10 @@ LAW_MEMORY_SIZE numbers. Such a function is made with ``numba.cfunc`` or by any
 compiler; `compiled_law` keeps what it makes.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from numba import types
@@ -48,6 +48,7 @@ from rom.mbs.kernels.tables import (
     table,
 )
 from rom.mbs.parts.bodies import Marker, Part
+from rom.mbs.parts.foreign import Entry
 from rom.mbs.parts.joints import Whole
 from rom.model import Array, Index
 from rom.names import offered
@@ -90,11 +91,11 @@ class Elements:
     address: int
     frames: Index
     numbers: Array
-    law: Any = None
+    law: Entry | None = None
     by_rate: bool = True
 
     @classmethod
-    def of(cls, law: Any, frames: Index, numbers: Array, *, by_rate: bool = True) -> "Elements":
+    def of(cls, law: Entry, frames: Index, numbers: Array, *, by_rate: bool = True) -> "Elements":
         """Elements with a law of `compiled_law`."""
         return cls(law.address, frames, numbers, law, by_rate)
 
@@ -156,7 +157,7 @@ class Assembly:
         return float(sum(np.linalg.norm(b.at - a.at) for a, b in pairwise(self.parts)))
 
 
-def compiled_law(function: Any) -> Any:
+def compiled_law(function: Callable[..., None]) -> Entry:
     """The law that a Python function describes, compiled and kept; it makes arrays of pointers."""
     return compiled_entry(function, LAW_SIGNATURE)
 
@@ -188,8 +189,8 @@ def add_nonlinear(
     self.check_new(name)
     _check(name, body)
     pose = start_pose(at, orientation, velocity, omega)
-    parts = tuple(_frame_part(f"{name}.{k}", body.frames, k, pose)
-                  for k in range(len(body.frames.x)))  # fmt: skip
+    n = len(body.frames.x)
+    parts = tuple(_frame_part(f"{name}.{k}", body.frames, k, pose) for k in range(n))
     assembly = Assembly(name, body, parts)
     for part in parts:
         self.check_new(part.name)
@@ -212,7 +213,7 @@ def _frame_part(name: str, frames: Frames, k: int, pose: tuple[Array, ...]) -> P
     return Part(name, float(frames.mass[k]), np.zeros(3), second, at + arm, p, *moving)
 
 
-def _check(name: str, body: Any) -> None:
+def _check(name: str, body: NonlinearBody) -> None:
     missing = [x for x in ("frames", "elements", "places", "coincident") if not hasattr(body, x)]
     if missing:
         raise ConfigError(
@@ -222,25 +223,28 @@ def _check(name: str, body: Any) -> None:
     frames, n = body.frames, len(body.frames.x)
     for key, shape in (("x", (n, 3)), ("p", (n, 4)), ("mass", (n,)), ("inertia", (n, 3))):
         finite(f"{key} of {name}", getattr(frames, key), shape)
-    without = (frames.mass <= 0.0) | (frames.inertia <= 0.0).any(axis=1)
+    if fault := next(_faults(frames, body.elements), ""):
+        raise ModelError(fault, where=name)
+
+
+def _faults(frames: Frames, elements: Sequence[Elements]) -> Iterator[str]:
+    """What is wrong with a body, in sentences."""
+    n, without = len(frames.x), (frames.mass <= 0.0) | (frames.inertia <= 0.0).any(axis=1)
     if without.any():
-        raise ModelError(
-            f"frame {int(np.argmax(without))} of {n} has mass {frames.mass[np.argmax(without)]:g} "
-            f"kg and inertia {frames.inertia[np.argmax(without)].tolist()} kg m^2: each must be "
-            "positive in a motion.",
-            where=name,
+        k = int(np.argmax(without))
+        yield (
+            f"frame {k} of {n} has mass {frames.mass[k]:g} kg and inertia "
+            f"{frames.inertia[k].tolist()} kg m^2: each must be positive in a motion."
         )
     if np.abs(np.linalg.norm(frames.p, axis=1) - 1.0).max() > QUATERNION_ATOL:
-        raise ModelError("each quaternion of a frame must have the length one.", where=name)
-    for group in body.elements:
+        yield "each quaternion of a frame must have the length one."
+    for group in elements:
         if group.frames.ndim != 2 or len(group.frames) != len(group.numbers):
-            raise ModelError(
-                "frames (e, k) and numbers must be of the same e elements.", where=name
-            )
+            yield "frames (e, k) and numbers must be of the same e elements."
         if group.frames.min(initial=0) < 0 or group.frames.max(initial=0) >= n:
-            raise ModelError(f"elements must connect frames from 0 to {n - 1}.", where=name)
+            yield f"elements must connect frames from 0 to {n - 1}."
         if not group.address:
-            raise ModelError("elements need a compiled law; give its address.", where=name)
+            yield "elements need a compiled law; give its address."
 
 
 @table
@@ -272,7 +276,7 @@ class Nonlinear(Table):
     by_rate: Index1
 
 
-def pack(bodies: Any, places: Places) -> Nonlinear:
+def pack(bodies: Mapping[str, Assembly], places: Places) -> Nonlinear:
     """The elements of all bodies as arrays."""
     groups = [
         (k, group, np.array([places.body[part.name] for part in whole.parts])[group.frames])
@@ -365,7 +369,7 @@ def nonlinear_energy(s, _W, elements, q, v):
     return total
 
 
-def _couples(elements: Any, _body: Index) -> list[Index]:
+def _couples(elements: Nonlinear, _body: Index) -> list[Index]:
     return [bodies[:n] for n, bodies in zip(elements.count, elements.body, strict=True)]
 
 
@@ -374,9 +378,14 @@ def _outside(whole: Assembly) -> bool:
     return any(group.frames.shape[1] == 1 for group in whole.body.elements)
 
 
+KERNELS = nonlinear_residuals, nonlinear_tangents, nonlinear_energy
+KNOWN = {"ends": on_joint, "outside": _outside, "couples": _couples}
 NONLINEAR_FAMILY = Family(
-    "nonlinear", Assembly, pack, nonlinear_residuals, nonlinear_tangents, nonlinear_energy,
-    ends=on_joint, outside=_outside, couples=_couples,
+    "nonlinear",
+    Assembly,
+    pack,
+    *KERNELS,
+    **KNOWN,
     by_rate=lambda elements: bool(elements.by_rate.any()),
     hooks=Hooks(answers=lambda elements: elements.forces),
-)  # fmt: skip
+)

@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from rom.errors import ModelError
-from rom.mbs.elements.family import Family, Places, apart, integers, never, on_joint
+from rom.mbs.elements.family import Family, Places, apart, integers, never, on_joint, starts
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.element_calls import energy, residuals, tangents
 from rom.mbs.kernels.markers import own_corner
@@ -73,12 +73,9 @@ def pack_quartics(found: Mapping[str, LargeDeflection], places: Places) -> Quart
         T3, T4 = x.by_pairs
         by_one[k, : x.n, : len(T3)] = T3.T
         by_two[k, : len(T4), : len(T4)] = T4
-    number = list(energies)
-    return Quartics(
-        integers(places.body[one.body] for one in found.values()),
-        integers(number.index(id(one.energy)) for one in found.values()),
-        by_one, by_two, np.zeros(P), np.zeros((e, P)), np.zeros((e, P)),
-    )  # fmt: skip
+    body = integers(places.body[one.body] for one in found.values())
+    which = integers(list(energies).index(id(one.energy)) for one in found.values())
+    return Quartics(body, which, by_one, by_two, np.zeros(P), np.zeros((e, P)), np.zeros((e, P)))
 
 
 @inner
@@ -148,10 +145,9 @@ def quartic_energy(s, _W, quartics, q, _v):
     return total
 
 
-QUARTICS_FAMILY = Family(
-    "bodies of large deflection", LargeDeflection, pack_quartics, quartic_residuals,
-    quartic_tangents, quartic_energy, ends=on_joint, couples=apart, by_rate=never,
-)  # fmt: skip
+ONE_BODY = {"ends": on_joint, "couples": apart, "by_rate": never}
+KERNELS = pack_quartics, quartic_residuals, quartic_tangents, quartic_energy
+QUARTICS_FAMILY = Family("bodies of large deflection", LargeDeflection, *KERNELS, **ONE_BODY)
 
 
 @table
@@ -186,16 +182,14 @@ def pack_samples(found: Mapping[str, LargeDeflection], places: Places) -> Sample
     every = [one.energy for one in found.values()]
     counts = [len(x.weights) for x in every]
     R, p, e = max((x.n for x in every), default=0), sum(counts), len(every)
-    G, K, start = np.zeros((p, 9, R)), np.zeros((e, R, R)), np.cumsum([0, *counts])
+    G, K, start = np.zeros((p, 9, R)), np.zeros((e, R, R)), starts(counts)
     for k, x in enumerate(every):
         G[start[k] : start[k + 1], :, : x.n] = x.gradients
         K[k, : x.n, : x.n] = x.K
-    return Samples(
-        integers(places.body[one.body] for one in found.values()), integers(start), G,
-        np.concatenate([np.zeros(0), *(x.weights for x in every)]),
-        np.vstack([np.zeros((0, 2)), *(x.lame for x in every)]),
-        K, np.zeros((p, 20)), np.zeros((9, R)), np.zeros(9),
-    )  # fmt: skip
+    body = integers(places.body[one.body] for one in found.values())
+    weights, lame = (np.concatenate([getattr(x, y) for x in every]) for y in ("weights", "lame"))
+    memory = np.zeros((p, 20)), np.zeros((9, R)), np.zeros(9)
+    return Samples(body, start, G, weights, lame, K, *memory)
 
 
 @inner
@@ -208,8 +202,8 @@ def take_state(s, samples, e, p, q):
         for k in range(r):
             X[i] += samples.gradients[p, i, k] * q[at + k]
     minors = X[0] * X[4] - X[1] * X[3] + X[0] * X[8] - X[2] * X[6] + X[4] * X[8] - X[5] * X[7]
-    third = (X[0] * (X[4] * X[8] - X[5] * X[7]) - X[1] * (X[3] * X[8] - X[5] * X[6])
-             + X[2] * (X[3] * X[7] - X[4] * X[6]))  # fmt: skip
+    third = X[0] * (X[4] * X[8] - X[5] * X[7]) - X[1] * (X[3] * X[8] - X[5] * X[6])
+    third += X[2] * (X[3] * X[7] - X[4] * X[6])
     grown = X[0] + X[4] + X[8] + minors + third
     X[18] = log1p(grown) if grown > -1.0 else nan
     a, d, g = 1.0 + X[0], 1.0 + X[4], 1.0 + X[8]
@@ -302,10 +296,8 @@ def sample_energy(s, _W, samples, q, _v):
     return total
 
 
-SAMPLES_FAMILY = Family(
-    "bodies of sampled elements", LargeDeflection, pack_samples, sample_residuals, sample_tangents,
-    sample_energy, ends=on_joint, couples=apart, by_rate=never,
-)  # fmt: skip
+OF_SAMPLES = pack_samples, sample_residuals, sample_tangents, sample_energy
+SAMPLES_FAMILY = Family("bodies of sampled elements", LargeDeflection, *OF_SAMPLES, **ONE_BODY)
 
 
 def deflection_of(part: Part) -> tuple[LargeDeflection, Family]:

@@ -1,8 +1,9 @@
 """Springs and dampers along the line between two markers."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 
@@ -79,7 +80,7 @@ class Springs(Table):
     law: Array2
 
 
-def pack(springs: Any, places: Places) -> Springs:
+def pack(springs: Mapping[str, Spring], places: Places) -> Springs:
     """The springs as arrays."""
     return Springs(
         integers(places.marker[s.i] for s in springs.values()),
@@ -140,7 +141,5 @@ def spring_energy(_s, W, springs, _q, _v):
     return total
 
 
-SPRINGS_FAMILY = Family(
-    "springs", Spring, pack, spring_wrenches, spring_tangents, spring_energy,
-    by_rate=lambda springs: springs.law[:, 1].any(),
-)  # fmt: skip
+KERNELS = spring_wrenches, spring_tangents, spring_energy
+SPRINGS_FAMILY = Family("springs", Spring, pack, *KERNELS, by_rate=lambda s: s.law[:, 1].any())

@@ -9,7 +9,8 @@ from typing import Any
 
 from numba import config, njit, types
 
-from rom.mbs.compiler.cache import kept
+from rom.mbs.compiler import calls
+from rom.mbs.compiler.cache import Function, kept
 from rom.mbs.compiler.calls import address_of, call_at, let_kernels_call
 from rom.mbs.compiler.table_types import number, pointer, word
 from rom.mbs.kernels.compiled import OPTIONS
@@ -26,7 +27,7 @@ SYSTEM_TYPE, WORK_TYPE = System._numba_type_, Work._numba_type_
 class ElementKernel:
     """A kernel of one family, which takes system, work and its table; compiled when needed."""
 
-    def __init__(self, function: Callable[..., Any], signature: Any):
+    def __init__(self, function: Function, signature: calls.Signature):
         compiler = njit(**OPTIONS, no_cpython_wrapper=True, no_cfunc_wrapper=True)
         self.kernel, self.signature = kept(compiler)(function), signature
         self._address = 0
@@ -47,34 +48,37 @@ class Role:
     It stands in a column of the row of a family; types are of what follows system, work and table.
     """
 
-    def __init__(self, column: int, result: Any, *types_: Any):
+    def __init__(self, column: int, result: types.Type, *types_: types.Type):
         self.column, self.result, self.types = column, result, types_
         signature = result(SYSTEM_TYPE, types.intp, WORK_TYPE, *types_)
         let_kernels_call(self, f"Role{column}", signature, self._call)
 
-    def of(self, table: Any) -> Callable[[Callable[..., Any]], ElementKernel]:
+    def of(self, table: type[Table]) -> Callable[[Function], ElementKernel]:
         """Make a function the kernel in this role of the family with this class of table."""
         signature = self.result(SYSTEM_TYPE, WORK_TYPE, table._numba_type_, *self.types)
         return lambda function: ElementKernel(function, signature)
 
-    def __call__(self, s: Any, k: int, W: Any, *arguments: Any) -> Any:
+    def __call__(self, s: System, k: int, W: Work, *arguments: object) -> Any:
         """The call where Python runs the kernels."""
         table, kernel = (int(s.elements[k, c]) for c in (0, self.column))
         return PYTHON_OBJECTS[kernel](s, W, PYTHON_OBJECTS[table], *arguments) if kernel else 0.0
 
-    def _call(self, context: Any, builder: Any, signature: Any, values: Any) -> Any:
+    def _call(
+        self,
+        context: calls.Context,
+        builder: calls.Builder,
+        signature: calls.Signature,
+        values: calls.Values,
+    ) -> calls.Value:
         s, k, W, *arguments = values
         rows = pointer(builder, word(builder, s, number(System._layout["elements"][0])))
         first = builder.mul(k, number(ROW_WORDS))
-
-        def of_row(column: int) -> Any:
-            return word(builder, rows, builder.add(first, number(column)))
-
-        table = pointer(builder, of_row(0))
+        places = (builder.add(first, number(column)) for column in (0, self.column))
+        table, address = (word(builder, rows, place) for place in places)
         # all tables are one address to compiled code: that of any class stands for the others
         called = self.result(SYSTEM_TYPE, WORK_TYPE, SYSTEM_TYPE, *self.types)
-        values = [s, W, table, *arguments]
-        return call_at(context, builder, called, of_row(self.column), values)
+        values = [s, W, pointer(builder, table), *arguments]
+        return call_at(context, builder, called, address, values)
 
 
 # (s, k, W, q, v, lam): add wrenches on markers, forces to W.residual and powers to W.power

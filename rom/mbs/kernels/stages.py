@@ -5,17 +5,19 @@ A stage is compiled once, whoever calls it, and only for systems that need it; i
 in a table that the system begins with.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 from numba import config, njit, types
 
-from rom.mbs.compiler.cache import CODE_FILES, EXPECTED_FUNCTIONS, kept
+from rom.mbs.compiler import calls
+from rom.mbs.compiler.cache import CODE_FILES, EXPECTED_FUNCTIONS, Function, kept
 from rom.mbs.compiler.calls import address_of, call_at, let_kernels_call
 from rom.mbs.compiler.table_types import number, pointer, word
 from rom.mbs.kernels.compiled import OPTIONS
 
+Needed = Callable[[Any], object]  # of a table: whether it needs a stage
 REAL_VECTOR = types.Array(types.float64, 1, "A")  # a row or a column of a table
 REAL_MATRIX = types.Array(types.float64, 2, "C")
 REAL_BLOCK = types.Array(types.float64, 2, "A")  # rows and columns of a matrix
@@ -35,10 +37,6 @@ STAGE_KERNELS: dict[str, "Stage"] = {}
 STAGE_ADDRESSES = np.zeros(len(STAGE_NAMES), dtype=np.int64)  # 0 until a stage is linked
 
 
-def _always(_: Any) -> bool:
-    return True
-
-
 class Stage:
     """A kernel with a fixed signature, callable from Python and, once linked, from kernels.
 
@@ -46,9 +44,7 @@ class Stage:
     system, or step, of this process ``needed`` it, a table of the class ``asked``.
     """
 
-    def __init__(
-        self, function: Callable[..., Any], types_: Any, asked: type, needed: Callable[[Any], Any]
-    ):
+    def __init__(self, function: Function, types_: Sequence[Any], asked: type, needed: Needed):
         result, *arguments = (getattr(kind, "_numba_type_", kind) for kind in types_)
         self.signature, self.asked, self.needed = result(*arguments), asked, needed
         self.kernel = kept(njit(**OPTIONS, no_cfunc_wrapper=True))(function)
@@ -66,11 +62,17 @@ class Stage:
         if not self.linked:
             STAGE_ADDRESSES[self.slot] = address_of(self.kernel, self.signature)
 
-    def __call__(self, *arguments: Any) -> Any:
+    def __call__(self, *arguments: object) -> Any:
         """Run it from Python."""
         return self.kernel(*arguments)
 
-    def _call(self, context: Any, builder: Any, signature: Any, values: Any) -> Any:
+    def _call(
+        self,
+        context: calls.Context,
+        builder: calls.Builder,
+        signature: calls.Signature,
+        values: calls.Values,
+    ) -> calls.Value:
         """What a call in a kernel becomes."""
         addresses = pointer(builder, word(builder, values[0], number(0)))
         address = word(builder, addresses, number(self.slot))
@@ -78,8 +80,8 @@ class Stage:
 
 
 def stage(
-    *types_: Any, asked: type | None = None, needed: Callable[[Any], Any] = _always
-) -> Callable[[Any], Stage]:
+    *types_: Any, asked: type | None = None, needed: Needed = lambda _: True
+) -> Callable[[Function], Stage]:
     """Make a function a stage, of the types of its result and arguments: tables or types of Numba.
 
     Tables of the class ``asked``, systems unless told, may need it; ``needed`` says if one does.
@@ -87,12 +89,12 @@ def stage(
     return lambda function: Stage(function, types_, asked or types_[1], needed)
 
 
-def needed_by(table: Any) -> set[str]:
+def needed_by(table: object) -> set[str]:
     """Names of the stages that a system or a step needs."""
     return {n for n, s in STAGE_KERNELS.items() if isinstance(table, s.asked) and s.needed(table)}
 
 
-def link(table: Any) -> None:
+def link(table: object) -> None:
     """Compile all stages that a system or a step needs, before kernels call them.
 
     What another process compiles just now comes last, so that two share the work.

@@ -38,9 +38,9 @@ class Table:
 
     __slots__ = ("_address", "_words")
     _address: int
-    _words: Any
-    _numba_type_: Any
-    _layout: dict[str, tuple[int, Any]]  # first word and type of each field
+    _words: Index
+    _numba_type_: TableType
+    _layout: dict[str, tuple[int, types.Type]]  # first word and type of each field
     _passing: frozenset[str]  # fields marked so
 
     def __post_init__(self) -> None:
@@ -50,7 +50,7 @@ class Table:
         object.__setattr__(self, "_words", np.array(words, dtype=np.int64))
         object.__setattr__(self, "_address", self._words.ctypes.data)
 
-    def __reduce__(self) -> Any:
+    def __reduce__(self) -> tuple[object, ...]:
         return type(self), tuple(value for _, value in self.items())
 
     def items(self) -> Iterator[tuple[str, Any]]:
@@ -73,9 +73,7 @@ def table(cls: type[T]) -> type[T]:
     made._numba_type_ = TableType(made)
     made._layout, at = {}, 0
     hints = get_type_hints(made, include_extras=True)
-    made._passing = frozenset(
-        name for name, hint in hints.items() if PASSING_MARK in get_args(hint)
-    )
+    made._passing = frozenset(x for x, hint in hints.items() if PASSING_MARK in get_args(hint))
     for name, hint in hints.items():
         if name.startswith("_"):
             continue
@@ -85,7 +83,7 @@ def table(cls: type[T]) -> type[T]:
     return made
 
 
-def _kind(hint: Any) -> Any:
+def _kind(hint: object) -> types.Type:
     """Type of a field in compiled code."""
     for part in (hint, *get_args(hint)):
         if isinstance(part, types.Array):
@@ -95,7 +93,7 @@ def _kind(hint: Any) -> Any:
     return types.int64
 
 
-def _words(value: Any, kind: Any, what: str) -> list[int]:
+def _words(value: Any, kind: types.Type, what: str) -> list[int]:
     """What a table says of one of its fields."""
     if isinstance(kind, TableType):
         return [0 if value is None else value._address]

@@ -1,9 +1,10 @@
 """Memory for what is computed of a system at one instant, and over a time step."""
 
 from functools import cache
-from typing import Annotated, Any, get_args, get_type_hints
+from typing import Annotated, get_args, get_type_hints
 
 import numpy as np
+from numba import types
 
 from rom.mbs.kernels.stages import link
 from rom.mbs.kernels.system import System
@@ -179,7 +180,7 @@ def workspace(system: System, n_signals: int) -> Work:
 
 
 @cache
-def _fields() -> dict[str, tuple[Any, str]]:
+def _fields() -> dict[str, tuple[types.Array, str]]:
     """Type and shape of the fields of `Work`."""
     hints = get_type_hints(Work, include_extras=True)
     return {name: get_args(hints[name])[1:] for name in Work._layout}

@@ -118,11 +118,7 @@ class Part:
         return np.asarray(self.flexible.markers[marker.place].point, dtype=float)
 
     def spin_about(self, name: str, axis: Array) -> float:
-        """Angular velocity of the material through the frame about an axis (3,) of it [rad/s].
-
-        Raises:
-            ConfigError: naming the element that asks, if the body spins about another axis.
-        """
+        """Angular velocity [rad/s] through the frame about an axis (3,), which must be its own."""
         speed = float(axis @ self.spin)
         if np.linalg.norm(self.spin - speed * axis) > SPIN_RTOL * np.linalg.norm(self.spin):
             raise ConfigError(
@@ -140,11 +136,7 @@ class Part:
             )
 
     def check_on_axis(self, name: str, marker: Marker) -> None:
-        """Let nothing, by name, hold a body that spins at a point beside its axis.
-
-        Raises:
-            ModelError: if the marker lies beside the axis through the mass centre.
-        """
+        """Let nothing, by name, hold a body that spins at a marker beside its axis."""
         speed = float(np.linalg.norm(self.spin))
         if not speed or self._surface_row(marker.place) is not None:
             return
@@ -184,7 +176,7 @@ class Part:
         found = getattr(self.moving.markers[marker.place], "covariance", None)
         return None if found is None else np.asarray(found, dtype=float)
 
-    def _surface_row(self, place: Any) -> int | None:
+    def _surface_row(self, place: object) -> int | None:
         """Point of the surface that a contact has put a marker on, or None."""
         if self.flexible is None or not isinstance(place, str) or place in self.names:
             return None
@@ -198,24 +190,17 @@ def ground_part() -> Part:
 
 
 def rigid_part(name: str, mass: float, inertia: Array, pose: Any, points: dict[str, Array]) -> Part:
-    """A rigid body.
-
-    Raises:
-        ModelError: if no distribution of mass has this inertia.
-    """
+    """A rigid body, if some distribution of mass has this inertia."""
     size = np.abs(inertia).max()
     moments = np.linalg.eigvalsh(0.5 * (inertia + inertia.T))
+    fault = ""
     if np.abs(inertia - inertia.T).max() > 1e-9 * size or moments[0] <= 0.0:
+        fault = "it must be symmetric and positive definite"
+    elif moments[2] > (1 + 1e-6) * (moments[0] + moments[1]):
+        fault = "the largest must be at most the sum of the others; no body has this inertia"
+    if fault:
         raise ModelError(
-            f"inertia has principal moments {moments.tolist()} kg m^2: it must be symmetric and "
-            "positive definite.",
-            where=name,
-        )
-    if moments[2] > (1 + 1e-6) * (moments[0] + moments[1]):
-        raise ModelError(
-            f"the largest principal moment {moments[2]:g} must be at most the sum of the others, "
-            f"{moments[0] + moments[1]:g} kg m^2: no body has this inertia.",
-            where=name,
+            f"inertia has principal moments {moments.tolist()} kg m^2: {fault}.", where=name
         )
     reach = max((float(np.linalg.norm(x)) for x in points.values()), default=0.0)
     radius = float(np.sqrt(moments[2] / mass))
@@ -230,11 +215,7 @@ def rigid_part(name: str, mass: float, inertia: Array, pose: Any, points: dict[s
 
 
 def flexible_part(name: str, body: Any, moving: Any, pose: Any, elastic: Any) -> Part:
-    """A flexible body, integrated as the body ``moving``.
-
-    Raises:
-        ModelError: if its mass matrix is singular.
-    """
+    """A flexible body, integrated as the body ``moving``, if its mass matrix is regular."""
     inertia = np.asarray(body.inertia, dtype=float)
     second = 0.5 * np.trace(inertia) * np.eye(3) - inertia
     first = np.asarray(body.first_moment, dtype=float)

@@ -9,7 +9,7 @@ import math
 import traceback
 from collections.abc import Callable
 from types import TracebackType
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -17,10 +17,19 @@ from rom.arguments import shortened
 from rom.errors import ConfigError, RomError, SolverError
 from rom.model import Array
 
+Function = Callable[..., Any]  # of the user
 KEPT_HINT = "The motion up to there is kept in error.solution."
 
 
-def ask(what: str, t: float, function: Callable[..., Any], *arguments: Any) -> Any:
+class Entry(Protocol):
+    """A function of C."""
+
+    @property
+    def address(self) -> int:
+        """Where it is in memory."""
+
+
+def ask(what: str, t: float, function: Function, *arguments: object) -> Any:
     """What a function of the user, by its name in the mechanism, answers at a time [s].
 
     Raises:
@@ -41,8 +50,8 @@ def ask(what: str, t: float, function: Callable[..., Any], *arguments: Any) -> A
 
 
 def compiled_function(
-    what: str, law: Any, make: Callable[[Any], Any], wanted: bool | None, hint: str
-) -> Any:
+    what: str, law: Function, make: Callable[[Function], Entry], wanted: bool | None, hint: str
+) -> Entry | None:
     """What ``make`` compiles a function of the user to; None when it is left to Python.
 
     True to insist, False to leave it to Python, None for what works; the hint says what it may be
@@ -67,7 +76,7 @@ def compiled_function(
         raise ConfigError(f"{what} cannot be compiled: {why}", hint=hint) from error
 
 
-def numbers(what: str, t: float, value: Any, shape: tuple[int, ...], needed: str) -> Array:
+def numbers(what: str, t: float, value: object, shape: tuple[int, ...], needed: str) -> Array:
     """The answer of a function at a time [s] as finite numbers of a shape, which ``needed`` words.
 
     Raises:
@@ -80,7 +89,7 @@ def numbers(what: str, t: float, value: Any, shape: tuple[int, ...], needed: str
     return A
 
 
-def real(what: str, t: float, value: Any, shape: tuple[int, ...], needed: str) -> Array:
+def real(what: str, t: float, value: object, shape: tuple[int, ...], needed: str) -> Array:
     """The same, finite or not."""
     A = _floats(value)
     if A is None or A.size != math.prod(shape) or (len(shape) > 1 and A.shape[0] != shape[0]):
@@ -91,7 +100,7 @@ def real(what: str, t: float, value: Any, shape: tuple[int, ...], needed: str) -
     return A.reshape(shape)
 
 
-def _floats(value: Any) -> Array | None:
+def _floats(value: object) -> Array | None:
     """A float array of real numbers; None of texts, None and complex numbers."""
     try:
         A = np.asarray(value)

@@ -7,7 +7,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 
 from rom.errors import ConfigError
-from rom.mbs.kernels.system import ALONG, ANGLE, NORMAL, POINT
+from rom.mbs.kernels.system import ALONG, ANGLE, COUPLING, NORMAL, POINT
 from rom.mbs.parts.bodies import Marker, Part
 from rom.model import Array
 from rom.names import offered
@@ -93,6 +93,11 @@ def triad(axis: Array, frames: tuple[Array, Array]) -> Triad:
     return Triad(frames[0].T @ axes, frames[1].T @ axes)
 
 
+def coupling(*terms: tuple[Row, float]) -> Row:
+    """A sum of two coordinates with factors stays zero."""
+    return Row(COUPLING, NO_VECTOR, NO_VECTOR, NO_VECTOR, terms=terms)
+
+
 def coincidence() -> tuple[Row, ...]:
     """The two points are one."""
     return tuple(Row(POINT, e, NO_VECTOR, NO_VECTOR) for e in np.eye(3))
@@ -144,7 +149,7 @@ class Whole(Protocol):
     def law(self) -> Callable[..., None]:
         """Add a law of force, see `rom.mbs.elements.laws.law`."""
 
-    def add(self, name: str, element: Any, family: Any) -> None:
+    def add(self, name: str, element: object, family: Any) -> None:
         """Enter an element."""
 
     def part(self, name: str) -> Part:

@@ -14,8 +14,9 @@ from rom.errors import ModelError, RomError, SolverError, warn
 from rom.mbs.parts.foreign import KEPT_HINT, ask, real
 from rom.model import Array
 
-# a function of time (numbers and arrays) with its rate and acceleration
-Motion = tuple[Callable[[Any], Any], Callable[[Any], Any], Callable[[Any], Any]]
+TimeFunction = Callable[[float], Any]  # of a user: number or vector
+OfMany = Callable[[Any], Any]  # the same of arrays of times, too
+Motion = tuple[OfMany, OfMany, OfMany]  # such a one, its rate and its acceleration
 # first and last time a function may be asked for
 Span = tuple[float, float]
 # weights of f(t), f(t + s), ... f(t + 4 s) in 12 s f' and 12 s^2 f'', fourth and third order
@@ -198,9 +199,9 @@ class Signal:
     """
 
     name: str
-    function: Callable[[float], Any]
-    rate: Callable[[float], Any] | None = None
-    acceleration: Callable[[float], Any] | None = None
+    function: TimeFunction
+    rate: TimeFunction | None = None
+    acceleration: TimeFunction | None = None
     width: int = 1
     looked: dict[Span, Examined] = field(default_factory=dict, compare=False, repr=False)
 
@@ -216,7 +217,7 @@ class Signal:
             self.looked[span] = Examined(self.name, self._of_many(self.function), rate, span[0])
         return self.looked[span].up_to(min(time, span[1]), spacing)
 
-    def _of_many(self, function: Callable[[float], Any]) -> Callable[[Array], Array]:
+    def _of_many(self, function: TimeFunction) -> Function:
         return lambda t: self._values(function, t)[:, 0]
 
     def sample(self, t: Array, span: Span, spacing: float) -> Array:
@@ -247,7 +248,7 @@ class Signal:
         # differences to one value first, so that a constant has the derivative zero exactly
         return ((values - values[:, :1]) * weights).sum(axis=1) / 12
 
-    def _values(self, function: Callable[[float], Any], t: Array, which: str = "function") -> Array:
+    def _values(self, function: TimeFunction, t: Array, which: str = "function") -> Array:
         """(n, width) values; one that is not finite is left for `first_failure` to tell."""
         many = _at_once(function, t, self.width)
         if many is not None:
@@ -259,7 +260,7 @@ class Signal:
         return np.array(values).reshape(-1, width)
 
 
-def _at_once(function: Callable[[Any], Any], t: Array, width: int) -> Array | None:
+def _at_once(function: OfMany, t: Array, width: int) -> Array | None:
     """Values at all times by one call, if the function can do that and agrees with itself."""
     if t.size < 4 or width != 1:
         return None
@@ -288,7 +289,7 @@ def transition(low: float, high: float, duration: float, start: float = 0.0) -> 
     """
     w, rise = 2 * np.pi, high - low
 
-    def s(t: Any) -> Any:
+    def s(t: Array) -> Array:
         return np.clip((t - start) / duration, 0.0, 1.0)
 
     return (
@@ -302,7 +303,7 @@ def run_up(rate: float, duration: float) -> Motion:
     """From rest to a steady rate, which rises without a jolt as in `transition`."""
     k, (speed, acceleration, _) = 2 * np.pi / duration, transition(0.0, rate, duration)
 
-    def value(t: Any) -> Any:
+    def value(t: Array) -> Array:
         s = np.clip(t, 0.0, duration)
         rising = s * s / (2 * duration) - np.sin(k * s / 2) ** 2 / (np.pi * k)
         return rate * (rising + np.maximum(t - duration, 0.0))

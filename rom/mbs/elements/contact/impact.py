@@ -1,7 +1,8 @@
 """Laws of compliant impact: stiffness from Hertz, damping from the coefficient of restitution."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 
@@ -50,27 +51,26 @@ class Impact:
     tangential_damping: Annotated[float, NotNegative()] = 0.0
 
     def __post_init__(self) -> None:
-        k, c = self.tangential_stiffness, self.tangential_damping
-        if k is None and c:
-            raise ConfigError(f"tangential_damping = {c:g} needs a tangential_stiffness.")
-        if k is not None and not self.mu:
-            raise ConfigError(
-                f"tangential_stiffness = {k:g} N/m without friction holds nothing.",
-                hint="Give mu above zero, or no tangential_stiffness.",
-            )
-        if (self.restitution is None) != (self.impact_speed is None):
-            raise ConfigError(
-                f"restitution = {self.restitution} needs the impact speed at which it holds, "
-                f"got impact_speed = {self.impact_speed}, and the other way round."
-            )
+        if fault := next(self._faults(), ""):
+            raise ConfigError(fault)
         if self.restitution is not None and self.impact_speed is not None:
-            if self.damping:
-                raise ConfigError(f"damping = {self.damping:g} and restitution; give only one.")
             factor = damping_of(self.restitution, self.impact_speed)
             object.__setattr__(self, "damping", factor)
 
+    def _faults(self) -> Iterator[str]:
+        """What numbers say against each other, in sentences."""
+        k, e, v = self.tangential_stiffness, self.restitution, self.impact_speed
+        if k is None and self.tangential_damping:
+            yield f"tangential_damping = {self.tangential_damping:g} needs a tangential_stiffness."
+        if k is not None and not self.mu:
+            yield f"tangential_stiffness = {k:g} N/m without friction holds nothing; give mu too."
+        if (e is None) != (v is None):
+            yield f"restitution = {e} needs the impact speed at which it holds, got {v}; give both."
+        if e is not None and self.damping:
+            yield f"damping = {self.damping:g} and restitution; give only one."
 
-def checked_law(name: str, law: Any, *parts: Part) -> Impact:
+
+def checked_law(name: str, law: object, *parts: Part) -> Impact:
     """The law, if it is one, and bodies that touch show how fast they slide."""
     if not isinstance(law, Impact):
         raise ConfigError(f"law of {name!r} is {law!r}; a rom.mbs.Impact is needed.")

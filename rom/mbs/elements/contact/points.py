@@ -16,8 +16,8 @@ Source:
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -95,7 +95,7 @@ class Contacts(Table):
     remembered: Index1
 
 
-def pack(contacts: Any, places: Places) -> Contacts:
+def pack(contacts: Mapping[str, Contact], places: Places) -> Contacts:
     """The contacts as arrays."""
     found = contacts.values()
     laws = [c.law for c in found]
@@ -364,7 +364,6 @@ def contact_energy(_s, W, contacts, _q, _v):
     return total
 
 
-CONTACTS_FAMILY = Family(
-    "contacts", Contact, pack, contact_wrenches, contact_tangents, contact_energy,
-    hooks=Hooks(remembers=lambda contacts: contacts.remembered >= 0, kept=kept),
-)  # fmt: skip
+KERNELS = contact_wrenches, contact_tangents, contact_energy
+HOOKS = Hooks(remembers=lambda contacts: contacts.remembered >= 0, kept=kept)
+CONTACTS_FAMILY = Family("contacts", Contact, pack, *KERNELS, hooks=HOOKS)

@@ -10,7 +10,7 @@ Source:
     Johnson, Contact Mechanics (1985), section 4.3 (elastic foundation).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Annotated, Any
 
@@ -36,6 +36,7 @@ from rom.mbs.parts.joints import Whole
 from rom.model import Array
 
 Where = Callable[[Array], Any] | str | None  # as rom.surface_load takes it
+Axes = Sequence[Direction | None]  # of both shapes
 
 
 def sphere_on_plane(
@@ -200,8 +201,10 @@ def capsule_on_capsule(  # noqa: PLR0913  two bodies and a law
     gap = self.design_point(m2) - self.design_point(m1)
     e, s = (unit_vector(f"axis of {name}", axis) for axis in axes)
     if not distance(gap, e, s, half[1], half[0]) > 0.0:
-        raise ConfigError(f"contact {name!r}: the axes cross at the start; nothing tells the side "
-                          "on which the bodies touch.", hint="Move one of them away.")  # fmt: skip
+        raise ConfigError(
+            f"contact {name!r}: the axes cross at the start; nothing tells the side on which the "
+            "bodies touch. Move one of them away."
+        )
     _enter(self, name, CAPSULE, (m1, m2), law, axes, (radius2, radius1), half)
 
 
@@ -229,7 +232,7 @@ def surface_on_plane(
         ConfigError: for a wrong argument.
         ModelError: if the body carries no surface.
     """
-    _cover(self, name, PLANE, m1, part, (law, normal, 0.0, where))
+    _cover(self, name, PLANE, m1, part, law, (normal, 0.0, where))
 
 
 def surface_on_sphere(
@@ -256,7 +259,7 @@ def surface_on_sphere(
         ConfigError: for a wrong argument.
         ModelError: if the body carries no surface.
     """
-    _cover(self, name, SPHERE, m1, part, (law, None, radius, where))
+    _cover(self, name, SPHERE, m1, part, law, (None, radius, where))
 
 
 def surface_on_cylinder(  # noqa: PLR0913  two surfaces and a law
@@ -288,14 +291,20 @@ def surface_on_cylinder(  # noqa: PLR0913  two surfaces and a law
         ModelError: if the body carries no surface.
     """
     kind = BORE if inside else CYLINDER
-    _cover(self, name, kind, m1, part, (law, axis, radius, where))
+    _cover(self, name, kind, m1, part, law, (axis, radius, where))
 
 
 def _cover(
-    self: Whole, name: str, kind: int, m1: Marker, part: Part, given: tuple[Any, ...]
+    self: Whole,
+    name: str,
+    kind: int,
+    m1: Marker,
+    part: Part,
+    law: Impact,
+    given: tuple[Direction | None, float, Where],
 ) -> None:
     """Put a contact on every point of the surface that has area."""
-    law, axis, radius, where = given
+    axis, radius, where = given
     self.check_new(name)
     part = self.part(str(getattr(part, "name", part)))
     if part.flexible is None:
@@ -327,7 +336,7 @@ def _enter(  # noqa: PLR0913  what the record holds
     kind: int,
     markers: tuple[Marker, Marker],
     law: Impact,
-    axes: Any,
+    axes: Axes,
     radius: tuple[float, float],
     half: tuple[float, float] = (0.0, 0.0),
 ) -> None:
@@ -338,7 +347,7 @@ def _enter(  # noqa: PLR0913  what the record holds
     self.add(name, Contact(kind, *markers, e, s, radius, law, half), CONTACTS_FAMILY)
 
 
-def _carried(self: Whole, name: str, marker: Marker, axis: Any) -> Array:
+def _carried(self: Whole, name: str, marker: Marker, axis: Direction | None) -> Array:
     """(3,) direction of an axis in the axes of the body of a marker; zeros for none."""
     if axis is None:
         return np.zeros(3)

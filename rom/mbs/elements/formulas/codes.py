@@ -13,10 +13,11 @@ COUNTS: dict[str, tuple[int, int | None]] = {
 # name: instruction, fewest and most arguments; None for any number
 FUNCTIONS = {name: (code, *COUNTS[name]) for code, name in enumerate(NAMES, start=SIN)}
 VARIABLES = {"t": T, "x": X, "v": V}
+OF_TWO = (ADD, SUB, MUL, DIV, POW, ATAN2, MIN, MAX)
 # instruction: by how much the stack grows
 STACK_GROWTH = {
     **dict.fromkeys((NUMBER, T, X, V), 1),
-    **dict.fromkeys((ADD, SUB, MUL, DIV, POW, ATAN2, MIN, MAX), -1),
+    **dict.fromkeys(OF_TWO, -1),
     STEP: -2,
 }
 MAX_STACK = 48  # values on the stack of a program

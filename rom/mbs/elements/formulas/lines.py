@@ -9,7 +9,6 @@ the work is that of an applied force.
 
 import math
 from functools import cache
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +21,7 @@ from rom.mbs.elements.formulas.taylor import run
 from rom.mbs.elements.law_calls import LAW_TYPES, compiled_entry
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.parts.bodies import Marker
+from rom.mbs.parts.foreign import Entry
 from rom.mbs.parts.joints import Whole
 from rom.model import Array
 
@@ -130,7 +130,7 @@ def line_tangents(t, parameters, motion, memory, D):
 
 
 @cache
-def entries() -> tuple[Any, Any]:
+def entries() -> tuple[Entry, Entry]:
     """The compiled law and its tangents."""
     return compiled_entry(line_force, LAW_TYPES), compiled_entry(line_tangents, LAW_TYPES)
 

@@ -5,14 +5,17 @@ from functools import cache
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from numba import carray
 
 from rom.mbs.elements.formulas.codes import MAX_STACK, MUL, NUMBER, PIECES, Code, T, V, X
 from rom.mbs.elements.formulas.taylor import run
 from rom.mbs.elements.law_calls import compiled_entry
 from rom.mbs.kernels.compiled import kernel
+from rom.mbs.parts.foreign import Entry
 from rom.model import Array
 
+Value = Any  # a number, or an array of them
 # of a formula of a coordinate, as numba.cfunc takes it: t, x, v, program and answer
 FORMULA_TYPES = "void(f8, f8, f8, CPointer(f8), CPointer(f8))"
 
@@ -36,7 +39,7 @@ def along_coordinate(t, x, v, program, answer):
 
 
 @cache
-def entry() -> Any:
+def entry() -> Entry:
     """The compiled `along_coordinate`."""
     return compiled_entry(along_coordinate, FORMULA_TYPES)
 
@@ -53,15 +56,15 @@ class Formula:
     program: Array
     names: frozenset[str]
 
-    def __call__(self, t: Any, x: Any = 0.0, v: Any = 0.0) -> Any:
+    def __call__(self, t: Value, x: Value = 0.0, v: Value = 0.0) -> Value:
         """Its value; of arrays each to each."""
         return self._sampled(t, x, v)[..., 0] if np.ndim(t) else float(self._sampled(t, x, v)[0])
 
-    def rate(self, t: Any) -> Any:
+    def rate(self, t: Value) -> Value:
         """Its first derivative by time."""
         return self._sampled(t, by_time=1.0)[..., 1]
 
-    def acceleration(self, t: Any) -> Any:
+    def acceleration(self, t: Value) -> Value:
         """Its second derivative by time."""
         return self._sampled(t, by_time=1.0)[..., 2]
 
@@ -70,7 +73,9 @@ class Formula:
         """Of the compiled function that answers for it, see `along_coordinate`."""
         return int(entry().address)
 
-    def _sampled(self, t: Any, x: Any = 0.0, v: Any = 0.0, by_time: float = 0.0) -> Array:
+    def _sampled(
+        self, t: npt.ArrayLike, x: npt.ArrayLike = 0.0, v: npt.ArrayLike = 0.0, by_time: float = 0.0
+    ) -> Array:
         given = np.stack(np.broadcast_arrays(t, x, v), axis=-1).astype(float)
         out = np.empty((given.size // 3, 3))
         sampled(self.program, given.reshape(-1, 3), by_time, out, np.empty((MAX_STACK, 3)))

@@ -7,36 +7,7 @@ f_1 is infinite: sqrt(0) is 0.
 
 import math
 
-from rom.mbs.elements.formulas.codes import (
-    ABS,
-    ACOS,
-    ADD,
-    ASIN,
-    ATAN,
-    ATAN2,
-    COS,
-    DIV,
-    EXP,
-    LOG,
-    MAX,
-    MIN,
-    MUL,
-    NEG,
-    NUMBER,
-    PIECES,
-    POW,
-    SIGN,
-    SIN,
-    SINH,
-    SQRT,
-    STEP,
-    SUB,
-    TAN,
-    TANH,
-    T,
-    V,
-    X,
-)
+from rom.mbs.elements.formulas import codes
 from rom.mbs.kernels.algebra import add, row, sub
 from rom.mbs.kernels.compiled import inner
 
@@ -134,22 +105,22 @@ def pieces(program, at, a):
 def circular(code, a):
     """Sine, cosine, tangent, and their inverses."""
     x = a[0]
-    if code == SIN:
+    if code == codes.SIN:
         s, c = math.sin(x), math.cos(x)
         return chained(s, c, -s, a)
-    if code == COS:
+    if code == codes.COS:
         s, c = math.sin(x), math.cos(x)
         return chained(c, -s, -c, a)
-    if code == TAN:
+    if code == codes.TAN:
         f = math.tan(x)
         return chained(f, 1.0 + f * f, 2.0 * f * (1.0 + f * f), a)
-    if code == ATAN:
+    if code == codes.ATAN:
         slope = 1.0 / (1.0 + x * x)
         return chained(math.atan(x), slope, -2.0 * x * slope * slope, a)
     if not -1.0 <= x <= 1.0:
         return math.nan, math.nan, math.nan
     slope = 1.0 / math.sqrt(1.0 - x * x)
-    if code == ASIN:
+    if code == codes.ASIN:
         return chained(math.asin(x), slope, x * slope**3, a)
     return chained(math.acos(x), -slope, -x * slope**3, a)
 
@@ -158,35 +129,35 @@ def circular(code, a):
 def hyperbolic(code, a):
     """Hyperbolic sine, cosine and tangent, exponential, logarithm and square root."""
     x = a[0]
-    if code == EXP:
+    if code == codes.EXP:
         f = math.exp(x)
         return chained(f, f, f, a)
-    if code == LOG:
+    if code == codes.LOG:
         if x < 0.0:
             return math.nan, math.nan, math.nan
         return chained(math.log(x), 1.0 / x, -1.0 / (x * x), a)
-    if code == SQRT:
+    if code == codes.SQRT:
         f = math.sqrt(x) if x >= 0.0 else math.nan
         return chained(f, 0.5 / f, -0.25 / (f * f * f), a)
-    if code == TANH:
+    if code == codes.TANH:
         f = math.tanh(x)
         return chained(f, 1.0 - f * f, -2.0 * f * (1.0 - f * f), a)
     s, c = math.sinh(x), math.cosh(x)
-    return chained(s, c, s, a) if code == SINH else chained(c, s, c, a)
+    return chained(s, c, s, a) if code == codes.SINH else chained(c, s, c, a)
 
 
 @inner
 def of_one(code, a):
     """A function of one number."""
-    if code == NEG:
+    if code == codes.NEG:
         return -a[0], -a[1], -a[2]
-    if code == ABS:
+    if code == codes.ABS:
         if a[0] == 0.0:
             return chained(0.0, 0.0, 0.0, a)
         return (-a[0], -a[1], -a[2]) if a[0] < 0.0 else a
-    if code == SIGN:
+    if code == codes.SIGN:
         return math.copysign(1.0, a[0]) if a[0] != 0.0 else 0.0 * a[0], 0.0, 0.0
-    if code in (SIN, COS, TAN, ASIN, ACOS, ATAN):
+    if code in (codes.SIN, codes.COS, codes.TAN, codes.ASIN, codes.ACOS, codes.ATAN):
         return circular(code, a)
     return hyperbolic(code, a)
 
@@ -194,19 +165,19 @@ def of_one(code, a):
 @inner
 def of_two(code, a, b):
     """A function of two numbers."""
-    if code == ADD:
+    if code == codes.ADD:
         return add(a, b)
-    if code == SUB:
+    if code == codes.SUB:
         return sub(a, b)
-    if code == MUL:
+    if code == codes.MUL:
         return product(a, b)
-    if code == DIV:
+    if code == codes.DIV:
         return quotient(a, b)
-    if code == POW:
+    if code == codes.POW:
         return power(a, b)
-    if code == ATAN2:
+    if code == codes.ATAN2:
         return angle(a, b)
-    if a[0] != a[0] or (a[0] <= b[0]) == (code == MIN):  # what is no number wins
+    if a[0] != a[0] or (a[0] <= b[0]) == (code == codes.MIN):  # what is no number wins
         return a
     return b
 
@@ -220,18 +191,18 @@ def run(program, t, x, v, stack):
     top = -1
     for k in range(int(program[0])):
         code, number = int(program[1 + 2 * k]), program[2 + 2 * k]
-        if code <= V:
+        if code <= codes.V:
             top += 1
             a = (number, 0.0, 0.0)
-            if code != NUMBER:
-                a = t if code == T else x if code == X else v
-        elif code in (ADD, SUB, MUL, DIV, POW, ATAN2, MIN, MAX):
+            if code != codes.NUMBER:
+                a = t if code == codes.T else x if code == codes.X else v
+        elif code in codes.OF_TWO:
             top -= 1
             a = of_two(code, row(stack, top, 0), row(stack, top + 1, 0))
-        elif code == STEP:
+        elif code == codes.STEP:
             top -= 2
             a = smooth_step(row(stack, top, 0), row(stack, top + 1, 0), row(stack, top + 2, 0))
-        elif code == PIECES:
+        elif code == codes.PIECES:
             a = pieces(program, int(number), row(stack, top, 0))
         else:
             a = of_one(code, row(stack, top, 0))
