@@ -18,11 +18,19 @@ from rom.mbs.parts.joints import Joint, Row
 from rom.model import Array
 
 
+class Seen(NamedTuple):
+    """Place (n_t, 3), axes (n_t, 3, 3), velocities (n_t, 6) of a marker; no n_t at one time."""
+
+    position: Array
+    axes: Array
+    twist: Array
+
+
 class Tracks(NamedTuple):
     """One row per instant.
 
     Attributes:
-        position, axes, twist: (n_t, 3), (n_t, 3, 3), (n_t, 6) of one marker.
+        position, axes, twist: of one marker, see `Seen`.
         reaction: (n_t, 6) force and moment of some constraint rows on their second marker.
         energy: (n_t, 3) kinetic, strain, potential [J].
         momentum: (n_t, 6) linear, and angular about the world origin.
@@ -142,15 +150,15 @@ class JointMotion:
     displacement_rate: Array | None
 
 
-def joint_motion(t: Array, joint: Joint, one: Any, two: Any) -> JointMotion:
-    """Measure a joint again, from the `rom.mbs.results.recomputed.Tracks` of its markers."""
+def joint_motion(t: Array, joint: Joint, one: Seen, two: Seen) -> JointMotion:
+    """Measure a joint again, from what was seen of its markers."""
     angle = (None, None) if joint.turn is None else angles(joint.turn, t, one, two)
     slide = joint.displacement
     displacement = (None, None) if slide is None else displacements(slide, one, two)
     return JointMotion(t, *angle, *displacement)
 
 
-def angles(row: Row, t: Array, one: Any, two: Any) -> tuple[Array, Array]:
+def angles(row: Row, t: Array, one: Seen, two: Seen) -> tuple[Array, Array]:
     """(n_t,) angle of b seen in the axes a and c, and its rate.
 
     Between two instants the angle changes by what the trapezoidal rule makes of the rates, to less
@@ -168,7 +176,7 @@ def angles(row: Row, t: Array, one: Any, two: Any) -> tuple[Array, Array]:
     return angle, rate
 
 
-def displacements(row: Row, one: Any, two: Any) -> tuple[Array, Array]:
+def displacements(row: Row, one: Seen, two: Seen) -> tuple[Array, Array]:
     """(n_t,) distance along the axis a, which the first body carries, and its rate."""
     a, gap = one.axes @ row.a, two.position - one.position
     slide, turn = two.twist[:, :3] - one.twist[:, :3], np.cross(one.twist[:, 3:], a)
