@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -12,8 +11,14 @@ from rom.arguments import typed, whole
 from rom.errors import ModelError, RomError, SolverError, reached, warn
 from rom.mbs.analysis.local_equations import Instant, instant
 from rom.mbs.analysis.rotors.spins import Spins
-from rom.mbs.analysis.sparse_tangent import Loan, SparseTangent
-from rom.mbs.analysis.tangent import Tangent, best_reactions, faint_force, sizes
+from rom.mbs.analysis.tangent import (
+    Loan,
+    SparseTangent,
+    Tangent,
+    best_reactions,
+    faint_force,
+    sizes,
+)
 from rom.mbs.equations.packing import Packed
 from rom.mbs.integrate.consistent_start import assembled, check_velocity, initial_state
 from rom.mbs.mechanism import Mechanism
@@ -288,7 +293,8 @@ class _Search:
             return None
         ahead = self.corrected(now, state, newton)
         beyond = self.tangent(now, ahead[2])
-        return (ahead, beyond) if beyond.steadier(equations) else None
+        steadier = beyond.descent < beyond.MAX_DESCENT_LEFT * equations.descent
+        return (ahead, beyond) if steadier else None
 
     def judge(self, state: State) -> None:
         """Refuse free motions, and warn of unstable ones."""
@@ -349,9 +355,9 @@ class _Progress:
 
     now: Instant
     sizes: list[float] = field(default_factory=list)
-    displacement: Any = 0.0
+    displacement: Array | float = 0.0
     work: float = 0.0  # of the forces against the motion
-    least: Any = np.inf
+    least: Array | float = np.inf
     idle: int = 0
 
     def ends(self, size: float, motion: Array, before: State, after: State) -> bool:

@@ -1,7 +1,6 @@
 """Inverse dynamics: loads of a motion that drives prescribe entirely, without integration."""
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -67,11 +66,10 @@ def inverse_dynamics(mechanism: Mechanism, t: npt.ArrayLike, *, assemble: bool =
     states: list[State] = []
     powers: list[Array] = []
 
-    def solution() -> Any:
-        so_far = np.array(powers), signals[: len(states)]
-        return _solution(mechanism, packed, states, *so_far) if states else None
+    def solution() -> Solution:
+        return _solution(mechanism, packed, states, np.array(powers), signals[: len(states)])
 
-    with reached(solution):
+    with reached(lambda: solution() if states else None):
         for k, x in enumerate(times):
             W.signal[:] = signals[k]
             state = _next(packed, W, forces, state, float(x))
@@ -112,7 +110,7 @@ def _refuse_free(packed: Packed, state: State) -> None:
 def _solution(
     mechanism: Mechanism, packed: Packed, states: list[State], powers: Array, signals: Array
 ) -> Solution:
-    def rows(name: str) -> Any:
+    def rows(name: str) -> Array:
         return np.array([getattr(state, name) for state in states])
 
     t, work = rows("t"), np.zeros_like(powers)

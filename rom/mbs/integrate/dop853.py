@@ -8,7 +8,6 @@ integrator. Instants of output are a given interval apart, interpolated, or else
 from collections.abc import Sequence
 from dataclasses import replace
 from time import perf_counter
-from typing import Any
 
 import numpy as np
 from scipy.integrate import DOP853, solve_ivp
@@ -225,7 +224,7 @@ def first_steps(record: Record, W: Work, step: Step) -> tuple[Array, tuple[Array
     past = [_instant(record, equations, t[0], _coordinates(start))]
     if count:
         options = {"method": "Radau", "rtol": RADAU_RTOL, "atol": RADAU_ATOL, "t_eval": t[1:]}
-        found: Any = solve_ivp(equations, (t[0], t[-1]), _coordinates(past[0][0]), **options)
+        found = solve_ivp(equations, (t[0], t[-1]), _coordinates(past[0][0]), **options)
         if not found.success:
             raise SolverError(
                 f"the first steps failed after t = {t[0]:.9g} s: {found.message}",
@@ -265,7 +264,7 @@ def _remember(record: Record, W: Work, step: Step, states: Sequence[State], work
 
 def _seen(record: Record, q: Array, other: Array) -> Array:
     """(n,) increment that leads from coordinates q to other ones."""
-    bodies: Any = record.packed.system.bodies
+    bodies = record.packed.system.bodies
     out = np.zeros(record.packed.v.size)
     for at, vt, r in zip(bodies.q_at, bodies.v_at, bodies.r, strict=True):
         back = q[at + 3 : at + 7] * np.array([1.0, -1.0, -1.0, -1.0])

@@ -195,7 +195,7 @@ class Keeping:
             self.folder.rmdir()
 
 
-def digests_of(packed: Packed, arguments: Mapping[str, Any]) -> dict[str, str]:
+def digests_of(packed: Packed, arguments: Mapping[str, object]) -> dict[str, str]:
     """Digests by which a run is known: one of each argument, and one of the mechanism."""
     hashed = hashlib.sha256(repr((packed.names, packed.row_owner)).encode())
     hashed.update(repr([signal.name for signal in packed.signals]).encode())

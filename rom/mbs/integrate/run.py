@@ -77,7 +77,7 @@ class Settings:
             )
 
     @property
-    def arguments(self) -> dict[str, Any]:
+    def arguments(self) -> dict[str, object]:
         """What makes a run the one it is, beside its end."""
         names = ("t_start", "dt", "rho_inf", "tolerance", "rtol", "atol", "save_every", "order")
         values = {name: getattr(self, name) for name in names}
@@ -296,7 +296,7 @@ class Record:
             {} if self.watch is None else self.watch.occurrences,
         )
 
-    def _statistics(self) -> dict[str, Any]:
+    def _statistics(self) -> dict[str, float]:
         total = perf_counter() - self.clock
         return {
             **self.counts,

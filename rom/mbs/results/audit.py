@@ -10,9 +10,12 @@ from scipy.linalg import eigh
 from rom import rotation
 from rom.arguments import typed
 from rom.errors import warn
+from rom.mbs.equations.packing import Packed
 from rom.mbs.kernels.system import ANGLE, ROLL
+from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import GROUND
 from rom.mbs.results.solution import Solution
+from rom.mbs.results.state import State
 from rom.model import BUCKLING_LOADS, Array, Report, Row
 
 # limits; energy counts relative to the largest amount of energy that was exchanged
@@ -153,7 +156,7 @@ def _numbers(solution: Solution) -> list[Row]:
     p = solution.q[:, solution.packed.system.bodies.q_at[:, None] + np.arange(3, 7)]
     stretched = np.abs(np.linalg.norm(p, axis=2) - 1).max()
     rows = [_row("quaternion length - 1", stretched, QUATERNION_ATOL)]
-    statistics: dict[str, Any] = solution.statistics
+    statistics = solution.statistics
     if "iterations" in statistics:
         mean = statistics["iterations"] / max(statistics["steps"], 1)
         rows.append(_row("Newton corrections per step", mean, MAX_MEAN_CORRECTIONS))
@@ -219,7 +222,7 @@ def warn_of_limits(solution: Solution) -> None:
             )
 
 
-def warn_of_range(mechanism: Any, packed: Any, state: Any) -> None:
+def warn_of_range(mechanism: Mechanism, packed: Packed, state: State) -> None:
     """Warn of bodies of large deflection that are beyond their certificates at one instant."""
     bodies = packed.system.bodies
     for name, at in zip(packed.names, bodies.q_at, strict=True):
@@ -236,7 +239,7 @@ def pressed(solution: Solution, name: str) -> float | None:
     As on hinges, with a warning of too much. Zero where geometric stiffness is known to the motion,
     None where the body does not know its buckling loads.
     """
-    body: Any = solution.mechanism.parts[name].flexible
+    body = solution.mechanism.parts[name].flexible
     if body.K_geo or body.quartic is not None:
         return 0.0
     known = body.provenance.get(BUCKLING_LOADS)
@@ -352,7 +355,7 @@ def deformation(solution: Solution, name: str, *, surface: bool = True) -> float
 
     Of all points of the outer surface, or of the interfaces alone.
     """
-    part: Any = solution.mechanism.parts[name]
+    part = solution.mechanism.parts[name]
     body, q = part.flexible, solution.elastic(name)
     shapes: list[Array] = [np.asarray(m.translation) for m in body.markers.values()]
     drawn = getattr(body, "surface", None)

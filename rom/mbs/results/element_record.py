@@ -1,7 +1,7 @@
 """What a single force element, or law of the user, does along a motion: asked again."""
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,12 +14,16 @@ from rom.mbs.kernels.compiled import copy, inner, kernel
 from rom.mbs.kernels.element_calls import residuals
 from rom.mbs.kernels.system import ALONG
 from rom.mbs.kernels.work import workspace
+from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import Marker
 from rom.mbs.parts.joints import Row
 from rom.mbs.parts.signals import sample_all
 from rom.mbs.results.recomputed import at_instants, evaluate_at
 from rom.model import Array, Index
 from rom.names import check_known
+
+if TYPE_CHECKING:
+    from rom.mbs.results.solution import Solution
 
 INSTANT_SPACING = 1e-6  # of differences of drives about a single instant [s]
 
@@ -74,7 +78,7 @@ class LawRecord:
     outputs: dict[str, Array]
 
 
-def law_record(solution: Any, name: str) -> LawRecord:
+def law_record(solution: "Solution", name: str) -> LawRecord:
     """Ask a law again at all instants of a motion."""
     law = solution.mechanism.laws[name]
     table = solution.packed.elements[LAWS_FAMILY]
@@ -89,14 +93,14 @@ def law_record(solution: Any, name: str) -> LawRecord:
     return LawRecord(solution.t, force, moment, energy[:, 0], lost[:, 0], memory, own)
 
 
-def _said(solution: Any, table: Any, mine: slice, sizes: tuple[int, int]) -> list[Array]:
+def _said(solution: "Solution", table: Any, mine: slice, sizes: tuple[int, int]) -> list[Array]:
     """The fields of the answers at all instants."""
     rows = [table.answer[mine].copy() for _ in at_instants(solution)]
     answers = (answer_of(row, *sizes) for row in rows)
     return [np.array(field) for field in zip(*answers, strict=True)]
 
 
-def element_record(solution: Any, name: str) -> ElementRecord:
+def element_record(solution: "Solution", name: str) -> ElementRecord:
     """Evaluate one element along a motion."""
     mechanism = solution.mechanism
     check_known(name, mechanism.elements, f"no element {name!r}; there are")
@@ -116,13 +120,15 @@ def element_record(solution: Any, name: str) -> ElementRecord:
     return ElementRecord(solution.t, markers, *forces, law.energy, law.lost)
 
 
-def markers_of(mechanism: Any, family: Family, element: Any) -> tuple[Marker, ...]:
+def markers_of(mechanism: Mechanism, family: Family, element: object) -> tuple[Marker, ...]:
     """The markers an element acts on, its own or those of its joint."""
-    joint = mechanism.joints.get(getattr(element, "joint", None))
+    joint = mechanism.joints.get(getattr(element, "joint", ""))
     return tuple(family.ends(element)) or (() if joint is None else tuple(joint.markers))
 
 
-def _alone(solution: Any, name: str, markers: tuple[Marker, ...], rows: Index) -> ElementRecord:
+def _alone(
+    solution: "Solution", name: str, markers: tuple[Marker, ...], rows: Index
+) -> ElementRecord:
     """The element as the only one of its mechanism, in the motion of the whole."""
     packed, places = solution.packed, solution.packed.places.copy()
     family, element = solution.mechanism.elements[name]
@@ -187,7 +193,7 @@ def along_coordinate(wrench, gradient):
     return force / size
 
 
-def _sampled(solution: Any, places: Places) -> Array:
+def _sampled(solution: "Solution", places: Places) -> Array:
     """(n_t, s, 3) the functions of time that were asked for once more."""
     t, new = solution.t, tuple(places.signals[len(solution.packed.signals) :])
     if t.size == 1:
@@ -196,9 +202,9 @@ def _sampled(solution: Any, places: Places) -> Array:
     return sample_all(new, t, span, 0.01 * (span[1] - span[0]) / (t.size - 1))
 
 
-def coordinate_row(mechanism: Any, element: Any) -> Row | None:
+def coordinate_row(mechanism: Mechanism, element: object) -> Row | None:
     """The joint coordinate an element acts along, if it is one on a joint."""
-    joint = mechanism.joints.get(getattr(element, "joint", None))
+    joint = mechanism.joints.get(getattr(element, "joint", ""))
     return None if joint is None else getattr(element, "row", joint.turn)
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -15,7 +15,12 @@ from rom.mbs.kernels.inertia import body_energy
 from rom.mbs.kernels.work import Work, workspace
 from rom.mbs.parts.bodies import GROUND
 from rom.mbs.parts.joints import Joint, Row
-from rom.model import Array
+from rom.model import Array, Index
+
+if TYPE_CHECKING:
+    from rom.mbs.results.solution import Solution
+
+Place = str | tuple[float, float, float]
 
 
 class Seen(NamedTuple):
@@ -46,7 +51,7 @@ class Tracks(NamedTuple):
     gap: Array
 
 
-def follow(solution: Any, marker: int, rows: Any) -> Tracks:
+def follow(solution: "Solution", marker: int, rows: Index) -> Tracks:
     """Evaluate one marker, some constraint rows and the totals along a solution."""
     packed, system, n = solution.packed, solution.packed.seen, solution.t.size
     shapes = ((n, 3), (n, 3, 3), (n, 6), (n, 6), (n, 3), (n, 6), solution.lam.shape)
@@ -101,7 +106,7 @@ def body_momentum(bodies, W, b, q, v, out):
     put(out, 3, add(mv(A, angular), cross(vec(q, bodies.q_at[b]), p)))
 
 
-def at_instants(solution: Any) -> Iterator[Work]:
+def at_instants(solution: "Solution") -> Iterator[Work]:
     """The memory after the equations of motion were evaluated at each instant, one by one."""
     packed, system = solution.packed, solution.packed.seen
     W, forces = workspace(system, len(packed.signals)), packed.asked
@@ -117,10 +122,10 @@ def at_instants(solution: Any) -> Iterator[Work]:
         yield W
 
 
-def of_body(solution: Any, body: str, wrench: Array, frame: str) -> dict[Any, Array]:
+def of_body(solution: "Solution", body: str, wrench: Array, frame: str) -> dict[Place, Array]:
     """{place: (n_t, 6)} loads on the markers of one body that carry any, in the axes asked for."""
-    turned, found = frame == "body" and body != GROUND, {}
-    axes: Any = rotation.matrix(solution.orientation(body).T) if turned else None
+    turned, found = frame == "body" and body != GROUND, dict[Place, Array]()
+    axes = rotation.matrix(solution.orientation(body).T) if turned else np.eye(3)[:, :, None]
     for marker, k in solution.packed.markers.items():
         if marker.body == body and wrench[:, k].any():
             both = wrench[:, k].reshape(-1, 2, 3)

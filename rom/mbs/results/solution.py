@@ -6,6 +6,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from rom.arguments import one_of, typed, vector
 from rom.errors import ConfigError
@@ -26,6 +27,7 @@ from rom.mbs.results.element_record import (
 from rom.mbs.results.interpolation import Point, between
 from rom.mbs.results.recomputed import (
     JointMotion,
+    Place,
     Seen,
     Tracks,
     at_instants,
@@ -35,7 +37,7 @@ from rom.mbs.results.recomputed import (
 )
 from rom.mbs.results.state import State
 from rom.mbs.results.whereabouts import Whereabouts
-from rom.model import Array
+from rom.model import Array, Index
 from rom.names import check_known
 from rom.notebook import html_table, listed
 from rom.rotation import matrix
@@ -123,7 +125,7 @@ class Solution(Whereabouts, Columns, metaclass=Open, kind="columns", bound=typed
     status: str
     final: State
     events: dict[str, Occurrences] = field(default_factory=dict)
-    _tracks: dict[Any, Tracks] = field(default_factory=dict, repr=False)
+    _tracks: dict[tuple[int, tuple[int, ...]], Tracks] = field(default_factory=dict, repr=False)
 
     def __repr__(self) -> str:
         return (
@@ -146,7 +148,7 @@ class Solution(Whereabouts, Columns, metaclass=Open, kind="columns", bound=typed
         ]
         return html_table(f"Motion. {self.status}", ("", ""), rows)
 
-    def at(self, t: Any) -> "Solution":
+    def at(self, t: npt.ArrayLike) -> "Solution":
         """The motion at other times, with everything that can be asked of a solution.
 
         Its ``final`` is the state at the last of them, from which a run can go on.
@@ -200,7 +202,7 @@ class Solution(Whereabouts, Columns, metaclass=Open, kind="columns", bound=typed
         Raises:
             ConfigError: if the stress of the body cannot be recovered.
         """
-        part: Any = self.mechanism.part(body)
+        part = self.mechanism.part(body)
         recovery = getattr(part.moving, "stress", None) if part.r else None
         if recovery is None:
             raise ConfigError(
@@ -256,7 +258,7 @@ class Solution(Whereabouts, Columns, metaclass=Open, kind="columns", bound=typed
         check_known(name, self.mechanism.drives, f"no drive {name!r}; there are")
         return -self.lam[:, self.packed.rows_of(name)[0]]
 
-    def interface_loads(self, body: str, *, frame: str = "world") -> dict[Any, Array]:
+    def interface_loads(self, body: str, *, frame: str = "world") -> dict[Place, Array]:
         """Loads on each marker of a body: joints, drives, springs, contacts, loads together.
 
         With gravity they are all that moves the body; on an interface of a flexible body they are
@@ -344,7 +346,7 @@ class Solution(Whereabouts, Columns, metaclass=Open, kind="columns", bound=typed
     def _at_marker(self, row: int) -> Seen:
         return Seen(*self._follow(row)[:3])
 
-    def _follow(self, marker: int = 0, rows: Sequence[int] = ()) -> Tracks:
+    def _follow(self, marker: int = 0, rows: Sequence[int] | Index = ()) -> Tracks:
         key = (marker, tuple(rows))
         if key not in self._tracks:
             self._tracks[key] = follow(self, marker, np.array(rows, dtype=np.int64))

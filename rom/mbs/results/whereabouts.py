@@ -107,7 +107,7 @@ class Whereabouts:
         """
         return self._places(body, 7, 7 + self.packed.system.bodies.r[self._number(body)])
 
-    def _seen(self, body: str, place: Any) -> Seen:
+    def _seen(self, body: str, place: object) -> Seen:
         """The same of a marker of a body, or of the ground."""
         if body != GROUND:
             self._number(body)

@@ -1,8 +1,7 @@
 """Steady rotation: of a mechanism as a whole, or of the bodies behind some of its joints."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -53,7 +52,7 @@ class Spins:
     turning: tuple[Turning, ...] = ()
 
     @classmethod
-    def of(cls, mechanism: Mechanism, now: Instant, spin: Any, about: npt.ArrayLike) -> "Spins":
+    def of(cls, mechanism: Mechanism, now: Instant, spin: object, about: npt.ArrayLike) -> "Spins":
         """What the caller of `equilibrium` says."""
         found = cls(np.zeros(3), finite("about", about, (3,)))
         if isinstance(spin, Mapping):
@@ -83,7 +82,7 @@ class Spins:
             v[at + 3 : at + 6] = rotation.matrix(state.q[q_at + 3 : q_at + 7]).T @ omega
         return replace(state, t=now.t, v=v, a=a, algorithmic=None)
 
-    def _each(self, now: Instant, state: State) -> Any:
+    def _each(self, now: Instant, state: State) -> Iterator[tuple[int, Array, Array]]:
         """Number, angular velocity (3,) and a point (3,) on the axis of each body that turns."""
         if self.whole.any():
             for b in range(now.packed.system.bodies.mass.size):
@@ -95,7 +94,7 @@ class Spins:
             for b in one.bodies:
                 yield b, omega, centre
 
-    def motions(self, now: Instant, state: State) -> tuple[Any, Any, Any]:
+    def motions(self, now: Instant, state: State) -> tuple[csr_matrix, csr_matrix, csr_matrix]:
         """Matrices (n, n) of small steady motions p to variations T p, velocities, accelerations.
 
         Bodies that turn carry their p with them; an axis goes along with what carries its joint.
@@ -133,7 +132,7 @@ class Spins:
 AT_REST = Spins(np.zeros(3), np.zeros(3))
 
 
-def _turning(mechanism: Mechanism, now: Instant, spin: Mapping[str, Any]) -> tuple[Turning, ...]:
+def _turning(mechanism: Mechanism, now: Instant, spin: Mapping[str, float]) -> tuple[Turning, ...]:
     """The bodies behind each joint: what joints and elements connect with its second side."""
     for name in spin:
         coordinate_of(mechanism.joints, name, "angle", "spin")
