@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, MutableMapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Any, Generic, TypeVar
+from typing import Annotated, Any, Generic, Literal, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -310,7 +310,7 @@ class Mechanism(Methods, metaclass=Open, kind="methods", bound=bound):
         name: str,
         function: Callable[..., object],
         *,
-        direction: int = 0,
+        direction: Literal[-1, 0, 1] = 0,
         terminal: bool = False,
         follow: Sequence[Marker | str | tuple[str, str]] = (),
     ) -> None:
@@ -331,8 +331,6 @@ class Mechanism(Methods, metaclass=Open, kind="methods", bound=bound):
                 is not there.
         """
         self.check_new(name)
-        if direction not in (-1, 0, 1):
-            raise ConfigError(f"direction of event {name!r} is {direction!r}; use -1, 0 or 1.")
         markers = tuple(one for one in follow if isinstance(one, Marker))
         self.check_markers(name, *markers)
         named = [(one, None) if isinstance(one, str) else one for one in follow]

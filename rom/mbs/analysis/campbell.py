@@ -4,12 +4,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
 from scipy.optimize import linear_sum_assignment
 
-from rom.arguments import typed, unit_vector, whole
+from rom.arguments import Count, typed, unit_vector
 from rom.errors import ConfigError, warn
 from rom.mbs.analysis.equilibrium import equilibrium
 from rom.mbs.analysis.linearize import Linearization, linearize
@@ -75,7 +76,7 @@ def campbell(
     mechanism: Turned,
     speeds: npt.ArrayLike,
     *,
-    n: int | None = None,
+    n: Annotated[int, Count(1)] | None = None,
     axis: npt.ArrayLike = (0.0, 0.0, 1.0),
     about: npt.ArrayLike = (0.0, 0.0, 0.0),
     frame: object = "body",
@@ -109,8 +110,6 @@ def campbell(
     if speeds.ndim != 1 or speeds.size < 2 or not np.all(np.diff(speeds) > 0):
         raise ConfigError(f"speeds = {speeds.tolist()} must be at least two growing numbers.")
     axis = unit_vector("axis", axis)
-    if n is not None:
-        whole("n", n, 1)
     counted = partial(linearize, frame=frame, blades=blades)
     found = [_at(mechanism, speed, axis, about, n, counted) for speed in speeds]
     orders: list[Index] = [np.arange(found[0].eigenvalues.size)]

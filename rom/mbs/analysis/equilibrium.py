@@ -3,11 +3,12 @@
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import typed, whole
+from rom.arguments import Count, typed
 from rom.errors import ModelError, RomError, SolverError, reached, warn
 from rom.mbs.analysis.local_equations import Instant, instant
 from rom.mbs.analysis.rotors.spins import Spins
@@ -51,7 +52,7 @@ def equilibrium(
     state: State | None = None,
     *,
     t: float | None = None,
-    steps: int = 1,
+    steps: Annotated[int, Count(1, MOST_STEPS)] = 1,
     spin: npt.ArrayLike | Mapping[str, float] | None = None,
     about: npt.ArrayLike = (0.0, 0.0, 0.0),
     assemble: bool = False,
@@ -101,7 +102,6 @@ def equilibrium(
         >>> round(float(rom.equilibrium(mech).q[2]), 6)  # it hangs
         -0.5
     """
-    whole("steps", steps, 1, MOST_STEPS)
     time = (0.0 if state is None else state.t) if t is None else t
     now = instant(mechanism, time, sparse=None)
     search = _Search(now, Spins.of(mechanism, now, spin, about))

@@ -95,12 +95,12 @@ class Wanted:
     band: tuple[float, float] = (0.0, np.inf)
 
     @classmethod
-    def of(cls, n: object, band: object) -> "Wanted | None":
+    def of(cls, n: int | None, band: tuple[float, float] | None) -> "Wanted | None":
         """What the caller says; None for all modes."""
         if n is None and band is None:
             return None
         if band is None:
-            return cls(whole("n", n, 1))
+            return cls(n or 0)
         if n is not None:
             raise ConfigError("at most one of n and band must be given.")
         low, high = finite("band", band, (2,))

@@ -3,16 +3,17 @@
 import ctypes
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from rom import rotation
-from rom.arguments import typed, whole
-from rom.errors import ConfigError
+from rom.arguments import Count, typed
 from rom.mbs.elements.law_calls import ENERGY_SIZE, MOTION_SIZE, answer_of, differences, motion_of
 from rom.mbs.elements.laws import Law, UserForce
 from rom.mbs.mechanism import Mechanism
 from rom.model import Array, Mask, Report, Row
+from rom.names import check_known
 
 LAW_ENTRY = ctypes.CFUNCTYPE(None, ctypes.c_double, *[ctypes.c_void_p] * 4)
 GUARD_SIZE, GUARD_VALUE = 64, -7.25e77  # numbers on either side of an array, which nobody writes
@@ -31,7 +32,7 @@ def check_law(
     name: str,
     *,
     t: float = 0.0,
-    samples: int = 5,
+    samples: Annotated[int, Count(1, MOST_SAMPLES)] = 5,
     rng: np.random.Generator | None = None,
 ) -> Report:
     """Ask a law at random motions around the start, and look for what would spoil a run.
@@ -56,10 +57,9 @@ def check_law(
         ConfigError: for a name that no law has.
         Exception: whatever a law in Python raises.
     """
-    law = mechanism.laws.get(name)
-    if law is None or isinstance(law, UserForce):
-        raise ConfigError(f"name = {name!r}: no law; there are {sorted(mechanism.laws)}.")
-    whole("samples", samples, 1, MOST_SAMPLES)
+    laws = {key: one for key, one in mechanism.laws.items() if not isinstance(one, UserForce)}
+    check_known(name, laws, f"name = {name!r}: no law; there are")
+    law = laws[name]
     rng = np.random.default_rng(0) if rng is None else rng
     asked = _Asked(law, t)
     found = [_looked(asked, motion) for motion in _motions(mechanism, law, samples, rng)]

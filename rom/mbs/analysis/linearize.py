@@ -3,13 +3,13 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from rom.arguments import typed
-from rom.errors import ConfigError, ModelError, warn
+from rom.arguments import Count, typed
+from rom.errors import ConfigError, warn
 from rom.mbs.analysis.few_modes import Pencil, Wanted, modes, phases
 from rom.mbs.analysis.local_equations import (
     Instant,
@@ -25,7 +25,6 @@ from rom.mbs.analysis.tangent import load_stiffness, sizes
 from rom.mbs.equations.packing import Packed
 from rom.mbs.equations.sparse_solve import Matrix
 from rom.mbs.integrate.consistent_start import fitting_velocity, with_accelerations
-from rom.mbs.kernels.system import ROLL
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import Marker
 from rom.mbs.results.audit import pressed
@@ -167,7 +166,7 @@ def linearize(  # noqa: PLR0913  keywords of the one entry, all have defaults
     *,
     t: float | None = None,
     frame: object = "body",
-    n: int | None = None,
+    n: Annotated[int, Count(1)] | None = None,
     band: tuple[float, float] | None = None,
     blades: object = None,
     assemble: bool = False,
@@ -427,11 +426,8 @@ def _virtual(now: Instant, state: State, basis: Array) -> Array:
 
 def refuse_rolling(packed: Packed, state: State) -> None:
     """At rest, what rolls without sliding is held like by any other joint."""
-    rolls = packed.system.rows.kind == ROLL
-    if rolls.any() and state.v.any():
-        name = packed.row_owner[int(np.argmax(rolls))]
-        raise ModelError(
+    if state.v.any():
+        packed.refuse_rolling(
             "a rolling joint binds velocities, not positions: it can be linearised at rest only.",
-            where=name,
-            hint="rom.steady_motion has the eigenvalues of steady rolling.",
+            "rom.steady_motion has the eigenvalues of steady rolling.",
         )

@@ -26,12 +26,12 @@ from rom.mbs.integrate.consistent_start import (
     fitting_velocity,
     independent,
     initial_state,
+    prescribed,
     with_accelerations,
 )
 from rom.mbs.kernels.system import ROLL, WORK, System
 from rom.mbs.kernels.work import Work, workspace
 from rom.mbs.mechanism import Mechanism
-from rom.mbs.parts.signals import first_failure, sample_all
 from rom.mbs.results.solution import Solution
 from rom.mbs.results.state import State, check_state
 from rom.model import Array
@@ -72,11 +72,8 @@ class Instant:
 
     def at(self, t: float) -> "Instant":
         """The same at another time; the memory is shared."""
-        signals, times = self.packed.signals, np.array([t])
-        table = sample_all(signals, times, (-np.inf, np.inf), DIFFERENCE_SPACING)
-        good, failure = first_failure(signals, times, table)
-        if not good:
-            raise failure
+        span = -np.inf, np.inf
+        table = prescribed(self.packed.signals, np.array([t]), span, DIFFERENCE_SPACING)
         self.W.signal[:] = table[0]
         return replace(self, t=t)
 

@@ -19,6 +19,7 @@ from rom.mbs.analysis.tangent import Tangent
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.results.state import State
 from rom.model import Array
+from rom.names import check_known
 
 DIFFERENCE_STEP = 1e-4  # of a parameter, relative to its size
 # steps that are tried where the result is a motion, and the relative error that ends the search
@@ -48,8 +49,7 @@ class Sensitivity:
 
     def __getitem__(self, name: str) -> Array:
         """(...) derivative by one parameter."""
-        if name not in self.names:
-            raise ConfigError(f"no parameter {name!r}; there are {list(self.names)}.")
+        check_known(name, self.names, f"no parameter {name!r}; there are")
         return self.derivative[..., self.names.index(name)]
 
 

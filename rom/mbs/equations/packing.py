@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from rom.errors import ConfigError, warn
+from rom.errors import ConfigError, ModelError, warn
 from rom.mbs.elements.family import Asked, Family, Places, integers, rows_of, starts
 from rom.mbs.equations import renewal
 from rom.mbs.equations.graph import graph_of
 from rom.mbs.kernels.element_calls import ROW_WORDS
 from rom.mbs.kernels.stages import STAGE_ADDRESSES
-from rom.mbs.kernels.system import ALONG, LENGTHS, Bodies, Graph, Markers, Rows, System
+from rom.mbs.kernels.system import ALONG, LENGTHS, ROLL, Bodies, Graph, Markers, Rows, System
 from rom.mbs.kernels.tables import Table
 from rom.mbs.kernels.work import Work
 from rom.mbs.mechanism import Mechanism
@@ -194,6 +194,12 @@ class Packed:
     def frames(self) -> list[Marker]:
         """The further markers of ``seen``."""
         return [marker for marker in self.markers if marker.place == OWN_FRAME]
+
+    def refuse_rolling(self, message: str, hint: str = "") -> None:
+        """Refuse joints that roll, naming the first, where positions alone may be bound."""
+        rolls = self.system.rows.kind == ROLL
+        if rolls.any():
+            raise ModelError(message, where=self.row_owner[int(np.argmax(rolls))], hint=hint)
 
     def row(self, marker: Marker) -> int:
         """Row of a marker in the arrays."""

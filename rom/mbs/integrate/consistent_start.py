@@ -13,7 +13,7 @@ from rom.mbs.equations.packing import Packed
 from rom.mbs.equations.sparse_solve import Constrained, Pattern, signature, unit_rows
 from rom.mbs.kernels.system import ROLL
 from rom.mbs.kernels.work import Work, workspace
-from rom.mbs.parts.signals import first_failure, sample_all
+from rom.mbs.parts.signals import Signal, Span, sampled
 from rom.mbs.results.state import State
 from rom.model import Array, Integers
 from rom.notebook import listed
@@ -51,11 +51,18 @@ def initial_state(
     given velocities change by as much as it takes; with ``placing`` drives say where bodies are and
     how they move: what was given contradicts nothing.
     """
-    table = sample_all(packed.signals, np.array([t]), (t, np.inf), spacing)
-    good, failure = first_failure(packed.signals, np.array([t]), table)
-    if not good:
-        raise failure
+    table = prescribed(packed.signals, np.array([t]), (t, np.inf), spacing)
     return _start(packed, table[0], t, (assemble, placing))
+
+
+def prescribed(
+    signals: tuple[Signal, ...], t: Array, span: Span, spacing: float, step: float | None = None
+) -> Array:
+    """(n, s, 3) signals at all times, as `sampled`; refused where one of them fails."""
+    table, failure = sampled(signals, t, span, spacing, step)
+    if failure is not None:
+        raise failure
+    return table
 
 
 def _start(packed: Packed, signal: Array, t: float, asked: tuple[bool, bool]) -> State:

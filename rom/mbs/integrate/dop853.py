@@ -16,10 +16,9 @@ from rom import rotation
 from rom.errors import ConfigError, SolverError
 from rom.mbs.elements.family import apply_laws
 from rom.mbs.equations.equations import evaluate, rates
-from rom.mbs.integrate.consistent_start import assembled, fitting_velocity
+from rom.mbs.integrate.consistent_start import assembled, fitting_velocity, prescribed
 from rom.mbs.integrate.run import RUN_KEY, Record, standing_at
 from rom.mbs.kernels.work import STEPS, Step, Work
-from rom.mbs.parts.signals import sampled
 from rom.mbs.results.state import Memory, State
 from rom.model import Array
 
@@ -47,10 +46,7 @@ class Equations:
         y = np.ascontiguousarray(y)  # SciPy hands over columns
         if packed.signals:
             h = settings.spacing
-            table, failure = sampled(packed.signals, np.array([t]), settings.span, h, h)
-            if failure is not None:
-                raise failure
-            self.W.signal[:] = table[0]
+            self.W.signal[:] = prescribed(packed.signals, np.array([t]), settings.span, h, h)[0]
         if self.forces:
             evaluate(packed.system, self.W, y[: self.n_q], y[self.n_q : self.n_q + self.n])
             apply_laws(self.forces, self.W, t)

@@ -17,6 +17,7 @@ from rom.mbs.kernels.system import WORK
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.joints import joint_with_axis
 from rom.mbs.parts.signals import sample_all
+from rom.mbs.results import recomputed
 from rom.mbs.results.element_record import (
     ElementRecord,
     LawRecord,
@@ -25,22 +26,14 @@ from rom.mbs.results.element_record import (
     markers_of,
 )
 from rom.mbs.results.interpolation import Point, between
-from rom.mbs.results.recomputed import (
-    JointMotion,
-    Place,
-    Seen,
-    Tracks,
-    at_instants,
-    follow,
-    joint_motion,
-    of_body,
-)
 from rom.mbs.results.state import State
 from rom.mbs.results.whereabouts import Whereabouts
 from rom.model import Array, Index
 from rom.names import check_known
 from rom.notebook import html_table, listed
 from rom.rotation import matrix
+
+Place = str | tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -125,7 +118,7 @@ class Solution(Whereabouts, Columns, metaclass=Open, kind="columns", bound=typed
     status: str
     final: State
     events: dict[str, Occurrences] = field(default_factory=dict)
-    _tracks: dict[tuple[int, tuple[int, ...]], Tracks] = field(default_factory=dict, repr=False)
+    _tracks: dict[object, recomputed.Tracks] = field(default_factory=dict, repr=False)
 
     def __repr__(self) -> str:
         return (
@@ -238,7 +231,7 @@ class Solution(Whereabouts, Columns, metaclass=Open, kind="columns", bound=typed
         check_known(name, set(self.packed.row_owner), f"no joint or drive {name!r}; there are")
         return self._follow(rows=self.packed.rows_of(name)).reaction
 
-    def joint(self, name: str) -> JointMotion:
+    def joint(self, name: str) -> recomputed.JointMotion:
         """Angle and displacement of a joint over time, with their rates.
 
         Raises:
@@ -247,7 +240,10 @@ class Solution(Whereabouts, Columns, metaclass=Open, kind="columns", bound=typed
         """
         joint = joint_with_axis(self.mechanism.joints, name, "motion of a joint")
         one, two = (self._at_marker(self.packed.row(marker)) for marker in joint.markers)
-        return joint_motion(self.t, joint, one, two)
+        row, slide = joint.turn, joint.displacement
+        angle = (None, None) if row is None else recomputed.angles(row, self.t, one, two)
+        displacement = (None, None) if slide is None else recomputed.displacements(slide, one, two)
+        return recomputed.JointMotion(self.t, *angle, *displacement)
 
     def drive_load(self, name: str) -> Array:
         """(n_t,) torque [N m] or force [N] that a drive supplies along its joint coordinate.
@@ -277,7 +273,14 @@ class Solution(Whereabouts, Columns, metaclass=Open, kind="columns", bound=typed
         """
         self.mechanism.part(body)
         one_of("frame", frame, ("body", "world"))
-        return of_body(self, body, self._marker_loads, frame)
+        found, loads = dict[Place, Array](), self._marker_loads
+        for marker, k in self.packed.markers.items():
+            if marker.body == body and loads[:, k].any():
+                both = loads[:, k].reshape(-1, 2, 3)
+                if frame == "body":
+                    both = np.einsum("tba,tsb->tsa", recomputed.axes_of(self, body), both)
+                found[marker.place] = both.reshape(-1, 6)
+        return found
 
     def law(self, name: str) -> LawRecord:
         """What a law of the user said over time: forces, energy, memory and its own outputs.
@@ -305,14 +308,13 @@ class Solution(Whereabouts, Columns, metaclass=Open, kind="columns", bound=typed
     @cached_property
     def _marker_loads(self) -> Array:
         """(n_t, k, 6) force [N] and moment [N m] of all that acts on each marker, world."""
-        return np.array([W.wrench.copy() for W in at_instants(self)])
+        return np.array([W.wrench.copy() for W in recomputed.at_instants(self)])
 
     @cached_property
     def energy(self) -> Energy:
         """Energies and works over time."""
         energy = self._follow().energy
-        works = {name: self.work[:, k] for k, name in enumerate(WORK)}
-        kept = self.packed.kept(self.base)
+        works, kept = dict(zip(WORK, self.work.T, strict=True)), self.packed.kept(self.base)
         works["damping"] = works["damping"] - (kept - kept[0])
         return Energy(energy[:, 0], energy[:, 1], energy[:, 2], **works)
 
@@ -343,11 +345,11 @@ class Solution(Whereabouts, Columns, metaclass=Open, kind="columns", bound=typed
         """The motion as named arrays: a Dataset of `rom.io.history.data_set`; as above."""
         return data_set(self, every=every)
 
-    def _at_marker(self, row: int) -> Seen:
-        return Seen(*self._follow(row)[:3])
+    def _at_marker(self, row: int) -> recomputed.Seen:
+        return recomputed.Seen(*self._follow(row)[:3])
 
-    def _follow(self, marker: int = 0, rows: Sequence[int] | Index = ()) -> Tracks:
+    def _follow(self, marker: int = 0, rows: Sequence[int] | Index = ()) -> recomputed.Tracks:
         key = (marker, tuple(rows))
         if key not in self._tracks:
-            self._tracks[key] = follow(self, marker, np.array(rows, dtype=np.int64))
+            self._tracks[key] = recomputed.follow(self, marker, np.array(rows, dtype=np.int64))
         return self._tracks[key]

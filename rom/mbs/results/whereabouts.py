@@ -18,10 +18,7 @@ from rom.rotation import continuous, matrix, quaternion
 
 @typed
 class Whereabouts:
-    """What `Solution` and the `Instant` of an event answer alike; the latter has no rows n_t.
-
-    They know what moves, its coordinates and velocities, and the marker of a row of the arrays.
-    """
+    """What `Solution` and the `Instant` of an event answer alike; the latter has no rows n_t."""
 
     mechanism: Mechanism
     packed: Packed

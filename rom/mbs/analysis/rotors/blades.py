@@ -23,6 +23,7 @@ from rom.errors import ConfigError
 from rom.mbs.equations.packing import Packed
 from rom.mbs.results.state import State
 from rom.model import Array, Index
+from rom.names import check_known
 
 MIN_BLADES = 3  # with two, coefficients stay periodic
 SPACING_TOL = 1e-3  # of the azimuth of a blade [rad]
@@ -134,8 +135,7 @@ def _bodies(blades: object, packed: Packed) -> Index:
     number_of: dict[object, int] = {name: b for b, name in enumerate(packed.names)}
     named = [[getattr(x, "name", x) for x in _parts(blade)] for blade in blades]
     for name in (name for row in named for name in row):
-        if name not in number_of:
-            raise ConfigError(f"blades: no body {name!r}; there are {sorted(packed.names)}.")
+        check_known(name, packed.names, f"blades: no body {name!r}; there are")
     rows = [[number_of[name] for name in row] for row in named]
     masses, shapes = packed.system.bodies.mass, packed.system.bodies.r
     alike = all(

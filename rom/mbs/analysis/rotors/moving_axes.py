@@ -8,10 +8,11 @@ from scipy.sparse import csc_matrix, diags
 
 from rom import rotation
 from rom.arguments import one_of
-from rom.errors import ConfigError, ModelError
+from rom.errors import ModelError
 from rom.mbs.analysis.rotors.blades import Blades
 from rom.mbs.equations.packing import Packed
 from rom.mbs.results.state import State
+from rom.names import check_known
 
 FRAMES = ("body", "world")
 SPIN_RTOL = 1e-3  # of the first frequency of a body, from which on it counts as spinning
@@ -36,9 +37,8 @@ IN_BODIES = Axes()
 def chosen(frame: object, names: tuple[str, ...]) -> Axes:
     """The axes that the caller of an analysis names."""
     table = frame if isinstance(frame, dict) else dict.fromkeys(names, frame)
-    unknown = set(table) - set(names)
-    if unknown:
-        raise ConfigError(f"frame: no body {sorted(unknown)}; there are {sorted(names)}.")
+    for name in table:
+        check_known(name, names, f"frame: no body {name!r}; there are")
     words = (one_of("frame", table.get(name, "body"), FRAMES) for name in names)
     return Axes(tuple(word == "world" for word in words))
 

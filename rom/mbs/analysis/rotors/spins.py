@@ -9,10 +9,10 @@ from scipy.sparse import csr_matrix, lil_matrix
 
 from rom import rotation
 from rom.arguments import finite, number
-from rom.errors import ConfigError, ModelError
+from rom.errors import ConfigError
 from rom.mbs.analysis.local_equations import Instant
 from rom.mbs.analysis.rotors.moving_axes import IN_BODIES, small_motions
-from rom.mbs.kernels.system import COUPLING, ROLL
+from rom.mbs.kernels.system import COUPLING
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import GROUND
 from rom.mbs.parts.joints import coordinate_of
@@ -59,11 +59,9 @@ class Spins:
             found = replace(found, turning=_turning(mechanism, now, spin))
         elif spin is not None:
             found = replace(found, whole=finite("spin", spin, (3,)))
-        rolls = now.packed.system.rows.kind == ROLL
-        if found.any and rolls.any():
-            raise ModelError(
-                "what rolls has no equilibrium while it spins; use rom.simulate instead.",
-                where=now.packed.row_owner[int(np.argmax(rolls))],
+        if found.any:
+            now.packed.refuse_rolling(
+                "what rolls has no equilibrium while it spins; use rom.simulate instead."
             )
         return found
 
