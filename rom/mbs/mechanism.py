@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, MutableMapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Any, Generic, TypeVar
+from typing import Annotated, Any, Generic, Literal, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -72,11 +72,11 @@ class Every(Generic[Element]):
     def __init__(self, record: type[Element]):
         self.record = record
 
-    def __get__(self, mechanism: "Mechanism | None", _: Any = None) -> ElementsOf[Element]:
+    def __get__(self, mechanism: "Mechanism | None", _: object = None) -> ElementsOf[Element]:
         return ElementsOf({} if mechanism is None else mechanism.elements, self.record)
 
 
-def bound(found: Any) -> Any:
+def bound(found: type | Callable[..., object]) -> object:
     """What a field gives as an attribute: a method, or for a record its elements."""
     return Every(found) if isinstance(found, type) else typed(found)
 
@@ -93,7 +93,7 @@ class Event:
         coordinates: joints and rows of the coordinates it asks for.
     """
 
-    function: Callable[..., Any]
+    function: Callable[..., object]
     direction: int
     terminal: bool
     markers: tuple[Marker, ...] = ()
@@ -156,12 +156,15 @@ class Mechanism(Methods, metaclass=Open, kind="methods", bound=bound):
         return f"Mechanism(bodies {listed(self.parts)}; joints {listed(self.joints)})"
 
     def _repr_html_(self) -> str:
-        kinds = [(name, f"flexible, {p.r} elastic coordinates" if p.r else "rigid", p.mass,
-                  listed(p.names)) for name, p in self.parts.items()]  # fmt: skip
-        ends = [(name, j.kind, "", listed(f"{m.body}.{m.place}" for m in j.markers))
-                for name, j in self.joints.items()]  # fmt: skip
+        rows: list[tuple[object, ...]] = []
+        for name, part in self.parts.items():
+            kind = f"flexible, {part.r} elastic coordinates" if part.r else "rigid"
+            rows.append((name, kind, part.mass, listed(part.names)))
+        for name, joint in self.joints.items():
+            markers = listed(f"{m.body}.{m.place}" for m in joint.markers)
+            rows.append((name, joint.kind, "", markers))
         title = f"Mechanism of {len(self.parts)} bodies and {len(self.joints)} joints"
-        return html_table(title, ("name", "kind", "mass [kg]", "markers"), [*kinds, *ends])
+        return html_table(title, ("name", "kind", "mass [kg]", "markers"), rows)
 
     def add_rigid(  # noqa: PLR0913  one keyword per property of a body
         self,
@@ -270,7 +273,7 @@ class Mechanism(Methods, metaclass=Open, kind="methods", bound=bound):
         same = (part.moving for part in self.parts.values() if part.flexible is body)
         return next(same, None) or body.on_mean_axes()
 
-    def add(self, name: str, element: Any, family: Family) -> None:
+    def add(self, name: str, element: object, family: Family) -> None:
         """Add an element of any family, one of your own too.
 
         Args:
@@ -305,9 +308,9 @@ class Mechanism(Methods, metaclass=Open, kind="methods", bound=bound):
     def event(
         self,
         name: str,
-        function: Callable[..., Any],
+        function: Callable[..., object],
         *,
-        direction: int = 0,
+        direction: Literal[-1, 0, 1] = 0,
         terminal: bool = False,
         follow: Sequence[Marker | str | tuple[str, str]] = (),
     ) -> None:
@@ -328,8 +331,6 @@ class Mechanism(Methods, metaclass=Open, kind="methods", bound=bound):
                 is not there.
         """
         self.check_new(name)
-        if direction not in (-1, 0, 1):
-            raise ConfigError(f"direction of event {name!r} is {direction!r}; use -1, 0 or 1.")
         markers = tuple(one for one in follow if isinstance(one, Marker))
         self.check_markers(name, *markers)
         named = [(one, None) if isinstance(one, str) else one for one in follow]

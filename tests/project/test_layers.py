@@ -44,7 +44,7 @@ fe.mesh: cell_types topology picks cad solid sources child curving quality repai
   summary input_deck
 io: files hdf5 archive native fields matrices sid programs fmu bodies history export ours
 mbs: compiler kernels parts connections elements mechanism equations results integrate analysis
-mbs.analysis: local_equations rotors few_modes tangent sparse_tangent equilibrium linearize campbell
+mbs.analysis: local_equations rotors few_modes tangent equilibrium linearize campbell
   response steady_motion sensitivity inverse_dynamics law_check
 mbs.elements: field family law_calls joint_forces springs loads laws formulas motors contact
   joint_laws bushings nonlinear solids

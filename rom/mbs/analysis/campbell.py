@@ -2,25 +2,28 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
 from scipy.optimize import linear_sum_assignment
 
-from rom.arguments import typed, unit_vector, whole
+from rom.arguments import Count, typed, unit_vector
 from rom.errors import ConfigError, warn
 from rom.mbs.analysis.equilibrium import equilibrium
 from rom.mbs.analysis.linearize import Linearization, linearize
 from rom.mbs.analysis.local_equations import MAX_DENSE
 from rom.mbs.analysis.rotors.blades import Blades
 from rom.mbs.mechanism import Mechanism
-from rom.model import Array
+from rom.mbs.results.state import State
+from rom.model import Array, Index
 
 N_SPARE = 6  # modes computed beyond twice those followed
 SPEED_RTOL = 1e-3  # by which the body nearest to a speed may miss it
 FREQUENCY_WEIGHT = 0.1  # weight of the relative change of frequency beside that of the shape
+Turned = Mechanism | Callable[[float], Mechanism | tuple[Mechanism, State]]
 
 
 @dataclass(frozen=True)
@@ -70,14 +73,14 @@ class Campbell:
 
 @typed
 def campbell(
-    mechanism: Mechanism | Callable[[float], Any],
+    mechanism: Turned,
     speeds: npt.ArrayLike,
     *,
-    n: int | None = None,
+    n: Annotated[int, Count(1)] | None = None,
     axis: npt.ArrayLike = (0.0, 0.0, 1.0),
     about: npt.ArrayLike = (0.0, 0.0, 0.0),
-    frame: Any = "body",
-    blades: Any = None,
+    frame: object = "body",
+    blades: object = None,
 ) -> Campbell:
     """Follow the natural frequencies over the speed of rotation.
 
@@ -107,11 +110,9 @@ def campbell(
     if speeds.ndim != 1 or speeds.size < 2 or not np.all(np.diff(speeds) > 0):
         raise ConfigError(f"speeds = {speeds.tolist()} must be at least two growing numbers.")
     axis = unit_vector("axis", axis)
-    if n is not None:
-        whole("n", n, 1)
-    counted = {"frame": frame, "blades": blades}
+    counted = partial(linearize, frame=frame, blades=blades)
     found = [_at(mechanism, speed, axis, about, n, counted) for speed in speeds]
-    orders: list[Any] = [np.arange(found[0].eigenvalues.size)]
+    orders: list[Index] = [np.arange(found[0].eigenvalues.size)]
     likeness = []
     for one, two in pairwise(found):
         follow, mac = _follow(one, two, orders[-1])
@@ -126,24 +127,30 @@ def campbell(
     return Campbell(speeds, values[:, kept], np.array(likeness)[:, kept], waves)
 
 
-def _waves(found: Linearization, blades: Any) -> Array:
+def _waves(found: Linearization, blades: object) -> Array:
     """(f, 3) how the blades take part in all modes at one speed."""
     rotor = Blades.of(blades, found.packed, found.state)
     return rotor.waves(found.shapes / found.scale[:, None], found.state)
 
 
 def _at(
-    mechanism: Any, speed: float, axis: Array, about: Any, n: int | None, axes: dict[str, Any]
+    mechanism: Turned,
+    speed: float,
+    axis: Array,
+    about: npt.ArrayLike,
+    n: int | None,
+    counted: Callable[..., Linearization],
 ) -> Linearization:
     """Modes at one speed; of large mechanisms some more than n, so that they can be followed."""
+    made: Mechanism | tuple[Mechanism, State]
     if isinstance(mechanism, Mechanism):
-        one, state = mechanism, equilibrium(mechanism, spin=speed * axis, about=about)
+        made = mechanism, equilibrium(mechanism, spin=speed * axis, about=about)
     else:
         made = mechanism(float(speed))
-        one, state = made if isinstance(made, tuple) else (made, None)
+    one, state = made if isinstance(made, tuple) else (made, None)
     if n is not None and state is not None and state.v.size > MAX_DENSE:
-        axes = axes | {"n": min(2 * n + N_SPARE, state.v.size - state.rank)}
-    found = linearize(one, state, **axes)
+        counted = partial(counted, n=min(2 * n + N_SPARE, state.v.size - state.rank))
+    found = counted(one, state)
     turns = found.state.v[found.packed.system.bodies.v_at[:, None] + np.arange(3, 6)]
     rates = np.linalg.norm(turns, axis=1)
     if np.abs(rates - abs(speed)).min() > SPEED_RTOL * max(rates.max(), abs(speed)):
@@ -154,7 +161,7 @@ def _at(
     return found
 
 
-def _follow(one: Linearization, two: Linearization, order: Array) -> tuple[Array, Array]:
+def _follow(one: Linearization, two: Linearization, order: Index) -> tuple[Index, Array]:
     """Modes of ``two`` that continue those of ``one`` in this order, and their likeness."""
     if one.eigenvalues.size != two.eigenvalues.size:
         raise ConfigError(

@@ -3,17 +3,23 @@
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import typed, whole
+from rom.arguments import Count, typed
 from rom.errors import ModelError, RomError, SolverError, reached, warn
 from rom.mbs.analysis.local_equations import Instant, instant
 from rom.mbs.analysis.rotors.spins import Spins
-from rom.mbs.analysis.sparse_tangent import Loan, SparseTangent
-from rom.mbs.analysis.tangent import Tangent, best_reactions, faint_force, sizes
+from rom.mbs.analysis.tangent import (
+    Loan,
+    SparseTangent,
+    Tangent,
+    best_reactions,
+    faint_force,
+    sizes,
+)
 from rom.mbs.equations.packing import Packed
 from rom.mbs.integrate.consistent_start import assembled, check_velocity, initial_state
 from rom.mbs.mechanism import Mechanism
@@ -46,7 +52,7 @@ def equilibrium(
     state: State | None = None,
     *,
     t: float | None = None,
-    steps: int = 1,
+    steps: Annotated[int, Count(1, MOST_STEPS)] = 1,
     spin: npt.ArrayLike | Mapping[str, float] | None = None,
     about: npt.ArrayLike = (0.0, 0.0, 0.0),
     assemble: bool = False,
@@ -96,7 +102,6 @@ def equilibrium(
         >>> round(float(rom.equilibrium(mech).q[2]), 6)  # it hangs
         -0.5
     """
-    whole("steps", steps, 1, MOST_STEPS)
     time = (0.0 if state is None else state.t) if t is None else t
     now = instant(mechanism, time, sparse=None)
     search = _Search(now, Spins.of(mechanism, now, spin, about))
@@ -288,7 +293,8 @@ class _Search:
             return None
         ahead = self.corrected(now, state, newton)
         beyond = self.tangent(now, ahead[2])
-        return (ahead, beyond) if beyond.steadier(equations) else None
+        steadier = beyond.descent < beyond.MAX_DESCENT_LEFT * equations.descent
+        return (ahead, beyond) if steadier else None
 
     def judge(self, state: State) -> None:
         """Refuse free motions, and warn of unstable ones."""
@@ -349,9 +355,9 @@ class _Progress:
 
     now: Instant
     sizes: list[float] = field(default_factory=list)
-    displacement: Any = 0.0
+    displacement: Array | float = 0.0
     work: float = 0.0  # of the forces against the motion
-    least: Any = np.inf
+    least: Array | float = np.inf
     idle: int = 0
 
     def ends(self, size: float, motion: Array, before: State, after: State) -> bool:

@@ -7,7 +7,6 @@ at two shifts, so that none is missed.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from scipy.linalg import eig, eigh
@@ -59,7 +58,7 @@ def modes(C: Array, K: Array, zero: float) -> tuple[Array, Array, Array]:
     return roots, V / np.linalg.norm(V, axis=0), every
 
 
-def _one_per_mode(every: Array, zero: Any) -> tuple[Index, Array]:
+def _one_per_mode(every: Array, zero: Array | float) -> tuple[Index, Array]:
     """Numbers and values of real eigenvalues, the larger of each pair, then of those that swing."""
     real = np.flatnonzero(np.abs(every.imag) <= zero)
     real = real[np.argsort(-every[real].real)][: (real.size + 1) // 2]
@@ -96,12 +95,12 @@ class Wanted:
     band: tuple[float, float] = (0.0, np.inf)
 
     @classmethod
-    def of(cls, n: Any, band: Any) -> "Wanted | None":
+    def of(cls, n: int | None, band: tuple[float, float] | None) -> "Wanted | None":
         """What the caller says; None for all modes."""
         if n is None and band is None:
             return None
         if band is None:
-            return cls(whole("n", n, 1))
+            return cls(n or 0)
         if n is not None:
             raise ConfigError("at most one of n and band must be given.")
         low, high = finite("band", band, (2,))
@@ -156,7 +155,7 @@ class Pencil:
     independent: bool = False
 
     @classmethod
-    def of(cls, now: Instant, state: State, motions: tuple[Any, ...]) -> "Pencil":
+    def of(cls, now: Instant, state: State, motions: tuple[csc_matrix, ...]) -> "Pencil":
         """Small motions around a state, counted as `small_motions` says, from sparse matrices."""
         assert now.pattern is not None
         T, T1, T2, T3 = motions
@@ -251,7 +250,7 @@ class Pencil:
         A = bordered(self.even - shift * self.M, self.G, redundant=not self.independent)
         return signature(A, self.groups).negative - self.G.shape[0]
 
-    def inverse(self, K: Any) -> Constrained:
+    def inverse(self, K: csc_matrix) -> Constrained:
         """The factorised equations with K in place of the stiffness."""
         return Constrained(csc_matrix(K), self.G, redundant=not self.independent)
 

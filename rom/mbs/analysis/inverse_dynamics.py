@@ -1,7 +1,6 @@
 """Inverse dynamics: loads of a motion that drives prescribe entirely, without integration."""
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -15,12 +14,11 @@ from rom.mbs.integrate.consistent_start import (
     assembled,
     fitting_velocity,
     initial_state,
+    prescribed,
     with_accelerations,
 )
-from rom.mbs.kernels.system import ROLL
 from rom.mbs.kernels.work import Work, workspace
 from rom.mbs.mechanism import Mechanism
-from rom.mbs.parts.signals import first_failure, sample_all
 from rom.mbs.results.solution import Solution
 from rom.mbs.results.state import State
 from rom.model import Array
@@ -57,21 +55,17 @@ def inverse_dynamics(mechanism: Mechanism, t: npt.ArrayLike, *, assemble: bool =
     state = initial_state(packed, times[0], spacing, assemble=assemble, placing=True)
     packed = packed.of_rank(state.rank)
     _refuse_free(packed, state)
-    signals = sample_all(packed.signals, times, span, spacing)
-    good, failure = first_failure(packed.signals, times, signals, span, spacing)
-    if good < times.size:
-        raise failure
+    signals = prescribed(packed.signals, times, span, spacing, spacing)
     W = workspace(packed.system, len(packed.signals))
     W.base[:] = state.base
     forces = packed.asked
     states: list[State] = []
     powers: list[Array] = []
 
-    def solution() -> Any:
-        so_far = np.array(powers), signals[: len(states)]
-        return _solution(mechanism, packed, states, *so_far) if states else None
+    def solution() -> Solution:
+        return _solution(mechanism, packed, states, np.array(powers), signals[: len(states)])
 
-    with reached(solution):
+    with reached(lambda: solution() if states else None):
         for k, x in enumerate(times):
             W.signal[:] = signals[k]
             state = _next(packed, W, forces, state, float(x))
@@ -94,7 +88,6 @@ def _next(packed: Packed, W: Work, forces: Laws, last: State, t: float) -> State
 def _refuse_free(packed: Packed, state: State) -> None:
     free = packed.v.size - state.rank
     elastic = int(packed.system.bodies.r.sum())
-    rolls = packed.system.rows.kind == ROLL
     if free:
         what = f"{elastic} of them elastic; " if elastic else ""
         raise ModelError(
@@ -102,17 +95,13 @@ def _refuse_free(packed: Packed, state: State) -> None:
             "needs none).",
             hint="Add drives, or simulate the motion: its solution answers the same questions.",
         )
-    if rolls.any():
-        raise ModelError(
-            "rolling prescribes velocities, not positions; use rom.simulate instead.",
-            where=packed.row_owner[int(np.argmax(rolls))],
-        )
+    packed.refuse_rolling("rolling prescribes velocities, not positions; use rom.simulate instead.")
 
 
 def _solution(
     mechanism: Mechanism, packed: Packed, states: list[State], powers: Array, signals: Array
 ) -> Solution:
-    def rows(name: str) -> Any:
+    def rows(name: str) -> Array:
         return np.array([getattr(state, name) for state in states])
 
     t, work = rows("t"), np.zeros_like(powers)

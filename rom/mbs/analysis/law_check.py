@@ -1,18 +1,19 @@
 """Mistakes in force laws of the user, found by asking them at many motions of their markers."""
 
 import ctypes
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 
 from rom import rotation
-from rom.arguments import typed, whole
-from rom.errors import ConfigError
+from rom.arguments import Count, typed
 from rom.mbs.elements.law_calls import ENERGY_SIZE, MOTION_SIZE, answer_of, differences, motion_of
 from rom.mbs.elements.laws import Law, UserForce
 from rom.mbs.mechanism import Mechanism
 from rom.model import Array, Mask, Report, Row
+from rom.names import check_known
 
 LAW_ENTRY = ctypes.CFUNCTYPE(None, ctypes.c_double, *[ctypes.c_void_p] * 4)
 GUARD_SIZE, GUARD_VALUE = 64, -7.25e77  # numbers on either side of an array, which nobody writes
@@ -31,7 +32,7 @@ def check_law(
     name: str,
     *,
     t: float = 0.0,
-    samples: int = 5,
+    samples: Annotated[int, Count(1, MOST_SAMPLES)] = 5,
     rng: np.random.Generator | None = None,
 ) -> Report:
     """Ask a law at random motions around the start, and look for what would spoil a run.
@@ -56,10 +57,9 @@ def check_law(
         ConfigError: for a name that no law has.
         Exception: whatever a law in Python raises.
     """
-    law = mechanism.laws.get(name)
-    if law is None or isinstance(law, UserForce):
-        raise ConfigError(f"name = {name!r}: no law; there are {sorted(mechanism.laws)}.")
-    whole("samples", samples, 1, MOST_SAMPLES)
+    laws = {key: one for key, one in mechanism.laws.items() if not isinstance(one, UserForce)}
+    check_known(name, laws, f"name = {name!r}: no law; there are")
+    law = laws[name]
     rng = np.random.default_rng(0) if rng is None else rng
     asked = _Asked(law, t)
     found = [_looked(asked, motion) for motion in _motions(mechanism, law, samples, rng)]
@@ -89,14 +89,12 @@ class _Asked:
     def __init__(self, law: Law, t: float):
         self.law, self.t = law, t
         n, m, o = law.sizes
-        self.fields = [
-            *(f"{what} on marker {k}, {a}" for what in ("force", "moment")
-              for k in range(n) for a in AXIS_NAMES),
-            "energy", "lost power", *(f"memory {k}" for k in range(m)), *law.outputs,
-        ]  # fmt: skip
-        self.motions = [f"{what} {k} {how} {a}" for k in range(n)
-                        for what, how in (("way of marker", "along"), ("turn of marker", "about"))
-                        for a in AXIS_NAMES]  # fmt: skip
+        places = [(k, axis) for k in range(n) for axis in AXIS_NAMES]
+        loads = [f"{what} on marker {k}, {a}" for what in ("force", "moment") for k, a in places]
+        memory = [f"memory {k}" for k in range(m)]
+        self.fields = [*loads, "energy", "lost power", *memory, *law.outputs]
+        ways = ("way of marker {} along {}", "turn of marker {} about {}")
+        self.motions = [way.format(k, a) for k in range(n) for way in ways for a in AXIS_NAMES]
         self.size = 6 * n + ENERGY_SIZE + m + o
         self.harm = 0.0  # numbers that were written where none may be
 
@@ -131,7 +129,9 @@ class _Asked:
         return given[3][mine].copy()
 
 
-def _motions(mechanism: Mechanism, law: Law, samples: int, rng: np.random.Generator) -> Any:
+def _motions(
+    mechanism: Mechanism, law: Law, samples: int, rng: np.random.Generator
+) -> Iterator[Array]:
     """Motions of the markers around the start, each (18 K,)."""
     points = np.array([mechanism.design_point(m) for m in law.markers])
     axes = np.array([rotation.matrix(mechanism.part(m.body).p) for m in law.markers])
@@ -140,9 +140,8 @@ def _motions(mechanism: Mechanism, law: Law, samples: int, rng: np.random.Genera
         n = len(points)
         turns = [rotation.matrix(rotation.exp(TURN_SPREAD * rng.normal(size=3))) for _ in range(n)]
         moved = points + SPREAD_SHARE * size * rng.normal(size=(n, 3))
-        yield np.concatenate([
-            moved.ravel(), (np.array(turns) @ axes).ravel(), rng.normal(size=6 * n)
-        ])  # fmt: skip
+        turned = np.array(turns) @ axes
+        yield np.concatenate([moved.ravel(), turned.ravel(), rng.normal(size=6 * n)])
 
 
 def _looked(asked: _Asked, motion: Array) -> list[_Finding]:
@@ -202,8 +201,8 @@ def _balance(asked: _Asked, motion: Array, answer: Array) -> _Finding:
     unseen = ENERGY_DIGITS * max(map(abs, energies)) / h / ENERGY_RTOL
     scale = max(abs(power), abs(rate), abs(lost), unseen, 1e-300)
     where = f"power {power:.6g} W, stored {rate:.6g} W, lost {lost:.6g} W"
-    return _Finding("power + stored + lost / largest", where, abs(power + rate + lost) / scale,
-                    ENERGY_RTOL)  # fmt: skip
+    share = abs(power + rate + lost) / scale
+    return _Finding("power + stored + lost / largest", where, share, ENERGY_RTOL)
 
 
 def _later(motion: Array, h: float) -> Array:

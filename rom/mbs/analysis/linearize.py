@@ -1,14 +1,15 @@
 """Small motions around any state of a mechanism: frequencies, damping, shapes."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from rom.arguments import typed
-from rom.errors import ConfigError, ModelError, warn
+from rom.arguments import Count, typed
+from rom.errors import ConfigError, warn
 from rom.mbs.analysis.few_modes import Pencil, Wanted, modes, phases
 from rom.mbs.analysis.local_equations import (
     Instant,
@@ -22,8 +23,8 @@ from rom.mbs.analysis.rotors.blades import Blades
 from rom.mbs.analysis.rotors.moving_axes import Axes, chosen, small_motions
 from rom.mbs.analysis.tangent import load_stiffness, sizes
 from rom.mbs.equations.packing import Packed
+from rom.mbs.equations.sparse_solve import Matrix
 from rom.mbs.integrate.consistent_start import fitting_velocity, with_accelerations
-from rom.mbs.kernels.system import ROLL
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import Marker
 from rom.mbs.results.audit import pressed
@@ -164,10 +165,10 @@ def linearize(  # noqa: PLR0913  keywords of the one entry, all have defaults
     state: State | None = None,
     *,
     t: float | None = None,
-    frame: Any = "body",
-    n: int | None = None,
+    frame: object = "body",
+    n: Annotated[int, Count(1)] | None = None,
     band: tuple[float, float] | None = None,
-    blades: Any = None,
+    blades: object = None,
     assemble: bool = False,
 ) -> Linearization:
     """Linearise the equations of motion around a state, at rest or moving.
@@ -241,10 +242,10 @@ def linearize(  # noqa: PLR0913  keywords of the one entry, all have defaults
 
 def _few(now: Instant, state: State, axes: Axes, wanted: Wanted) -> Linearization | None:
     """The modes wanted from sparse matrices; None where whole ones are needed or cheaper."""
-    pencil, later, rate = sparse_equations(now, state, axes)
-    if pencil is None or not pencil.affords(wanted):
+    found = sparse_equations(now, state, axes)
+    if found is None or not found.now.affords(wanted):
         return None
-    known = None
+    pencil, known = found.now, None
     if pencil.symmetric:
         squares, Q = pencil.wanted(wanted)
         K, C = np.diag(squares), np.zeros((squares.size, squares.size))
@@ -253,34 +254,47 @@ def _few(now: Instant, state: State, axes: Axes, wanted: Wanted) -> Linearizatio
         known = roots, Y, np.concatenate([roots, roots.conj()])
         K, C = pencil.seen_in(Q)
     if state.v.any():
-        _warn_of_drift((K, C), later.seen_in(Q), rate)
+        _warn_of_drift((K, C), found.later.seen_in(Q), found.rate)
     now.evaluate(state.q, state.v)
-    basis = pencil.basis @ Q
-    return Linearization(state, np.eye(len(K)), C, K, basis, basis, ZERO_FREQUENCY_RTOL,
-                         now.probe(), now.packed, now.W.H.copy(), known)  # fmt: skip
+    basis, M = pencil.basis @ Q, np.eye(len(K))
+    seen = now.probe(), now.packed, now.W.H.copy()
+    return Linearization(state, M, C, K, basis, basis, ZERO_FREQUENCY_RTOL, *seen, known)
 
 
-def sparse_equations(now: Instant, state: State, axes: Axes) -> Any:
-    """Small motions by sparse matrices: now, a little later, and the speed [rad/s]; else Nones.
+class SparseEquations(NamedTuple):
+    """Small motions by sparse matrices: now, a little later, and the speed [rad/s]."""
+
+    now: Pencil
+    later: Pencil
+    rate: float
+
+
+def sparse_equations(now: Instant, state: State, axes: Axes) -> SparseEquations | None:
+    """Small motions of a large mechanism; None where whole matrices are needed.
 
     Only whole matrices know reactions that friction depends on, and joints whose directions change
     in the axes of the bodies.
     """
     if now.packed.loaded_rows.size:
-        return None, None, 0.0
+        return None
     pencil = _pencil(now, state, axes)
     path = _Path(now, state, axes, np.zeros((state.v.size, 0)))
-    rests = _rests(now, state, pencil.basis, lambda added, load: pencil.inverse(
-        pencil.even + added * pencil.M).solve(load)[0])  # fmt: skip
+
+    def answer(added: float, load: Array) -> Array:
+        return pencil.inverse(pencil.even + added * pencil.M).solve(load)[0]
+
+    rests = _rests(now, state, pencil.basis, answer)
     later = pencil if rests else _pencil(now, path.later().state, axes)
-    return (pencil, later, path.rate) if pencil.allows(later) else (None, None, 0.0)
+    return SparseEquations(pencil, later, path.rate) if pencil.allows(later) else None
 
 
 def _pencil(now: Instant, state: State, axes: Axes) -> Pencil:
     return Pencil.of(now, state, small_motions(now.packed, state, axes))
 
 
-def _rests(now: Instant, state: State, basis: Any, solve: Any) -> bool:
+def _rests(
+    now: Instant, state: State, basis: Matrix, solve: Callable[[float, Array], Array]
+) -> bool:
     """Whether a state has no velocity, and is so near to balance that its accelerations vanish.
 
     Light pieces of stiff bodies turn round-off of forces into accelerations of any size. ``solve``
@@ -386,8 +400,11 @@ def _matrices(now: Instant, state: State, axes: Axes, path: _Path) -> Linearizat
     test = _virtual(now, state, basis)
     C2 = test.T @ (M @ (T2 @ Z) + Cv @ basis)
     K2 = test.T @ (M @ (T3 @ Z) + Cv @ (T1 @ Z) + Kq @ basis)
-    if test is not basis or not _rests(now, state, basis, lambda added, load: np.linalg.solve(
-            K2 + added * np.eye(len(K2)), load)):  # fmt: skip
+
+    def answer(added: float, load: Array) -> Array:
+        return np.linalg.solve(K2 + added * np.eye(len(K2)), load)
+
+    if test is not basis or not _rests(now, state, basis, answer):
         Zd, Zdd = path.rates()
         C2 += test.T @ (M @ (2 * T @ Zd))
         K2 += test.T @ (M @ (T @ Zdd + T2 @ Zd) + Cv @ (T @ Zd))
@@ -409,11 +426,8 @@ def _virtual(now: Instant, state: State, basis: Array) -> Array:
 
 def refuse_rolling(packed: Packed, state: State) -> None:
     """At rest, what rolls without sliding is held like by any other joint."""
-    rolls = packed.system.rows.kind == ROLL
-    if rolls.any() and state.v.any():
-        name = packed.row_owner[int(np.argmax(rolls))]
-        raise ModelError(
+    if state.v.any():
+        packed.refuse_rolling(
             "a rolling joint binds velocities, not positions: it can be linearised at rest only.",
-            where=name,
-            hint="rom.steady_motion has the eigenvalues of steady rolling.",
+            "rom.steady_motion has the eigenvalues of steady rolling.",
         )

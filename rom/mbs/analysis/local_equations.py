@@ -3,14 +3,14 @@
 `snapshot` is such a state as a motion of one instant, which answers whatever motions answer.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from rom.arguments import number, typed
+from rom.arguments import typed
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.mbs.elements.family import Laws, apply_laws
 from rom.mbs.equations.equations import (
@@ -21,17 +21,17 @@ from rom.mbs.equations.equations import (
     tangents,
 )
 from rom.mbs.equations.packing import Packed, pack
-from rom.mbs.equations.sparse_solve import Pattern
+from rom.mbs.equations.sparse_solve import Matrix, Pattern
 from rom.mbs.integrate.consistent_start import (
     fitting_velocity,
     independent,
     initial_state,
+    prescribed,
     with_accelerations,
 )
-from rom.mbs.kernels.system import ROLL, WORK
+from rom.mbs.kernels.system import ROLL, WORK, System
 from rom.mbs.kernels.work import Work, workspace
 from rom.mbs.mechanism import Mechanism
-from rom.mbs.parts.signals import first_failure, sample_all
 from rom.mbs.results.solution import Solution
 from rom.mbs.results.state import State, check_state
 from rom.model import Array
@@ -72,16 +72,13 @@ class Instant:
 
     def at(self, t: float) -> "Instant":
         """The same at another time; the memory is shared."""
-        signals, times = self.packed.signals, np.array([t])
-        table = sample_all(signals, times, (-np.inf, np.inf), DIFFERENCE_SPACING)
-        good, failure = first_failure(signals, times, table)
-        if not good:
-            raise failure
+        span = -np.inf, np.inf
+        table = prescribed(self.packed.signals, np.array([t]), span, DIFFERENCE_SPACING)
         self.W.signal[:] = table[0]
         return replace(self, t=t)
 
     @cached_property
-    def system(self) -> Any:
+    def system(self) -> System:
         """The arrays of the mechanism, gravity times the factor of the loads."""
         s = self.packed.system
         return s.replace(bodies=s.bodies.replace(gravity=self.load * s.bodies.gravity))
@@ -107,7 +104,7 @@ class Instant:
             )
         return self.W.residual.copy()
 
-    def gradient(self, q: Array, v: Array) -> tuple[Array, Any, Any]:
+    def gradient(self, q: Array, v: Array) -> tuple[Array, Matrix, Matrix]:
         """(m,) gaps of the constraints, their gradient (m, n), and the mass matrix (n, n)."""
         linearize_constraints(self.packed.system, self.W, q, v)
         value, G, M = self.W.value.copy(), self.W.G, self.W.S
@@ -115,7 +112,7 @@ class Instant:
             return value, G.copy(), M.copy()
         return value, self.pattern.gradient(G), self.pattern.matrix(M)
 
-    def difference(self, f: Any) -> Any:
+    def difference(self, f: Callable[[Array], Array]) -> Matrix:
         """(n, n) central differences of forces f by motions or velocities."""
         if self.pattern is None:
             return difference(f, self.probe())
@@ -134,7 +131,7 @@ class Instant:
         rests = not state.v.any() or not self.packed.by_rate
         return bool(rests and np.abs(self.W.theta).max(initial=0.0) < ELASTIC_TURN)
 
-    def matrices(self, state: State) -> tuple[Any, Any, Any]:
+    def matrices(self, state: State) -> tuple[Matrix, Matrix, Matrix]:
         """(n, n) derivatives of the residual by accelerations, velocities, coordinates.
 
         Those by coordinates for rotations in the body frame.
@@ -199,17 +196,14 @@ class Instant:
         return step
 
 
-def difference(f: Any, step: Array) -> Array:
+def difference(f: Callable[[Array], Array | float], step: Array) -> Array:
     """Central differences of f by the entries of its argument, as columns."""
     columns = [(f(e) - f(-e)) / (2 * e[k]) for k, e in enumerate(np.diag(step))]
     return np.array(columns).reshape(step.size, -1).T
 
 
-def instant(mechanism: Any, t: float, *, sparse: bool | None = False) -> Instant:
+def instant(mechanism: Mechanism, t: float, *, sparse: bool | None = False) -> Instant:
     """The mechanism with its drives and loads at time t [s]; sparse: None for large ones only."""
-    if not isinstance(mechanism, Mechanism):
-        raise ConfigError(f"{mechanism!r} must be a rom.Mechanism.")
-    number("t", t)
     packed = pack(mechanism, whole=sparse is False)
     if sparse is None:
         sparse = packed.v.size > MAX_DENSE
@@ -221,7 +215,7 @@ def instant(mechanism: Any, t: float, *, sparse: bool | None = False) -> Instant
     return Instant(packed, W, float(t), packed.asked, pattern=pattern).at(float(t))
 
 
-def consistent(now: Instant, state: Any, assemble: bool = False) -> State:
+def consistent(now: Instant, state: State | None, assemble: bool = False) -> State:
     """The state with velocities, accelerations and multipliers that belong together.
 
     Raises ModelError naming the joint that is open, or whose velocity contradicts it.

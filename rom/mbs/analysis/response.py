@@ -65,7 +65,7 @@ def frequency_response(
     *,
     force: Marker,
     motion: Marker,
-    frame: Any = "body",
+    frame: object = "body",
     assemble: bool = False,
 ) -> FrequencyResponse:
     """Respond to a harmonic force, linearly around a state.
@@ -167,7 +167,7 @@ class _Large:
 
     @classmethod
     def of(
-        cls, mechanism: Mechanism, state: State | None, frame: Any, assemble: bool
+        cls, mechanism: Mechanism, state: State | None, frame: object, assemble: bool
     ) -> "_Large | None":
         """The equations; None where whole matrices are cheaper, or needed."""
         now = instant(mechanism, 0.0 if state is None else state.t, sparse=None)
@@ -175,9 +175,9 @@ class _Large:
             return None
         state = consistent(now, state, assemble)
         refuse_rolling(now.packed, state)
-        pencil = sparse_equations(now, state, chosen(frame, now.packed.names))[0]
+        found = sparse_equations(now, state, chosen(frame, now.packed.names))
         now.evaluate(state.q, state.v)
-        return pencil and cls(now, state, pencil, now.W.H.copy())
+        return found and cls(now, state, found.now, now.W.H.copy())
 
     def motion(self, marker: Marker) -> Array:
         """(6, n) of a marker per motion of the pencil."""

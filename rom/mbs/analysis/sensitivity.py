@@ -7,6 +7,7 @@ from inspect import signature
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from rom.arguments import positive, shortened, typed
 from rom.errors import ConfigError, ModelError
@@ -18,13 +19,15 @@ from rom.mbs.analysis.tangent import Tangent
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.results.state import State
 from rom.model import Array
+from rom.names import check_known
 
 DIFFERENCE_STEP = 1e-4  # of a parameter, relative to its size
 # steps that are tried where the result is a motion, and the relative error that ends the search
 MAX_STEP, MAX_HALVINGS, ERROR_RTOL = 5e-2, 9, 1e-9
 SEPARATE_RTOL = 1e-6  # distance of eigenvalues from which on each has its own derivative
 Builder = Callable[..., Mechanism]
-Output = Callable[[Mechanism, State], Any]
+Output = Callable[[Mechanism, State], npt.ArrayLike]
+Result = Callable[..., npt.ArrayLike]
 
 
 @dataclass(frozen=True)
@@ -40,14 +43,13 @@ class Sensitivity:
     """
 
     names: tuple[str, ...]
-    value: Any
-    derivative: Any
+    value: Array
+    derivative: Array
     error: Array
 
-    def __getitem__(self, name: str) -> Any:
+    def __getitem__(self, name: str) -> Array:
         """(...) derivative by one parameter."""
-        if name not in self.names:
-            raise ConfigError(f"no parameter {name!r}; there are {list(self.names)}.")
+        check_known(name, self.names, f"no parameter {name!r}; there are")
         return self.derivative[..., self.names.index(name)]
 
 
@@ -127,7 +129,7 @@ def frequency_sensitivity(
 
 
 @typed
-def motion_sensitivity(result: Callable[..., Any], parameters: Mapping[str, float]) -> Sensitivity:
+def motion_sensitivity(result: Result, parameters: Mapping[str, float]) -> Sensitivity:
     """Derivatives of the result of a simulation, by central differences with a chosen step.
 
     Steps are halved; the two results of each pair are combined to fourth order, and the pair that
@@ -152,7 +154,7 @@ def motion_sensitivity(result: Callable[..., Any], parameters: Mapping[str, floa
 
 
 def _checked(
-    parameters: Mapping[str, float], name: str, called: Callable[..., Any]
+    parameters: Mapping[str, float], name: str, called: Callable[..., object]
 ) -> dict[str, float]:
     """The parameters, if there are some and a function takes them by name."""
     if not parameters:
@@ -182,12 +184,12 @@ def _rest(
 
 
 def _slope(
-    of: Callable[[Mechanism, Instant, State], Any],
+    of: Callable[[Mechanism, Instant, State], npt.ArrayLike],
     build: Builder,
     values: dict[str, float],
     name: str,
     state: State,
-) -> Any:
+) -> Array:
     """Total derivative by a parameter: between the equilibria one step of it before and after.
 
     They are there to first order, by the implicit function theorem.
@@ -250,9 +252,7 @@ def _rate(E: Array, change: Array, s: complex, x: Array, y: Array) -> complex:
     return -projected_change / (y.conj() @ (2 * s * E[0] + E[1]) @ x)
 
 
-def _ridders(
-    result: Callable[..., Any], values: dict[str, float], name: str
-) -> tuple[Array, float]:
+def _ridders(result: Result, values: dict[str, float], name: str) -> tuple[Array, float]:
     """Derivative by one parameter, and its estimated relative error."""
     step = positive("step", MAX_STEP * (abs(values[name]) or 1.0))
     best, error, last, before = np.zeros(0), np.inf, None, None

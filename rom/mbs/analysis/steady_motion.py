@@ -1,7 +1,6 @@
 """Stability of steady motions of first order: what rolls while it moves."""
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -58,7 +57,7 @@ def steady_motion(
     state: State | None = None,
     *,
     t: float | None = None,
-    frame: Any = "world",
+    frame: object = "world",
     assemble: bool = False,
 ) -> SteadyMotion:
     """Linearise a steady motion in which wheels or balls may roll.

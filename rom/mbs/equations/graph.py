@@ -11,12 +11,12 @@ multipliers are not determined.
 
 import heapq
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from rom.mbs.elements.family import integers, starts
-from rom.mbs.kernels.system import Graph, Plan
+from rom.mbs.kernels.system import Graph, Plan, System
 from rom.model import Index
 
 # operations of a whole factorisation over those by blocks, from which blocks are quicker: measured
@@ -169,7 +169,7 @@ class Ordering:
         return tops
 
 
-def graph_of(system: Any, coupled: Sequence[Any], *, whole: bool = False) -> Graph:
+def graph_of(system: System, coupled: Sequence[Sequence[int]], *, whole: bool = False) -> Graph:
     """Storage and elimination plan of a system whose other arrays are complete.
 
     ``coupled`` are groups of bodies that elements couple; ``whole`` stores whole matrices anyhow.
@@ -187,14 +187,12 @@ def graph_of(system: Any, coupled: Sequence[Any], *, whole: bool = False) -> Gra
     own = integers([first[b] + others.index(b) for b, others in enumerate(neighbours)])
     touched, at = _touched(system, compact)
     rows = [group.rows for group in groups]
-    return Graph(
-        int(compact), 0, *(first, other, x, y, own, touched, at),
-        starts([len(r) for r in rows]), integers([k for r in rows for k in r]),
-        plan or NO_PLAN,
-    )  # fmt: skip
+    joints = starts([len(r) for r in rows]), integers([k for r in rows for k in r])
+    stored = first, other, x, y, own, touched, at
+    return Graph(int(compact), 0, *stored, *joints, plan or NO_PLAN)
 
 
-def _neighbours(system: Any, coupled: Sequence[Any]) -> list[list[int]]:
+def _neighbours(system: System, coupled: Sequence[Sequence[int]]) -> list[list[int]]:
     """Bodies that each body is coupled to by the stiffness of joints and forces, and itself."""
     found: list[set[int]] = [{b} for b in range(system.bodies.mass.size)]
     body, rows, C = system.markers.body, system.rows, system.coordinates
@@ -207,27 +205,27 @@ def _neighbours(system: Any, coupled: Sequence[Any]) -> list[list[int]]:
     return [sorted(others) for others in found]
 
 
-def _groups(system: Any) -> list[Group]:
+def _groups(system: System) -> list[Group]:
     """Constraint rows and moved bodies of each joint, its drives included."""
     R = system.rows
     rows: list[list[int]] = [[] for _ in R.joint_i]
     for k, joint in enumerate(R.pair):
         rows[joint].append(k)
-    return [
-        Group(tuple(mine), tuple(dict.fromkeys(b for k in mine for b in _bodies_of(system, k))),
-              bool((R.at[mine, 0] >= 0).all()))
-        for mine in rows
-    ]  # fmt: skip
+    found = []
+    for mine in rows:
+        bodies = dict.fromkeys(b for k in mine for b in _bodies_of(system, k))
+        found.append(Group(tuple(mine), tuple(bodies), bool((R.at[mine, 0] >= 0).all())))
+    return found
 
 
-def _bodies_of(system: Any, row: int) -> list[int]:
+def _bodies_of(system: System, row: int) -> list[int]:
     """Different bodies that a constraint row moves."""
     rows, body = system.rows, system.markers.body
     markers = [m[row] for m in (rows.i, rows.j, rows.k, rows.l) if m[row] >= 0]
     return list(dict.fromkeys(int(body[m]) for m in markers if body[m] >= 0))
 
 
-def _touched(system: Any, compact: bool) -> tuple[Index, Index]:
+def _touched(system: System, compact: bool) -> tuple[Index, Index]:
     """(m, 4) bodies that each row moves and their first columns in Work.G, padded with -1."""
     bodies, m = system.bodies, system.rows.kind.size
     body, at = np.full((m, 4), -1, dtype=np.int64), np.full((m, 4), -1, dtype=np.int64)
@@ -239,7 +237,7 @@ def _touched(system: Any, compact: bool) -> tuple[Index, Index]:
     return body, at
 
 
-def _plan(system: Any, neighbours: list[list[int]], groups: list[Group]) -> Plan | None:
+def _plan(system: System, neighbours: list[list[int]], groups: list[Group]) -> Plan | None:
     """The elimination plan, or None if whole matrices are quicker."""
     ordering = Ordering(6 + system.bodies.r, neighbours, groups)
     limit = 2 / 3 * sum(ordering.size) ** 3 / BLOCK_GAIN
@@ -247,7 +245,7 @@ def _plan(system: Any, neighbours: list[list[int]], groups: list[Group]) -> Plan
 
 
 def _tables(
-    system: Any, ordering: Ordering, neighbours: list[list[int]], groups: list[Group]
+    system: System, ordering: Ordering, neighbours: list[list[int]], groups: list[Group]
 ) -> Plan:
     """Where everything is in the factor."""
     sequence, n_bodies = ordering.sequence, len(neighbours)
@@ -298,7 +296,7 @@ def _tables(
     )
 
 
-def elimination_order(system: Any, coupled: Sequence[Any]) -> list[Index]:
+def elimination_order(system: System, coupled: Sequence[Sequence[int]]) -> list[Index]:
     """Unknowns of each body and each joint, rows of constraints after all velocities, in turn."""
     neighbours, groups = _neighbours(system, coupled), _groups(system)
     width, v_at = 6 + system.bodies.r, system.bodies.v_at
@@ -312,7 +310,7 @@ def elimination_order(system: Any, coupled: Sequence[Any]) -> list[Index]:
     return [unknowns for unknowns in found if unknowns.size]
 
 
-def _columns(pairs: list[tuple[int, int]]) -> Any:
+def _columns(pairs: list[tuple[int, int]]) -> Index:
     """Two vectors from a list of pairs of numbers."""
     return np.ascontiguousarray(np.array(pairs, dtype=np.int64).reshape(-1, 2).T)
 

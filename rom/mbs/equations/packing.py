@@ -1,6 +1,6 @@
 """From the described mechanism to the flat arrays of compiled code."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -8,14 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from rom.errors import ConfigError, warn
+from rom.errors import ConfigError, ModelError, warn
 from rom.mbs.elements.family import Asked, Family, Places, integers, rows_of, starts
 from rom.mbs.equations import renewal
 from rom.mbs.equations.graph import graph_of
 from rom.mbs.kernels.element_calls import ROW_WORDS
 from rom.mbs.kernels.stages import STAGE_ADDRESSES
-from rom.mbs.kernels.system import ALONG, LENGTHS, Bodies, Markers, Rows, System
+from rom.mbs.kernels.system import ALONG, LENGTHS, ROLL, Bodies, Graph, Markers, Rows, System
 from rom.mbs.kernels.tables import Table
+from rom.mbs.kernels.work import Work
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import GROUND, Marker, Part, moving_start
 from rom.mbs.parts.joints import Joint, Row
@@ -78,7 +79,7 @@ class Packed:
         """Constraint rows whose multipliers forces depend on."""
         return loaded_by(self.elements)
 
-    def told(self, hook: str, *given: Any) -> dict[str, Any]:
+    def told(self, hook: str, *given: object) -> dict[str, Any]:
         """What the hook of that name says of each element, of `rom.mbs.elements.family.Hooks`."""
         return {
             name: said
@@ -134,11 +135,11 @@ class Packed:
         found = (keep(table, memory) for _, keep, table in hooked(self.elements, "kept"))
         return sum(found, np.zeros(len(base)))
 
-    def phases(self, W: Any) -> dict[str, float]:
+    def phases(self, W: Work) -> dict[str, float]:
         """Numbers at the last residual that go on by whole ones in motions that repeat [1]."""
         return {name: float(phase) for name, phase in self.told("phases", W).items()}
 
-    def rows_of(self, joint: str) -> Array:
+    def rows_of(self, joint: str) -> Index:
         """Numbers of the constraint rows of a joint or drive."""
         return np.array([k for k, owner in enumerate(self.row_owner) if owner == joint], dtype=int)
 
@@ -151,14 +152,19 @@ class Packed:
         return np.where(lengths, self.length, 1.0)
 
     @property
+    def graph(self) -> Graph:
+        """How the equations are stored and solved."""
+        return self.system.graph
+
+    @property
     def by_blocks(self) -> bool:
         """Whether the equations are stored and solved body by body, joint by joint."""
-        return bool(self.system.graph.compact)
+        return bool(self.graph.compact)
 
     @property
     def shares(self) -> bool:
         """Whether constraints in blocks may repeat others."""
-        return bool(self.system.graph.shares)
+        return bool(self.graph.shares)
 
     def whole(self) -> "Packed":
         """The same with whole matrices."""
@@ -169,8 +175,7 @@ class Packed:
         """The same where constraints repeat others: of many coordinates still in blocks."""
         if self.v.size <= MAX_SHARING_WHOLE:
             return self.whole()
-        graph = self.system.graph.replace(shares=1)
-        return replace(self, system=self.system.replace(graph=graph))
+        return replace(self, system=self.system.replace(graph=self.graph.replace(shares=1)))
 
     def of_rank(self, rank: int) -> "Packed":
         """The same, ready for as many independent constraints as a start has found."""
@@ -181,7 +186,7 @@ class Packed:
         """Number of constraints in the equations: in blocks all, whole the independent ones."""
         return int(self.system.rows.kind.size) if self.by_blocks else rank
 
-    def coupled(self) -> list[Any]:
+    def coupled(self) -> list[Sequence[int]]:
         """Groups of bodies that elements couple."""
         return coupled_by(self.elements, self.system.markers.body)
 
@@ -189,6 +194,12 @@ class Packed:
     def frames(self) -> list[Marker]:
         """The further markers of ``seen``."""
         return [marker for marker in self.markers if marker.place == OWN_FRAME]
+
+    def refuse_rolling(self, message: str, hint: str = "") -> None:
+        """Refuse joints that roll, naming the first, where positions alone may be bound."""
+        rolls = self.system.rows.kind == ROLL
+        if rolls.any():
+            raise ModelError(message, where=self.row_owner[int(np.argmax(rolls))], hint=hint)
 
     def row(self, marker: Marker) -> int:
         """Row of a marker in the arrays."""
@@ -275,7 +286,7 @@ def _renewed(elements: Mapping[Family, Any], n: int) -> Index:
     return found if pays else found[:0]
 
 
-def coupled_by(elements: dict[Family, Table], body: Index) -> list[Any]:
+def coupled_by(elements: dict[Family, Table], body: Index) -> list[Sequence[int]]:
     """Groups of bodies that elements couple, -1 for the ground."""
     return [group for family, table in elements.items() for group in family.couples(table, body)]
 

@@ -12,7 +12,7 @@ Source:
 
 from collections.abc import Callable, Sequence
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from scipy.sparse import bmat, csc_matrix, csr_matrix, diags, identity, tril
@@ -21,7 +21,10 @@ from scipy.sparse.linalg import splu
 from rom.errors import SolverError
 from rom.mbs.equations.graph import elimination_order
 from rom.mbs.equations.packing import Packed
+from rom.mbs.kernels.system import Graph
 from rom.model import Array, Index
+
+Matrix: TypeAlias = Array | csc_matrix  # whole or sparse
 
 # what a constraint that repeats others may give way, of what the stiffest one does: the motion
 # keeps all digits but those that differences of such constraints have lost before
@@ -44,8 +47,7 @@ class Pattern:
 
     def __init__(self, packed: Packed):
         system = packed.system
-        graph: Any = system.graph
-        bodies, self.packed = system.bodies, packed
+        graph, bodies, self.packed = packed.graph, system.bodies, packed
         self.n, self.m = packed.v.size, system.rows.kind.size
         width = 6 + bodies.r
         body = np.repeat(np.arange(width.size), np.diff(graph.first))
@@ -93,7 +95,7 @@ def _within(tall: Index, wide: Index) -> tuple[Index, Index]:
     return at // np.repeat(wide, count), at % np.repeat(wide, count)
 
 
-def _families(graph: Any, n_bodies: int) -> list[Index]:
+def _families(graph: Graph, n_bodies: int) -> list[Index]:
     """Sets of bodies of which no two have a neighbour in common, or are neighbours."""
     family = np.full(n_bodies, -1)
     for b in range(n_bodies):
@@ -125,7 +127,7 @@ class Constrained:
         except RuntimeError as error:
             raise SolverError("the linear equations are singular.") from error
 
-    def solve(self, f: Array, g: Array | None = None) -> tuple[Any, Any]:
+    def solve(self, f: Array, g: Array | None = None) -> tuple[Array, Array]:
         """Motions x (n, k) and multipliers l (m, k) for forces f (n, k) and gaps g (m, k)."""
         m = self.A.shape[0] - self.n
         below = np.zeros((m, *f.shape[1:])) if g is None else self.size * g

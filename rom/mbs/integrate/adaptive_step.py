@@ -255,7 +255,7 @@ def _control(W: Work, step: alpha.Step, start: State) -> tuple[Work, Control]:
     The memory keeps of a step its factor, and what belongs to it.
     """
     base = W.base if start.base is None else start.base
-    own: dict[str, Any] = {"v": start.v, "a": start.a, "lam": start.lam, "base": base}
+    own: dict[str, Array] = {"v": start.v, "a": start.a, "lam": start.lam, "base": base}
     own |= {"jerk": 0 * start.v, "number": np.zeros(control.ERROR + 1)}
     counts = {"count": np.zeros(control.ANSWER + 1, dtype=np.int64)}
     kept = {f"W {name}": getattr(W, name) for name in ("base", *FACTOR_FIELDS, "factor")}

@@ -1,8 +1,7 @@
 """The start of a motion: positions that fit, velocities that fit, accelerations."""
 
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from scipy.sparse import bmat, csr_matrix, diags, identity
@@ -14,7 +13,7 @@ from rom.mbs.equations.packing import Packed
 from rom.mbs.equations.sparse_solve import Constrained, Pattern, signature, unit_rows
 from rom.mbs.kernels.system import ROLL
 from rom.mbs.kernels.work import Work, workspace
-from rom.mbs.parts.signals import first_failure, sample_all
+from rom.mbs.parts.signals import Signal, Span, sampled
 from rom.mbs.results.state import State
 from rom.model import Array, Integers
 from rom.notebook import listed
@@ -52,11 +51,18 @@ def initial_state(
     given velocities change by as much as it takes; with ``placing`` drives say where bodies are and
     how they move: what was given contradicts nothing.
     """
-    table = sample_all(packed.signals, np.array([t]), (t, np.inf), spacing)
-    good, failure = first_failure(packed.signals, np.array([t]), table)
-    if not good:
-        raise failure
+    table = prescribed(packed.signals, np.array([t]), (t, np.inf), spacing)
     return _start(packed, table[0], t, (assemble, placing))
+
+
+def prescribed(
+    signals: tuple[Signal, ...], t: Array, span: Span, spacing: float, step: float | None = None
+) -> Array:
+    """(n, s, 3) signals at all times, as `sampled`; refused where one of them fails."""
+    table, failure = sampled(signals, t, span, spacing, step)
+    if failure is not None:
+        raise failure
+    return table
 
 
 def _start(packed: Packed, signal: Array, t: float, asked: tuple[bool, bool]) -> State:
@@ -147,8 +153,8 @@ def _largest(packed: Packed, gaps: Array) -> tuple[float, str, str]:
 def _independent(packed: Packed, W: Work, q: Array) -> bool:
     """Whether the elimination by blocks meets no joint that could repeat others."""
     linearize_constraints(packed.system, W, q, np.zeros(packed.v.size))
-    _weigh(packed.system, W, _weights(packed, W))
-    return factorised(packed.system, W, RANK_TOLERANCE**1.5)
+    _weigh(packed, W, _weights(packed, W))
+    return factorised(packed, W, RANK_TOLERANCE**1.5)
 
 
 def independent(packed: Packed) -> bool:
@@ -224,7 +230,7 @@ def _reach(packed: Packed, step: Array) -> Iterator[tuple[float, float]]:
 def _weights(packed: Packed, W: Work, elastic: float = ELASTIC_WEIGHTS[-1]) -> Array:
     """(n,) inverse square root of what a unit of each velocity coordinate costs."""
     bodies = packed.system.bodies
-    mass: Array = W.S[_diagonal(packed.system)]
+    mass: Array = W.S[_diagonal(packed)]
     for b, t in enumerate(bodies.v_at):
         mass[t + 3 : t + 6] = np.maximum(mass[t + 3 : t + 6], 1e-3 * np.trace(W.J[b]))
         mass[t + 6 : t + 6 + bodies.r[b]] *= elastic
@@ -239,10 +245,10 @@ def _least_change(packed: Packed, W: Work, gap: Array, weight: Array, rows: Inte
         found: Array = weight * closing.solve(0 * weight, gap[rows] / size)[0]
         return found
     if packed.by_blocks:
-        _weigh(packed.system, W, weight)
-        if not factorised(packed.system, W, 0.0):
+        _weigh(packed, W, weight)
+        if not factorised(packed, W, 0.0):
             raise SolverError("constraints that were independent became dependent.")
-        return least_motion(packed.system, W, gap)
+        return least_motion(packed, W, gap)
     scale = packed.row_scale[rows]
     A, gap = W.G[rows] / scale[:, None] * weight, gap[rows] / scale
     size = np.linalg.norm(A, axis=1)
@@ -250,38 +256,38 @@ def _least_change(packed: Packed, W: Work, gap: Array, weight: Array, rows: Inte
     return weight * np.linalg.lstsq(A / size[:, None], gap / size, rcond=RANK_TOLERANCE)[0]
 
 
-def _diagonal(s: Any) -> tuple[Integers, Integers]:
+def _diagonal(packed: Packed) -> tuple[Integers, Integers]:
     """Rows and columns (n,) of W.S where the masses of all velocity coordinates stand."""
-    count = 6 + s.bodies.r
+    graph, count = packed.graph, 6 + packed.system.bodies.r
     body = np.repeat(np.arange(count.size), count)
     within = np.arange(body.size) - np.repeat(np.cumsum(count) - count, count)
-    own = s.graph.own[body]
-    return s.graph.x[own] + within, s.graph.y[own] + within
+    own = graph.own[body]
+    return graph.x[own] + within, graph.y[own] + within
 
 
-def _weigh(s: Any, W: Work, weight: Array) -> None:
+def _weigh(packed: Packed, W: Work, weight: Array) -> None:
     """Set W.S to the diagonal matrix with the inverse squares of the weights (n,)."""
     W.S[:] = 0.0
-    W.S[_diagonal(s)] = weight**-2
+    W.S[_diagonal(packed)] = weight**-2
 
 
-def factorised(s: Any, W: Work, least: float) -> bool:
+def factorised(packed: Packed, W: Work, least: float) -> bool:
     """Factorise [S G^T; G 0] by blocks; whether no pivot of a joint is below ``least``."""
-    P, n, m = s.graph.plan, W.residual.size, W.G.shape[0]
+    P, n, m = packed.graph.plan, W.residual.size, W.G.shape[0]
     W.UG[:], W.UGT[:] = W.G, W.G
-    if not factorise_bordered(s, W, m) or W.by_blocks[0] == 0:
+    if not factorise_bordered(packed.system, W, m) or W.by_blocks[0] == 0:
         return False
     joints = np.flatnonzero(np.isin(P.start, P.position[n:]))
     pivots = [P.pivot[k] + np.arange(P.size[k]) * (P.size[k] + 1) for k in joints]
     return bool(np.all(np.abs(W.factor[np.concatenate([*pivots, joints[:0]])]) > least))
 
 
-def least_motion(s: Any, W: Work, gap: Array) -> Array:
+def least_motion(packed: Packed, W: Work, gap: Array) -> Array:
     """The motion x (n,) with G x = gap (m,) and the least x^T S x, factorised before."""
     x = np.zeros(W.residual.size)
     W.rhs[:] = 0.0
     W.part[:] = gap
-    solve_bordered(s, W, gap.size, x, W.dlam)
+    solve_bordered(packed.system, W, gap.size, x, W.dlam)
     return x
 
 
@@ -399,7 +405,7 @@ def _rank(packed: Packed, W: Work, q: Array) -> int:
     return rank
 
 
-def _refuse_shared_friction(packed: Packed, names: Any) -> None:
+def _refuse_shared_friction(packed: Packed, names: Container[str]) -> None:
     for first in packed.loaded_rows:
         if packed.row_owner[first] in names:
             raise ModelError(

@@ -8,7 +8,6 @@ integrator. Instants of output are a given interval apart, interpolated, or else
 from collections.abc import Sequence
 from dataclasses import replace
 from time import perf_counter
-from typing import Any
 
 import numpy as np
 from scipy.integrate import DOP853, solve_ivp
@@ -17,10 +16,9 @@ from rom import rotation
 from rom.errors import ConfigError, SolverError
 from rom.mbs.elements.family import apply_laws
 from rom.mbs.equations.equations import evaluate, rates
-from rom.mbs.integrate.consistent_start import assembled, fitting_velocity
+from rom.mbs.integrate.consistent_start import assembled, fitting_velocity, prescribed
 from rom.mbs.integrate.run import RUN_KEY, Record, standing_at
 from rom.mbs.kernels.work import STEPS, Step, Work
-from rom.mbs.parts.signals import sampled
 from rom.mbs.results.state import Memory, State
 from rom.model import Array
 
@@ -48,10 +46,7 @@ class Equations:
         y = np.ascontiguousarray(y)  # SciPy hands over columns
         if packed.signals:
             h = settings.spacing
-            table, failure = sampled(packed.signals, np.array([t]), settings.span, h, h)
-            if failure is not None:
-                raise failure
-            self.W.signal[:] = table[0]
+            self.W.signal[:] = prescribed(packed.signals, np.array([t]), settings.span, h, h)[0]
         if self.forces:
             evaluate(packed.system, self.W, y[: self.n_q], y[self.n_q : self.n_q + self.n])
             apply_laws(self.forces, self.W, t)
@@ -225,7 +220,7 @@ def first_steps(record: Record, W: Work, step: Step) -> tuple[Array, tuple[Array
     past = [_instant(record, equations, t[0], _coordinates(start))]
     if count:
         options = {"method": "Radau", "rtol": RADAU_RTOL, "atol": RADAU_ATOL, "t_eval": t[1:]}
-        found: Any = solve_ivp(equations, (t[0], t[-1]), _coordinates(past[0][0]), **options)
+        found = solve_ivp(equations, (t[0], t[-1]), _coordinates(past[0][0]), **options)
         if not found.success:
             raise SolverError(
                 f"the first steps failed after t = {t[0]:.9g} s: {found.message}",
@@ -265,7 +260,7 @@ def _remember(record: Record, W: Work, step: Step, states: Sequence[State], work
 
 def _seen(record: Record, q: Array, other: Array) -> Array:
     """(n,) increment that leads from coordinates q to other ones."""
-    bodies: Any = record.packed.system.bodies
+    bodies = record.packed.system.bodies
     out = np.zeros(record.packed.v.size)
     for at, vt, r in zip(bodies.q_at, bodies.v_at, bodies.r, strict=True):
         back = q[at + 3 : at + 7] * np.array([1.0, -1.0, -1.0, -1.0])

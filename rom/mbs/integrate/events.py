@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import brentq
@@ -12,14 +12,13 @@ from rom.mbs.equations.equations import evaluate
 from rom.mbs.equations.packing import Packed
 from rom.mbs.kernels.work import workspace
 from rom.mbs.mechanism import Event, Mechanism
-from rom.mbs.parts.bodies import GROUND, Marker
 from rom.mbs.parts.foreign import ask, numbers
 from rom.mbs.parts.joints import coordinate_of
+from rom.mbs.results.recomputed import Seen
 from rom.mbs.results.solution import Occurrences
 from rom.mbs.results.state import State
+from rom.mbs.results.whereabouts import Whereabouts
 from rom.model import Array
-from rom.names import offered
-from rom.rotation import quaternion
 
 START_ATOL = 1e-10  # time after the start [s] within which a zero is the start, not an event
 ROOT_RTOL = 1e-14  # of the step
@@ -27,17 +26,18 @@ ROOT_RTOL = 1e-14  # of the step
 Motion = Callable[[float], tuple[Array, Array]]
 
 
-class Instant:
+class Instant(Whereabouts):
     """What an event function sees of the mechanism at one time.
 
     Attributes:
+        mechanism, packed: what moves.
         t: time [s].
-        q, v: coordinates and velocities, see `rom.mbs.results.state.State`.
+        q, v: (n_q,), (n,) coordinates and velocities, see `rom.mbs.results.state.State`.
     """
 
     def __init__(self, mechanism: Mechanism, packed: Packed):
-        self._mechanism, self._packed = mechanism, packed
-        self.W: Any = workspace(packed.seen, len(packed.signals))
+        self.mechanism, self.packed = mechanism, packed
+        self.W = workspace(packed.seen, len(packed.signals))
         self.t, self.q, self.v = 0.0, packed.q, packed.v
         self._fresh = False
 
@@ -46,70 +46,6 @@ class Instant:
         self.t, self.q, self.v, self._fresh = t, q, v, False
         return self
 
-    def position(self, body: str, marker: Any = None) -> Array:
-        """(3,) position of a marker, or of the body origin [m].
-
-        Raises:
-            ConfigError: if the body or the marker is unknown.
-        """
-        marker = self._frame(body) if marker is None else marker
-        if marker is not None:
-            return self._evaluated(body).P[self._row(body, marker)].copy()
-        at = self._q_at(body)
-        return self.q[at : at + 3].copy()
-
-    def velocity(self, body: str, marker: Any = None) -> Array:
-        """(3,) velocity of a marker, or of the body origin, world [m/s].
-
-        Raises:
-            ConfigError: if the body or the marker is unknown.
-        """
-        marker = self._frame(body) if marker is None else marker
-        if marker is not None:
-            return self._evaluated(body).V[self._row(body, marker), :3].copy()
-        at = self._v_at(body)
-        return self.v[at : at + 3].copy()
-
-    def axes(self, body: str, marker: Any) -> Array:
-        """(3, 3) orientation of a marker, to world [1].
-
-        Raises:
-            ConfigError: if the body or the marker is unknown.
-        """
-        return self._evaluated(body).E[self._row(body, marker)].copy()
-
-    def orientation(self, body: str) -> Array:
-        """(4,) quaternion of the body frame [1].
-
-        Raises:
-            ConfigError: if the body is unknown.
-        """
-        at = self._q_at(body) + 3
-        if frame := self._frame(body):
-            return quaternion(self.axes(body, frame))
-        return self.q[at : at + 4].copy()
-
-    def omega(self, body: str) -> Array:
-        """(3,) angular velocity of the body frame, body frame [rad/s].
-
-        Raises:
-            ConfigError: if the body is unknown.
-        """
-        at = self._v_at(body) + 3
-        if frame := self._frame(body):
-            row = self._row(body, frame)
-            return self._evaluated(body).E[row].T @ self.W.V[row, 3:]
-        return self.v[at : at + 3].copy()
-
-    def elastic(self, body: str) -> Array:
-        """(r,) elastic coordinates, in units of the body's shapes.
-
-        Raises:
-            ConfigError: if the body is unknown.
-        """
-        at = self._q_at(body) + 7
-        return self.q[at : at + self._mechanism.part(body).r].copy()
-
     def joint(self, name: str, coordinate: str | None = None) -> tuple[float, float]:
         """A joint coordinate, whole turns counted, and its rate [rad or m, per second].
 
@@ -117,8 +53,8 @@ class Instant:
             name: of a joint that the event follows, see `rom.Mechanism.event`.
             coordinate: "angle" or "displacement"; None for the only or the first one.
         """
-        row = coordinate_of(self._mechanism.joints, name, coordinate, "an event")
-        for k, known in enumerate(self._packed.coordinate_rows):
+        row = coordinate_of(self.mechanism.joints, name, coordinate, "an event")
+        for k, known in enumerate(self.packed.coordinate_rows):
             if known is row:
                 self._evaluate()
                 return float(self.W.x[k]), float(self.W.xd[k])
@@ -127,41 +63,13 @@ class Instant:
             hint=f"Add the event with follow=[{name!r}].",
         )
 
-    def _frame(self, body: str) -> Marker | None:
-        """Marker that is the frame of the body, where its motion is that of another frame."""
-        self._number(body)
-        return self._mechanism.part(body).own_frame
-
-    def _number(self, body: str) -> int:
-        names = self._packed.names
-        if body not in names:
-            raise ConfigError(f"no body {body!r}; the mechanism has {offered(names, body)}.")
-        return names.index(body)
-
-    def _q_at(self, body: str) -> int:
-        return int(self._packed.system.bodies.q_at[self._number(body)])
-
-    def _v_at(self, body: str) -> int:
-        return int(self._packed.system.bodies.v_at[self._number(body)])
-
-    def _row(self, body: str, place: Any) -> int:
-        marker = place if isinstance(place, Marker) else self._mechanism.part(body).marker(place)
-        if marker not in self._packed.markers:
-            raise ConfigError(
-                f"the point {marker.place} of body {body!r} is not a marker of the mechanism.",
-                hint="Name it when the body is added, or add the event with follow=[marker].",
-            )
-        return self._packed.row(marker)
-
-    def _evaluated(self, body: str) -> Any:
-        if body != GROUND:
-            self._number(body)
+    def _at_marker(self, row: int) -> Seen:
         self._evaluate()
-        return self.W
+        return Seen(*(A[row].copy() for A in (self.W.P, self.W.E, self.W.V)))
 
     def _evaluate(self) -> None:
         if not self._fresh:
-            evaluate(self._packed.seen, self.W, self.q, self.v)
+            evaluate(self.packed.seen, self.W, self.q, self.v)
             self._fresh = True
 
 

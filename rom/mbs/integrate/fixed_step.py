@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from time import perf_counter
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -36,6 +36,8 @@ from rom.model import Array
 CHUNK_SECONDS, FIRST_CHUNK, LARGEST_CHUNK = 0.2, 16, 4096
 # change of a law by the last correction, of its size, that keeps a step from ending
 RESTLESS_LAW_RTOL = 1e-2
+Instant = tuple[Array, ...]  # q, v, a, lam, work and base
+Chunk = tuple[Array, Array, Instant]  # times, signals, and room for what is kept
 LOSING_SHARE = 0.9  # of half a turn a step, from where on one that gains speed may exceed it
 
 
@@ -130,7 +132,7 @@ class Mark(NamedTuple):
     noted: Noted | None
 
 
-def _retrace(record: Record, W: Work, mark: Mark, forces: Laws, chunk: tuple[Any, ...]) -> None:
+def _retrace(record: Record, W: Work, mark: Mark, forces: Laws, chunk: Chunk) -> None:
     """Repeat the good steps of a chunk that failed, to stand behind the last as if it ended there.
 
     The step that failed has changed the factorisation and more of what the next one starts from.
@@ -155,7 +157,7 @@ def _retrace(record: Record, W: Work, mark: Mark, forces: Laws, chunk: tuple[Any
         record.reach(_state(record, W, step), noted)
 
 
-def _advance(record: Record, W: Work, step: Step, forces: Laws, chunk: tuple[Any, ...]) -> int:
+def _advance(record: Record, W: Work, step: Step, forces: Laws, chunk: Chunk) -> int:
     """Run a chunk, calling Python forces whenever they are asked for; says how it ended."""
     times, table, out = chunk
     settings, system = record.settings, record.packed.system
@@ -275,7 +277,7 @@ def kept_before_the_end(
     """
     f = record.final
     first = record.t, f.q, f.v, f.a, f.lam, record.blocks[-1][5][-1], f.base
-    k, failure = _look(record, first, t, out)
+    k, failure = _look(record, Point(*first[:4]), f.base, t, out)
     if k == t.size:
         return False
     rows = (t[:k], *(x[:k] for x in out))
@@ -303,11 +305,11 @@ def _projected(record: Record, W: Work, ends: tuple[Point, Point], t: float) -> 
 
 
 def _look(
-    record: Record, first: tuple[Any, ...], t: Array, out: tuple[Array, ...]
+    record: Record, left: Point, base: Array, t: Array, out: Instant
 ) -> tuple[int, BaseException | None]:
     """Number of steps before the one that an event ends, or that an event function refuses."""
     # not the memory of the steps: its factorisation must stay
-    left, base, W = Point(*first[:4]), first[6], record.watch.instant.W
+    W = record.watch.instant.W
     for k in range(t.size):
         right = Point(t[k], *(x[k] for x in out[:3]))
 

@@ -81,17 +81,17 @@ class Keeping:
         Raises:
             ConfigError: saying which.
         """
-        if self.state.exists() and not self.resume:
-            raise ConfigError(
-                f"{self.folder} holds the motion of a run that did not come to its end.",
-                hint="Go on with it by --resume (resume=True), or remove the folder.",
+        if self.state.exists() == self.resume:
+            return
+        fault = f"{self.folder} holds the motion of a run that did not come to its end."
+        cure = "Go on with it by --resume (resume=True), or remove the folder."
+        if self.resume:
+            fault = f"there is nothing to resume: {self.folder} holds no motion."
+            cure = (
+                "A run that came to its end leaves none, nor does one that ended within its first "
+                "steps. Leave out --resume."
             )
-        if self.resume and not self.state.exists():
-            raise ConfigError(
-                f"there is nothing to resume: {self.folder} holds no motion.",
-                hint="A run that came to its end leaves none, nor does one that ended within its "
-                "first steps. Leave out --resume.",
-            )
+        raise ConfigError(fault, hint=cure)
 
     def begin(self, origin: float | None, taken: int, digests: Mapping[str, str]) -> None:
         """Tell what the run is; to be called before `read` and `write`.
@@ -195,7 +195,7 @@ class Keeping:
             self.folder.rmdir()
 
 
-def digests_of(packed: Packed, arguments: Mapping[str, Any]) -> dict[str, str]:
+def digests_of(packed: Packed, arguments: Mapping[str, object]) -> dict[str, str]:
     """Digests by which a run is known: one of each argument, and one of the mechanism."""
     hashed = hashlib.sha256(repr((packed.names, packed.row_owner)).encode())
     hashed.update(repr([signal.name for signal in packed.signals]).encode())

@@ -51,33 +51,47 @@ class Settings:
     begun: int = 0  # steps of this very run that were taken before it was interrupted
 
     def __post_init__(self) -> None:
-        if self.t_end <= self.t_start:
-            raise ConfigError(
-                f"t_end = {self.t_end:g} s is not after {self.t_start:g} s.",
-                hint="It is the time at the end, not how long the motion lasts.",
-            )
-        self._check_kind()
-        self._check_steps(self.t_end - self.t_start)
+        for fault, cure in self._faults():
+            raise ConfigError(fault, hint=cure)
 
-    def _check_steps(self, duration: float) -> None:
-        """Steps must be told apart by the clock, and come to an end."""
+    def _faults(self) -> Iterator[tuple[str, str]]:
+        """What cannot be run, and what to do instead."""
+        duration = self.t_end - self.t_start
+        if duration <= 0.0:
+            yield (
+                f"t_end = {self.t_end:g} s is not after {self.t_start:g} s.",
+                "It is the time at the end, not how long the motion lasts.",
+            )
+        if self.order != 2 and self.method != "bdf":
+            yield f"order = {self.order} is for bdf only.", 'Leave it out, or take method="bdf".'
+        if self.order != 2 and self.dt is None:
+            yield (
+                f"order = {self.order} needs steps of one length dt; chosen ones have order two.",
+                "",
+            )
+        if self.stabilised and self.method == "dop853":
+            yield (
+                "stabilised is for implicit methods; dop853 keeps the constraints of velocities "
+                "to the tolerance of its steps.",
+                "Leave it out.",
+            )
         if self.dt is not None and not duration / self.dt <= MAX_STEPS:
-            raise ConfigError(
+            yield (
                 f"dt = {self.dt:g} s takes {duration / self.dt:.3g} steps to t_end = "
                 f"{self.t_end:g} s; at most {MAX_STEPS:.0e} are taken.",
-                hint="Take longer steps. They need to resolve what moves, not more.",
+                "Take longer steps. They need to resolve what moves, not more.",
             )
         end = max(abs(self.t_start), abs(self.t_end))
         step = FIRST_STEP_RATIO * duration if self.dt is None else self.dt
         if end + step == end or not np.isfinite(duration):
             what = "the first step" if self.dt is None else "dt"
-            raise ConfigError(
+            yield (
                 f"{what} = {step:g} s is lost beside t = {end:g} s: numbers have sixteen digits.",
-                hint="Take longer steps, or count the time from the start of the run.",
+                "Take longer steps, or count the time from the start of the run.",
             )
 
     @property
-    def arguments(self) -> dict[str, Any]:
+    def arguments(self) -> dict[str, object]:
         """What makes a run the one it is, beside its end."""
         names = ("t_start", "dt", "rho_inf", "tolerance", "rtol", "atol", "save_every", "order")
         values = {name: getattr(self, name) for name in names}
@@ -97,22 +111,6 @@ class Settings:
                 "GiB are free.",
                 hint=f"Keep fewer of them, e.g. save_every = {int(need / there) + 1} times "
                 f"{int(self.save_every)}, or take longer steps.",
-            )
-
-    def _check_kind(self) -> None:
-        """Order and stabilisation must be offered by the method."""
-        if self.order != 2 and self.method != "bdf":
-            raise ConfigError(
-                f"order = {self.order} is for bdf only.", hint='Leave it out, or take method="bdf".'
-            )
-        if self.order != 2 and self.dt is None:
-            raise ConfigError(
-                f"order = {self.order} needs steps of one length dt; chosen ones have order two."
-            )
-        if self.stabilised and self.method == "dop853":
-            raise ConfigError(
-                "stabilised is for implicit methods; dop853 keeps the constraints of velocities "
-                "to the tolerance of its steps. Leave it out."
             )
 
     @property
@@ -296,7 +294,7 @@ class Record:
             {} if self.watch is None else self.watch.occurrences,
         )
 
-    def _statistics(self) -> dict[str, Any]:
+    def _statistics(self) -> dict[str, float]:
         total = perf_counter() - self.clock
         return {
             **self.counts,

@@ -252,7 +252,7 @@ def _rescued(error: BaseException, record: Record) -> Solution | None:
     return solution
 
 
-def _check_fit(state: Any, packed: Packed, mechanism: Mechanism) -> None:
+def _check_fit(state: State, packed: Packed, mechanism: Mechanism) -> None:
     """Compiled code does not look at the size of its arrays, so this is the place to do it."""
     check_state(state, packed)
     angles = packed.followed if state.base is None else np.size(state.base)

@@ -40,14 +40,13 @@ from rom.mbs.kernels.tables import Array1, Array2, Array3, Index1, Table, table
 PAUSED, NEEDS_LAWS_THERE, NEEDS_SIGNALS, NEEDS_START = 6, 7, 8, 9
 TOO_SHORT, SINGULAR_MOTION, CONTRADICTED = 10, 11, 12
 # entries of Control.count
-(STAGE, NEXT, LIMIT, TAKEN, EVERY, SAVED, REJECTED, UNEVEN, IS_BDF, ROW, KNOWN,
- AT_HAND, ANSWER) = range(13)  # fmt: skip
+STAGE, NEXT, LIMIT, TAKEN, EVERY, SAVED, REJECTED, UNEVEN, IS_BDF, ROW, KNOWN = range(11)
+AT_HAND, ANSWER = 11, 12
 # entries of Control.number
-(TIME, END, LENGTH, BEFORE, WANTED, SHORTEST, LONGEST, DURATION, RTOL,
- REACHED, ERROR_BEFORE, ERROR) = range(12)  # fmt: skip
+TIME, END, LENGTH, BEFORE, WANTED, SHORTEST, LONGEST, DURATION, RTOL, REACHED = range(10)
+ERROR_BEFORE, ERROR = 10, 11
 # stages of a step
-(BEGINS, PREPARES, RESETS, TRIES, FITS, PROJECTS, JUDGES, ACCEPTS, CHOOSES,
- REJECTS) = range(10)  # fmt: skip
+BEGINS, PREPARES, RESETS, TRIES, FITS, PROJECTS, JUDGES, ACCEPTS, CHOOSES, REJECTS = range(10)
 # a step is at most so much longer or shorter than the last, and aims below the tolerance
 MAX_STEP_GROWTH, MIN_STEP_GROWTH, ERROR_AIM = 2.0, 0.2, 0.8
 ERROR_MARGIN = 16.0  # errors of early steps grow on the way to the end

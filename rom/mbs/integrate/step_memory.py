@@ -116,11 +116,11 @@ def across(record: Record, W: Work, state: State, shift: Array) -> Array:
     """The part of a velocity that changes the gaps of the constraints."""
     linearize_constraints(record.packed.system, W, state.q, state.v)
     if record.packed.by_blocks:
-        system, gap = record.packed.system, np.zeros(W.value.size)
-        if not factorised(system, W, 0.0):
+        packed, gap = record.packed, np.zeros(W.value.size)
+        if not factorised(packed, W, 0.0):
             raise SolverError("the equations of motion are singular where constraints are met.")
-        gradient_times(system, W, shift, False, gap)
-        return least_motion(system, W, gap)
+        gradient_times(packed.system, W, shift, False, gap)
+        return least_motion(packed, W, gap)
     A = W.G @ np.linalg.solve(W.S, W.G.T)
     rolling = record.packed.system.rows.kind == ROLL  # velocities across these are zero already
     y = np.linalg.lstsq(A, np.where(rolling, 0.0, W.G @ shift), rcond=1e-10)[0]

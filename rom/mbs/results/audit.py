@@ -7,12 +7,14 @@ from typing import Any
 import numpy as np
 from scipy.linalg import eigh
 
-from rom import rotation
 from rom.arguments import typed
 from rom.errors import warn
+from rom.mbs.equations.packing import Packed
 from rom.mbs.kernels.system import ANGLE, ROLL
-from rom.mbs.parts.bodies import GROUND
+from rom.mbs.mechanism import Mechanism
+from rom.mbs.results.recomputed import axes_of
 from rom.mbs.results.solution import Solution
+from rom.mbs.results.state import State
 from rom.model import BUCKLING_LOADS, Array, Report, Row
 
 # limits; energy counts relative to the largest amount of energy that was exchanged
@@ -123,15 +125,11 @@ def _momentum(solution: Solution) -> list[Row]:
     if grounded or pushed:
         return []
     # what starts at rest has no momentum as a whole: its parts have, as much as their energy allows
-    packed, rows = solution.packed, []
+    packed, (linear, angular), rows = solution.packed, solution.momentum, []
     moving = max(np.sqrt(2 * packed.mass * solution.energy.kinetic.max()), 1e-300)
-    for name, p, arm in zip(
-        ("linear", "angular"), solution.momentum, (1.0, packed.length), strict=True
-    ):
-        size = max(np.abs(p).max(), moving * arm)
-        rows.append(
-            _row(f"change of {name} momentum", np.abs(p - p[0]).max() / size, MOMENTUM_RTOL)
-        )
+    for name, p, arm in (("linear", linear, 1.0), ("angular", angular, packed.length)):
+        change = np.abs(p - p[0]).max() / max(np.abs(p).max(), moving * arm)
+        rows.append(_row(f"change of {name} momentum", change, MOMENTUM_RTOL))
     return rows
 
 
@@ -153,9 +151,8 @@ def _numbers(solution: Solution) -> list[Row]:
     p = solution.q[:, solution.packed.system.bodies.q_at[:, None] + np.arange(3, 7)]
     stretched = np.abs(np.linalg.norm(p, axis=2) - 1).max()
     rows = [_row("quaternion length - 1", stretched, QUATERNION_ATOL)]
-    statistics: dict[str, Any] = solution.statistics
-    if "iterations" in statistics:
-        mean = statistics["iterations"] / max(statistics["steps"], 1)
+    if "iterations" in solution.statistics:
+        mean = solution.statistics["iterations"] / max(solution.statistics["steps"], 1)
         rows.append(_row("Newton corrections per step", mean, MAX_MEAN_CORRECTIONS))
     return rows
 
@@ -163,20 +160,20 @@ def _numbers(solution: Solution) -> list[Row]:
 def _limits(solution: Solution, name: str, body: Any) -> list[Row]:
     """Whether a body stays within what it was made for."""
     bent = deformation(solution, name)
-    certified, certificate = list[Row](), getattr(body, "certificate", None)
+    rows, certificate = list[Row](), getattr(body, "certificate", None)
     if certificate is not None:
         n = len(certificate.failures)
         worst = f", worst: {certificate.worst.quantity}" if n else ""
-        certified = [_row(f"rows of the certificate of {name} that fail{worst}", n, 0)]
+        rows = [_row(f"rows of the certificate of {name} that fail{worst}", n, 0)]
     if getattr(body, "quartic", None) is not None:
-        rows = [*certified, Row(f"largest deformation of {name} / size", bent, "information", True)]
+        rows += [Row(f"largest deformation of {name} / size", bent, "information", True)]
         most = body.certified_energy
         if np.isfinite(most):
             share = np.nanmax(body.energy().energies(solution.elastic(name))) / max(most, 1e-300)
             what = f"strain energy of {name} / most to which its certificate holds"
             rows.append(_row(what, share, 1 + CERTIFIED_RTOL))
         return rows
-    rows = [*certified, _row(f"largest deformation of {name} / size", bent, MAX_DEFORMATION)]
+    rows += [_row(f"largest deformation of {name} / size", bent, MAX_DEFORMATION)]
     if share := softening(solution, name):
         rows.append(_row(f"speed of {name} / speed that softens it to nothing", share, 1.0))
     what, share = f"load that presses {name} / load that buckles it", pressed(solution, name)
@@ -190,7 +187,7 @@ def _limits(solution: Solution, name: str, body: Any) -> list[Row]:
 def warn_of_limits(solution: Solution) -> None:
     """Warn of bodies and elements that left the range where what is said of them holds."""
     _warn_of_lost_turns(solution)
-    axes = partial(_axes, solution)
+    axes = partial(axes_of, solution)
     for name, (family, element) in solution.mechanism.elements.items():
         if family.hooks.beyond is not None:
             warn(family.hooks.beyond(name, element, solution.t, axes))
@@ -219,7 +216,7 @@ def warn_of_limits(solution: Solution) -> None:
             )
 
 
-def warn_of_range(mechanism: Any, packed: Any, state: Any) -> None:
+def warn_of_range(mechanism: Mechanism, packed: Packed, state: State) -> None:
     """Warn of bodies of large deflection that are beyond their certificates at one instant."""
     bodies = packed.system.bodies
     for name, at in zip(packed.names, bodies.q_at, strict=True):
@@ -236,7 +233,7 @@ def pressed(solution: Solution, name: str) -> float | None:
     As on hinges, with a warning of too much. Zero where geometric stiffness is known to the motion,
     None where the body does not know its buckling loads.
     """
-    body: Any = solution.mechanism.parts[name].flexible
+    body = solution.mechanism.parts[name].flexible
     if body.K_geo or body.quartic is not None:
         return 0.0
     known = body.provenance.get(BUCKLING_LOADS)
@@ -297,13 +294,6 @@ def _warn_of_lost_turns(solution: Solution) -> None:
             )
 
 
-def _axes(solution: Solution, body: str) -> Array:
-    """(n_t, 3, 3) axes of a body in the world."""
-    if body == GROUND:
-        return np.broadcast_to(np.eye(3), (solution.t.size, 3, 3))
-    return np.moveaxis(rotation.matrix(solution.orientation(body).T), -1, 0)
-
-
 def _top(solution: Solution, body: int) -> float:
     """Largest angular speed of a body, -1 for the ground."""
     if body < 0:
@@ -324,7 +314,7 @@ def _spin(solution: Solution, body: int) -> Array:
     if body < 0:
         return np.zeros((solution.t.size, 3))
     name = solution.packed.names[body]
-    return np.einsum("tij,tj->ti", _axes(solution, name), solution.omega(name))
+    return np.einsum("tij,tj->ti", axes_of(solution, name), solution.omega(name))
 
 
 def softening(solution: Solution, name: str) -> float:
@@ -352,7 +342,7 @@ def deformation(solution: Solution, name: str, *, surface: bool = True) -> float
 
     Of all points of the outer surface, or of the interfaces alone.
     """
-    part: Any = solution.mechanism.parts[name]
+    part = solution.mechanism.parts[name]
     body, q = part.flexible, solution.elastic(name)
     shapes: list[Array] = [np.asarray(m.translation) for m in body.markers.values()]
     drawn = getattr(body, "surface", None)

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from rom.arguments import AnySolution
 from rom.errors import ConfigError
 from rom.mbs.elements.family import Family, Places, apply_laws
 from rom.mbs.elements.law_calls import answer_of
@@ -14,8 +15,8 @@ from rom.mbs.kernels.compiled import copy, inner, kernel
 from rom.mbs.kernels.element_calls import residuals
 from rom.mbs.kernels.system import ALONG
 from rom.mbs.kernels.work import workspace
+from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import Marker
-from rom.mbs.parts.joints import Row
 from rom.mbs.parts.signals import sample_all
 from rom.mbs.results.recomputed import at_instants, evaluate_at
 from rom.model import Array, Index
@@ -74,7 +75,7 @@ class LawRecord:
     outputs: dict[str, Array]
 
 
-def law_record(solution: Any, name: str) -> LawRecord:
+def law_record(solution: AnySolution, name: str) -> LawRecord:
     """Ask a law again at all instants of a motion."""
     law = solution.mechanism.laws[name]
     table = solution.packed.elements[LAWS_FAMILY]
@@ -89,14 +90,14 @@ def law_record(solution: Any, name: str) -> LawRecord:
     return LawRecord(solution.t, force, moment, energy[:, 0], lost[:, 0], memory, own)
 
 
-def _said(solution: Any, table: Any, mine: slice, sizes: tuple[int, int]) -> list[Array]:
+def _said(solution: AnySolution, table: Any, mine: slice, sizes: tuple[int, int]) -> list[Array]:
     """The fields of the answers at all instants."""
     rows = [table.answer[mine].copy() for _ in at_instants(solution)]
     answers = (answer_of(row, *sizes) for row in rows)
     return [np.array(field) for field in zip(*answers, strict=True)]
 
 
-def element_record(solution: Any, name: str) -> ElementRecord:
+def element_record(solution: AnySolution, name: str) -> ElementRecord:
     """Evaluate one element along a motion."""
     mechanism = solution.mechanism
     check_known(name, mechanism.elements, f"no element {name!r}; there are")
@@ -112,17 +113,19 @@ def element_record(solution: Any, name: str) -> ElementRecord:
         return _alone(solution, name, markers, rows)
     law = law_record(solution, name)
     along = pull(np.array([W.P[rows] for W in at_instants(solution)]), law.force)
-    forces = law.force, law.moment, along, "N", False
-    return ElementRecord(solution.t, markers, *forces, law.energy, law.lost)
+    loads = law.force, law.moment, along, "N", False
+    return ElementRecord(solution.t, markers, *loads, law.energy, law.lost)
 
 
-def markers_of(mechanism: Any, family: Family, element: Any) -> tuple[Marker, ...]:
+def markers_of(mechanism: Mechanism, family: Family, element: object) -> tuple[Marker, ...]:
     """The markers an element acts on, its own or those of its joint."""
-    joint = mechanism.joints.get(getattr(element, "joint", None))
+    joint = mechanism.joints.get(getattr(element, "joint", ""))
     return tuple(family.ends(element)) or (() if joint is None else tuple(joint.markers))
 
 
-def _alone(solution: Any, name: str, markers: tuple[Marker, ...], rows: Index) -> ElementRecord:
+def _alone(
+    solution: AnySolution, name: str, markers: tuple[Marker, ...], rows: Index
+) -> ElementRecord:
     """The element as the only one of its mechanism, in the motion of the whole."""
     packed, places = solution.packed, solution.packed.places.copy()
     family, element = solution.mechanism.elements[name]
@@ -132,7 +135,8 @@ def _alone(solution: Any, name: str, markers: tuple[Marker, ...], rows: Index) -
     system = packed.system.replace(elements=np.array([family.row(table)], dtype=np.int64))
     W = workspace(system, len(places.signals))
     signals = np.concatenate([solution.signals, _sampled(solution, places)], axis=1)
-    row = coordinate_row(solution.mechanism, element)
+    joint = solution.mechanism.joints.get(getattr(element, "joint", ""))
+    row = None if joint is None else getattr(element, "row", joint.turn)
     c = -1 if row is None else places.coordinate(element.joint, row)
     n = solution.t.size
     # wrenches and positions of the markers; energy, power lost, force along the joint coordinate
@@ -148,11 +152,9 @@ def _alone(solution: Any, name: str, markers: tuple[Marker, ...], rows: Index) -
         track_element(system, W, motion, rows, c, found)
     (wrench, position, scalars), unit = found, "N" if row is None or row.kind == ALONG else "N m"
     force, moment, (energy, lost, along) = wrench[..., :3], wrench[..., 3:], scalars.T
-    if row is None:
-        forces = force, moment, pull(position, force), unit, False
-    else:
-        forces = force, moment, along, unit, True
-    return ElementRecord(solution.t, markers, *forces, energy, lost)
+    along = pull(position, force) if row is None else along
+    loads = force, moment, along, unit, row is not None
+    return ElementRecord(solution.t, markers, *loads, energy, lost)
 
 
 @kernel
@@ -187,19 +189,13 @@ def along_coordinate(wrench, gradient):
     return force / size
 
 
-def _sampled(solution: Any, places: Places) -> Array:
+def _sampled(solution: AnySolution, places: Places) -> Array:
     """(n_t, s, 3) the functions of time that were asked for once more."""
     t, new = solution.t, tuple(places.signals[len(solution.packed.signals) :])
     if t.size == 1:
         return sample_all(new, t, (-np.inf, np.inf), INSTANT_SPACING)
     span = (float(t.min()), float(t.max()))
     return sample_all(new, t, span, 0.01 * (span[1] - span[0]) / (t.size - 1))
-
-
-def coordinate_row(mechanism: Any, element: Any) -> Row | None:
-    """The joint coordinate an element acts along, if it is one on a joint."""
-    joint = mechanism.joints.get(getattr(element, "joint", None))
-    return None if joint is None else getattr(element, "row", joint.turn)
 
 
 def pull(position: Array, force: Array) -> Array | None:
@@ -209,5 +205,4 @@ def pull(position: Array, force: Array) -> Array | None:
     gap = position[:, 1] - position[:, 0]
     length = np.linalg.norm(gap, axis=1)
     e = gap / np.where(length > 0, length, 1.0)[:, None]
-    found: Array = 0.5 * ((force[:, 0] - force[:, 1]) * e).sum(axis=1)
-    return found
+    return np.asarray(0.5 * ((force[:, 0] - force[:, 1]) * e).sum(axis=1))

@@ -5,7 +5,7 @@ likewise in rotation vectors from the left end, velocities from velocities and a
 Between exact ends the error is of fourth order.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -42,7 +42,7 @@ def slope(s: float, h: float, left: tuple[Array, Array], right: tuple[Array, Arr
 
 def between(system: System, left: Point, right: Point, t: float) -> tuple[Array, Array, Array]:
     """Coordinates, velocities and accelerations at a time between two instants."""
-    bodies: Any = system.bodies
+    bodies = system.bodies
     h = right.t - left.t
     s = (t - left.t) / h
     q = left.q.copy()

@@ -2,11 +2,11 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from rom import rotation
+from rom.arguments import AnySolution
 from rom.mbs.elements.family import apply_laws
 from rom.mbs.equations.equations import element_energy, evaluate, residual
 from rom.mbs.kernels.algebra import add, cross, dual, mtv, mv, put, scale, vec
@@ -14,15 +14,24 @@ from rom.mbs.kernels.compiled import copy, inner, kernel
 from rom.mbs.kernels.inertia import body_energy
 from rom.mbs.kernels.work import Work, workspace
 from rom.mbs.parts.bodies import GROUND
-from rom.mbs.parts.joints import Joint, Row
-from rom.model import Array
+from rom.mbs.parts.joints import Row
+from rom.model import Array, Index
+from rom.rotation import matrix
+
+
+class Seen(NamedTuple):
+    """Place (n_t, 3), axes (n_t, 3, 3), velocities (n_t, 6) of a marker; no n_t at one time."""
+
+    position: Array
+    axes: Array
+    twist: Array
 
 
 class Tracks(NamedTuple):
     """One row per instant.
 
     Attributes:
-        position, axes, twist: (n_t, 3), (n_t, 3, 3), (n_t, 6) of one marker.
+        position, axes, twist: of one marker, see `Seen`.
         reaction: (n_t, 6) force and moment of some constraint rows on their second marker.
         energy: (n_t, 3) kinetic, strain, potential [J].
         momentum: (n_t, 6) linear, and angular about the world origin.
@@ -38,7 +47,7 @@ class Tracks(NamedTuple):
     gap: Array
 
 
-def follow(solution: Any, marker: int, rows: Any) -> Tracks:
+def follow(solution: AnySolution, marker: int, rows: Index) -> Tracks:
     """Evaluate one marker, some constraint rows and the totals along a solution."""
     packed, system, n = solution.packed, solution.packed.seen, solution.t.size
     shapes = ((n, 3), (n, 3, 3), (n, 6), (n, 6), (n, 3), (n, 6), solution.lam.shape)
@@ -93,7 +102,7 @@ def body_momentum(bodies, W, b, q, v, out):
     put(out, 3, add(mv(A, angular), cross(vec(q, bodies.q_at[b]), p)))
 
 
-def at_instants(solution: Any) -> Iterator[Work]:
+def at_instants(solution: AnySolution) -> Iterator[Work]:
     """The memory after the equations of motion were evaluated at each instant, one by one."""
     packed, system = solution.packed, solution.packed.seen
     W, forces = workspace(system, len(packed.signals)), packed.asked
@@ -109,17 +118,11 @@ def at_instants(solution: Any) -> Iterator[Work]:
         yield W
 
 
-def of_body(solution: Any, body: str, wrench: Array, frame: str) -> dict[Any, Array]:
-    """{place: (n_t, 6)} loads on the markers of one body that carry any, in the axes asked for."""
-    turned, found = frame == "body" and body != GROUND, {}
-    axes: Any = rotation.matrix(solution.orientation(body).T) if turned else None
-    for marker, k in solution.packed.markers.items():
-        if marker.body == body and wrench[:, k].any():
-            both = wrench[:, k].reshape(-1, 2, 3)
-            if turned:
-                both = np.einsum("ban,nsb->nsa", axes, both)
-            found[marker.place] = both.reshape(-1, 6)
-    return found
+def axes_of(solution: AnySolution, body: str) -> Array:
+    """(n_t, 3, 3) axes of a body, or of the ground, in the world."""
+    if body == GROUND:
+        return np.broadcast_to(np.eye(3), (solution.t.size, 3, 3))
+    return np.moveaxis(matrix(solution.orientation(body).T), -1, 0)
 
 
 @dataclass(frozen=True)
@@ -142,15 +145,7 @@ class JointMotion:
     displacement_rate: Array | None
 
 
-def joint_motion(t: Array, joint: Joint, one: Any, two: Any) -> JointMotion:
-    """Measure a joint again, from the `rom.mbs.results.recomputed.Tracks` of its markers."""
-    angle = (None, None) if joint.turn is None else angles(joint.turn, t, one, two)
-    slide = joint.displacement
-    displacement = (None, None) if slide is None else displacements(slide, one, two)
-    return JointMotion(t, *angle, *displacement)
-
-
-def angles(row: Row, t: Array, one: Any, two: Any) -> tuple[Array, Array]:
+def angles(row: Row, t: Array, one: Seen, two: Seen) -> tuple[Array, Array]:
     """(n_t,) angle of b seen in the axes a and c, and its rate.
 
     Between two instants the angle changes by what the trapezoidal rule makes of the rates, to less
@@ -168,7 +163,7 @@ def angles(row: Row, t: Array, one: Any, two: Any) -> tuple[Array, Array]:
     return angle, rate
 
 
-def displacements(row: Row, one: Any, two: Any) -> tuple[Array, Array]:
+def displacements(row: Row, one: Seen, two: Seen) -> tuple[Array, Array]:
     """(n_t,) distance along the axis a, which the first body carries, and its rate."""
     a, gap = one.axes @ row.a, two.position - one.position
     slide, turn = two.twist[:, :3] - one.twist[:, :3], np.cross(one.twist[:, 3:], a)

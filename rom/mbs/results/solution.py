@@ -1,11 +1,12 @@
 """What a run leaves behind, and the questions it answers."""
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from rom.arguments import one_of, typed, vector
 from rom.errors import ConfigError
@@ -14,9 +15,9 @@ from rom.io.history import data_frame, data_set
 from rom.mbs.equations.packing import Packed
 from rom.mbs.kernels.system import WORK
 from rom.mbs.mechanism import Mechanism
-from rom.mbs.parts.bodies import Marker
 from rom.mbs.parts.joints import joint_with_axis
 from rom.mbs.parts.signals import sample_all
+from rom.mbs.results import recomputed
 from rom.mbs.results.element_record import (
     ElementRecord,
     LawRecord,
@@ -25,19 +26,14 @@ from rom.mbs.results.element_record import (
     markers_of,
 )
 from rom.mbs.results.interpolation import Point, between
-from rom.mbs.results.recomputed import (
-    JointMotion,
-    Tracks,
-    at_instants,
-    follow,
-    joint_motion,
-    of_body,
-)
 from rom.mbs.results.state import State
-from rom.model import Array
+from rom.mbs.results.whereabouts import Whereabouts
+from rom.model import Array, Index
 from rom.names import check_known
 from rom.notebook import html_table, listed
-from rom.rotation import continuous, matrix, quaternion
+from rom.rotation import matrix
+
+Place = str | tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -88,7 +84,7 @@ class Energy:
 
 @typed
 @dataclass(frozen=True)
-class Solution(Columns, metaclass=Open, kind="columns", bound=typed):
+class Solution(Whereabouts, Columns, metaclass=Open, kind="columns", bound=typed):
     """Motion of a mechanism.
 
     Attributes:
@@ -122,7 +118,7 @@ class Solution(Columns, metaclass=Open, kind="columns", bound=typed):
     status: str
     final: State
     events: dict[str, Occurrences] = field(default_factory=dict)
-    _tracks: dict[Any, Tracks] = field(default_factory=dict, repr=False)
+    _tracks: dict[object, recomputed.Tracks] = field(default_factory=dict, repr=False)
 
     def __repr__(self) -> str:
         return (
@@ -145,7 +141,7 @@ class Solution(Columns, metaclass=Open, kind="columns", bound=typed):
         ]
         return html_table(f"Motion. {self.status}", ("", ""), rows)
 
-    def at(self, t: Any) -> "Solution":
+    def at(self, t: npt.ArrayLike) -> "Solution":
         """The motion at other times, with everything that can be asked of a solution.
 
         Its ``final`` is the state at the last of them, from which a run can go on.
@@ -186,90 +182,6 @@ class Solution(Columns, metaclass=Open, kind="columns", bound=typed):
     def _point(self, k: int) -> Point:
         return Point(self.t[k], self.q[k], self.v[k], self.a[k])
 
-    def position(self, body: str, marker: Any = None) -> Array:
-        """(n_t, 3) position of a marker, or of the body origin [m].
-
-        Of a rod, or another body of frames, (n_t, k, 3) for all of its k frames.
-
-        Raises:
-            ConfigError: if the body is unknown, or the marker was not one of the run.
-
-        Example:
-            >>> mech = rom.Mechanism(gravity=(0, 0, 0))
-            >>> solid = {"mass": 1.0, "inertia": (1e-3,) * 3}
-            >>> ball = mech.add_rigid("ball", **solid, at=(0, 0, 0), velocity=(3, 0, 0))
-            >>> rom.simulate(mech, t_end=2.0, dt=0.1).position("ball")[-1].round(6)
-            array([6., 0., 0.])
-        """
-        if body in self.mechanism.nonlinear:
-            return self._of_frames(body, marker, self.position)
-        marker = self._frame(body) if marker is None else marker
-        if marker is None:
-            at = self._start_of(body)
-            return self.q[:, at : at + 3]
-        return self._track(body, marker).position
-
-    def velocity(self, body: str, marker: Any = None) -> Array:
-        """(n_t, 3) velocity of a marker, or of the body origin, world [m/s]; of frames as above.
-
-        Raises:
-            ConfigError: if the body is unknown, or the marker was not one of the run.
-        """
-        if body in self.mechanism.nonlinear:
-            return self._of_frames(body, marker, self.velocity)
-        marker = self._frame(body) if marker is None else marker
-        if marker is None:
-            at = self._start_of(body, velocity=True)
-            return self.v[:, at : at + 3]
-        return self._track(body, marker).twist[:, :3]
-
-    def axes(self, body: str, marker: Any) -> Array:
-        """(n_t, 3, 3) orientation of a marker, to world, elastic rotation included [1].
-
-        Raises:
-            ConfigError: if the body is unknown, or the marker was not one of the run.
-        """
-        if body in self.mechanism.nonlinear:
-            frame = self.mechanism.nonlinear[body].marker(marker).body
-            return np.array([matrix(p) for p in self.orientation(frame)])
-        return self._track(body, marker).axes
-
-    def orientation(self, body: str) -> Array:
-        """(n_t, 4) quaternion of the body frame [1], (n_t, k, 4) of k frames.
-
-        Raises:
-            ConfigError: if the body is unknown.
-        """
-        if body in self.mechanism.nonlinear:
-            return self._of_frames(body, None, self.orientation)
-        at = self._start_of(body)
-        if frame := self._frame(body):
-            return continuous(np.array([quaternion(E) for E in self._track(body, frame).axes]))
-        return self.q[:, at + 3 : at + 7]
-
-    def omega(self, body: str) -> Array:
-        """(n_t, 3) angular velocity of the body frame, body frame [rad/s]; of frames as above.
-
-        Raises:
-            ConfigError: if the body is unknown.
-        """
-        if body in self.mechanism.nonlinear:
-            return self._of_frames(body, None, self.omega)
-        at = self._start_of(body, velocity=True)
-        if frame := self._frame(body):
-            track = self._track(body, frame)
-            return np.einsum("tij,ti->tj", track.axes, track.twist[:, 3:])
-        return self.v[:, at + 3 : at + 6]
-
-    def elastic(self, body: str) -> Array:
-        """(n_t, r) elastic coordinates, in units of the body's shapes.
-
-        Raises:
-            ConfigError: if the body is unknown.
-        """
-        at = self._start_of(body)
-        return self.q[:, at + 7 : at + 7 + self.mechanism.part(body).r]
-
     def stress(self, body: str, instant: int) -> Array:
         """(p, 6) stress xx, yy, zz, yz, xz, xy on the surface of a flexible body [Pa].
 
@@ -283,7 +195,7 @@ class Solution(Columns, metaclass=Open, kind="columns", bound=typed):
         Raises:
             ConfigError: if the stress of the body cannot be recovered.
         """
-        part: Any = self.mechanism.part(body)
+        part = self.mechanism.part(body)
         recovery = getattr(part.moving, "stress", None) if part.r else None
         if recovery is None:
             raise ConfigError(
@@ -292,9 +204,9 @@ class Solution(Columns, metaclass=Open, kind="columns", bound=typed):
             )
         q, moving = self.elastic(body)[instant], None
         if recovery.inertial is not None:
-            at, turned = self._start_of(body, velocity=True), self._start_of(body) + 3
-            A = matrix(self.q[instant, turned : turned + 4])
-            a, omega = self.a[instant, at : at + 6 + part.r], self.v[instant, at + 3 : at + 6]
+            at = self.packed.system.bodies.v_at[self._number(body)]
+            A, omega = matrix(self._places(body, 3, 7)[instant]), self._rates(body, 3, 6)[instant]
+            a = self.a[instant, at : at + 6 + part.r]
             a_minus_g = A.T @ (a[:3] - np.asarray(self.mechanism.gravity))
             moving = recovery.accelerations(a_minus_g, a[3:6], omega, a[6:])
         return recovery.field(q, moving)
@@ -319,7 +231,7 @@ class Solution(Columns, metaclass=Open, kind="columns", bound=typed):
         check_known(name, set(self.packed.row_owner), f"no joint or drive {name!r}; there are")
         return self._follow(rows=self.packed.rows_of(name)).reaction
 
-    def joint(self, name: str) -> JointMotion:
+    def joint(self, name: str) -> recomputed.JointMotion:
         """Angle and displacement of a joint over time, with their rates.
 
         Raises:
@@ -327,8 +239,11 @@ class Solution(Columns, metaclass=Open, kind="columns", bound=typed):
                 displacement along one.
         """
         joint = joint_with_axis(self.mechanism.joints, name, "motion of a joint")
-        one, two = (self._follow(self.packed.row(marker)) for marker in joint.markers)
-        return joint_motion(self.t, joint, one, two)
+        one, two = (self._at_marker(self.packed.row(marker)) for marker in joint.markers)
+        row, slide = joint.turn, joint.displacement
+        angle = (None, None) if row is None else recomputed.angles(row, self.t, one, two)
+        displacement = (None, None) if slide is None else recomputed.displacements(slide, one, two)
+        return recomputed.JointMotion(self.t, *angle, *displacement)
 
     def drive_load(self, name: str) -> Array:
         """(n_t,) torque [N m] or force [N] that a drive supplies along its joint coordinate.
@@ -339,7 +254,7 @@ class Solution(Columns, metaclass=Open, kind="columns", bound=typed):
         check_known(name, self.mechanism.drives, f"no drive {name!r}; there are")
         return -self.lam[:, self.packed.rows_of(name)[0]]
 
-    def interface_loads(self, body: str, *, frame: str = "world") -> dict[Any, Array]:
+    def interface_loads(self, body: str, *, frame: str = "world") -> dict[Place, Array]:
         """Loads on each marker of a body: joints, drives, springs, contacts, loads together.
 
         With gravity they are all that moves the body; on an interface of a flexible body they are
@@ -358,7 +273,14 @@ class Solution(Columns, metaclass=Open, kind="columns", bound=typed):
         """
         self.mechanism.part(body)
         one_of("frame", frame, ("body", "world"))
-        return of_body(self, body, self._marker_loads, frame)
+        found, loads = dict[Place, Array](), self._marker_loads
+        for marker, k in self.packed.markers.items():
+            if marker.body == body and loads[:, k].any():
+                both = loads[:, k].reshape(-1, 2, 3)
+                if frame == "body":
+                    both = np.einsum("tba,tsb->tsa", recomputed.axes_of(self, body), both)
+                found[marker.place] = both.reshape(-1, 6)
+        return found
 
     def law(self, name: str) -> LawRecord:
         """What a law of the user said over time: forces, energy, memory and its own outputs.
@@ -386,14 +308,13 @@ class Solution(Columns, metaclass=Open, kind="columns", bound=typed):
     @cached_property
     def _marker_loads(self) -> Array:
         """(n_t, k, 6) force [N] and moment [N m] of all that acts on each marker, world."""
-        return np.array([W.wrench.copy() for W in at_instants(self)])
+        return np.array([W.wrench.copy() for W in recomputed.at_instants(self)])
 
     @cached_property
     def energy(self) -> Energy:
         """Energies and works over time."""
         energy = self._follow().energy
-        works = {name: self.work[:, k] for k, name in enumerate(WORK)}
-        kept = self.packed.kept(self.base)
+        works, kept = dict(zip(WORK, self.work.T, strict=True)), self.packed.kept(self.base)
         works["damping"] = works["damping"] - (kept - kept[0])
         return Energy(energy[:, 0], energy[:, 1], energy[:, 2], **works)
 
@@ -424,48 +345,11 @@ class Solution(Columns, metaclass=Open, kind="columns", bound=typed):
         """The motion as named arrays: a Dataset of `rom.io.history.data_set`; as above."""
         return data_set(self, every=every)
 
-    def _follow(self, marker: int = 0, rows: Any = ()) -> Tracks:
+    def _at_marker(self, row: int) -> recomputed.Seen:
+        return recomputed.Seen(*self._follow(row)[:3])
+
+    def _follow(self, marker: int = 0, rows: Sequence[int] | Index = ()) -> recomputed.Tracks:
         key = (marker, tuple(rows))
         if key not in self._tracks:
-            self._tracks[key] = follow(self, marker, np.array(rows, dtype=np.int64))
+            self._tracks[key] = recomputed.follow(self, marker, np.array(rows, dtype=np.int64))
         return self._tracks[key]
-
-    def _of_frames(self, body: str, marker: Any, ask: Callable[[str], Array]) -> Array:
-        """An answer for one frame of a body of frames, or for all of them, (n_t, k, ...)."""
-        whole = self.mechanism.nonlinear[body]
-        if marker is not None:
-            given = marker if isinstance(marker, Marker) else whole.marker(marker)
-            return ask(_of_body(given, body, [part.name for part in whole.parts]).body)
-        return np.stack([ask(part.name) for part in whole.parts], axis=1)
-
-    def _frame(self, body: str) -> Marker | None:
-        """Marker that is the frame of the body, where its motion is that of another frame."""
-        self._start_of(body)
-        return self.mechanism.part(body).own_frame
-
-    def _start_of(self, body: str, *, velocity: bool = False) -> int:
-        check_known(body, self.packed.names, f"no body {body!r}; the mechanism has")
-        bodies = self.packed.system.bodies
-        starts = bodies.v_at if velocity else bodies.q_at
-        return int(starts[self.packed.names.index(body)])
-
-    def _track(self, body: str, place: Any) -> Tracks:
-        self._start_of(body)
-        given = place if isinstance(place, Marker) else self.mechanism.part(body).marker(place)
-        marker = _of_body(given, body, [body])
-        if marker not in self.packed.markers:
-            raise ConfigError(
-                f"the point {marker.place} of body {body!r} was not a marker of the run.",
-                hint="Name it when the body is added.",
-            )
-        return self._follow(self.packed.row(marker))
-
-
-def _of_body(marker: Marker, body: str, names: list[str]) -> Marker:
-    """The marker, if it is one of a body, whose frames have these names."""
-    if marker.body in names:
-        return marker
-    raise ConfigError(
-        f"the marker {marker.place!r} is of body {marker.body!r}, not of {body!r}.",
-        hint=f"Write ({marker.body!r}, {marker.place!r}), or the name of a marker of {body!r}.",
-    )

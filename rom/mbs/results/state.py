@@ -12,6 +12,7 @@ import numpy as np
 from rom.arguments import typed
 from rom.errors import ConfigError
 from rom.io.archive import MAX_BYTES, Kind, read_archive, stated, write_archive
+from rom.mbs.equations.packing import Packed
 from rom.model import Array
 from rom.names import named
 
@@ -80,10 +81,10 @@ class State:
     in_own_frames: bool = False
 
 
-def check_state(state: State, packed: Any, *, joints: bool = True) -> None:
+def check_state(state: State, packed: Packed, *, joints: bool = True) -> None:
     """Refuse a state of other bodies or joints, or of bodies in frames of an older version."""
     needed = (packed.q.size, packed.v.size, packed.system.rows.kind.size)
-    sizes: Any = tuple(np.size(getattr(state, x, 0.0)) for x in ("q", "v", "lam"))
+    sizes = tuple(np.size(getattr(state, x, 0.0)) for x in ("q", "v", "lam"))
     if not isinstance(state, State) or sizes[: 2 + joints] != needed[: 2 + joints]:
         raise ConfigError(
             f"the state has {sizes[0]} coordinates, {sizes[1]} velocities and {sizes[2]} "

@@ -14,7 +14,6 @@ Source:
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.sparse import csc_matrix, identity
@@ -24,6 +23,7 @@ from rom.errors import ConfigError
 from rom.mbs.equations.packing import Packed
 from rom.mbs.results.state import State
 from rom.model import Array, Index
+from rom.names import check_known
 
 MIN_BLADES = 3  # with two, coefficients stay periodic
 SPACING_TOL = 1e-3  # of the azimuth of a blade [rad]
@@ -51,7 +51,7 @@ class Blades:
     axis: Array
 
     @classmethod
-    def of(cls, blades: Any, packed: Packed, state: State) -> "Blades":
+    def of(cls, blades: object, packed: Packed, state: State) -> "Blades":
         """Blades that the caller names, one after the other around the axis."""
         rows = _bodies(blades, packed)
         bodies = packed.system.bodies
@@ -83,7 +83,7 @@ class Blades:
         A = rotation.matrix(state.q[self.q_at : self.q_at + 4])
         return float(rotation.log(rotation.quaternion(A @ self.home.T)) @ self.axis)
 
-    def motions(self, state: State) -> tuple[Any, Any, Any]:
+    def motions(self, state: State) -> tuple[csc_matrix, csc_matrix, csc_matrix]:
         """(n, n) p per z; the same of their rates and accelerations per z; all sparse."""
         N = len(self.coordinates)
         psi = self.azimuth(state) + 2 * np.pi / N * np.arange(N)
@@ -125,18 +125,17 @@ class Blades:
         return (np.stack([square[0], *two]) / total).T
 
 
-def _bodies(blades: Any, packed: Packed) -> Index:
+def _bodies(blades: object, packed: Packed) -> Index:
     """(N, bodies of a blade) numbers of bodies, refused if they are no identical blades."""
     if isinstance(blades, str) or not isinstance(blades, Sequence) or len(blades) < MIN_BLADES:
         raise ConfigError(
             f"blades must be {MIN_BLADES} or more, each named by its bodies.",
             hint="Two blades have periodic coefficients in all axes.",
         )
-    number_of = {name: b for b, name in enumerate(packed.names)}
+    number_of: dict[object, int] = {name: b for b, name in enumerate(packed.names)}
     named = [[getattr(x, "name", x) for x in _parts(blade)] for blade in blades]
     for name in (name for row in named for name in row):
-        if name not in number_of:
-            raise ConfigError(f"blades: no body {name!r}; there are {sorted(number_of)}.")
+        check_known(name, packed.names, f"blades: no body {name!r}; there are")
     rows = [[number_of[name] for name in row] for row in named]
     masses, shapes = packed.system.bodies.mass, packed.system.bodies.r
     alike = all(
@@ -153,7 +152,7 @@ def _bodies(blades: Any, packed: Packed) -> Index:
     return every
 
 
-def _parts(blade: Any) -> Any:
+def _parts(blade: object) -> Sequence[object]:
     """The bodies of a blade: of a non-linear body, of a list, or the one body it is."""
     parts = getattr(blade, "parts", blade)
     return parts if isinstance(parts, list | tuple) else [parts]

@@ -1,7 +1,6 @@
 """Axes in which small motions of moving bodies are counted."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.linalg import eigvalsh
@@ -9,9 +8,11 @@ from scipy.sparse import csc_matrix, diags
 
 from rom import rotation
 from rom.arguments import one_of
-from rom.errors import ConfigError, ModelError
+from rom.errors import ModelError
 from rom.mbs.analysis.rotors.blades import Blades
+from rom.mbs.equations.packing import Packed
 from rom.mbs.results.state import State
+from rom.names import check_known
 
 FRAMES = ("body", "world")
 SPIN_RTOL = 1e-3  # of the first frequency of a body, from which on it counts as spinning
@@ -33,17 +34,16 @@ class Axes:
 IN_BODIES = Axes()
 
 
-def chosen(frame: Any, names: tuple[str, ...]) -> Axes:
+def chosen(frame: object, names: tuple[str, ...]) -> Axes:
     """The axes that the caller of an analysis names."""
     table = frame if isinstance(frame, dict) else dict.fromkeys(names, frame)
-    unknown = set(table) - set(names)
-    if unknown:
-        raise ConfigError(f"frame: no body {sorted(unknown)}; there are {sorted(names)}.")
+    for name in table:
+        check_known(name, names, f"frame: no body {name!r}; there are")
     words = (one_of("frame", table.get(name, "body"), FRAMES) for name in names)
     return Axes(tuple(word == "world" for word in words))
 
 
-def small_motions(packed: Any, state: State, axes: Axes) -> tuple[Any, ...]:
+def small_motions(packed: Packed, state: State, axes: Axes) -> tuple[csc_matrix, ...]:
     """Matrices T, T1, T2, T3 (n, n) from small motions p, counted in moving axes, to variations.
 
     The coordinates vary by T p, the velocities by T dp/dt + T1 p, the accelerations by
@@ -82,7 +82,7 @@ def small_motions(packed: Any, state: State, axes: Axes) -> tuple[Any, ...]:
     return T @ B, T1 @ B + T @ B1, T2 @ B + 2 * T @ B1, T3 @ B + T2 @ B1 + T @ B2
 
 
-def _refuse_spinning_shapes(packed: Any, state: State, b: int) -> None:
+def _refuse_spinning_shapes(packed: Packed, state: State, b: int) -> None:
     bodies, r = packed.system.bodies, packed.system.bodies.r[b]
     speed = np.linalg.norm(state.v[bodies.v_at[b] + np.arange(3, 6)])
     K, M = (A[bodies.flex[b], :r, :r] for A in (bodies.K, bodies.M))

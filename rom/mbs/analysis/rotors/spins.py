@@ -1,8 +1,7 @@
 """Steady rotation: of a mechanism as a whole, or of the bodies behind some of its joints."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -10,10 +9,10 @@ from scipy.sparse import csr_matrix, lil_matrix
 
 from rom import rotation
 from rom.arguments import finite, number
-from rom.errors import ConfigError, ModelError
+from rom.errors import ConfigError
 from rom.mbs.analysis.local_equations import Instant
 from rom.mbs.analysis.rotors.moving_axes import IN_BODIES, small_motions
-from rom.mbs.kernels.system import COUPLING, ROLL
+from rom.mbs.kernels.system import COUPLING
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import GROUND
 from rom.mbs.parts.joints import coordinate_of
@@ -53,18 +52,16 @@ class Spins:
     turning: tuple[Turning, ...] = ()
 
     @classmethod
-    def of(cls, mechanism: Mechanism, now: Instant, spin: Any, about: npt.ArrayLike) -> "Spins":
+    def of(cls, mechanism: Mechanism, now: Instant, spin: object, about: npt.ArrayLike) -> "Spins":
         """What the caller of `equilibrium` says."""
         found = cls(np.zeros(3), finite("about", about, (3,)))
         if isinstance(spin, Mapping):
             found = replace(found, turning=_turning(mechanism, now, spin))
         elif spin is not None:
             found = replace(found, whole=finite("spin", spin, (3,)))
-        rolls = now.packed.system.rows.kind == ROLL
-        if found.any and rolls.any():
-            raise ModelError(
-                "what rolls has no equilibrium while it spins; use rom.simulate instead.",
-                where=now.packed.row_owner[int(np.argmax(rolls))],
+        if found.any:
+            now.packed.refuse_rolling(
+                "what rolls has no equilibrium while it spins; use rom.simulate instead."
             )
         return found
 
@@ -83,7 +80,7 @@ class Spins:
             v[at + 3 : at + 6] = rotation.matrix(state.q[q_at + 3 : q_at + 7]).T @ omega
         return replace(state, t=now.t, v=v, a=a, algorithmic=None)
 
-    def _each(self, now: Instant, state: State) -> Any:
+    def _each(self, now: Instant, state: State) -> Iterator[tuple[int, Array, Array]]:
         """Number, angular velocity (3,) and a point (3,) on the axis of each body that turns."""
         if self.whole.any():
             for b in range(now.packed.system.bodies.mass.size):
@@ -95,7 +92,7 @@ class Spins:
             for b in one.bodies:
                 yield b, omega, centre
 
-    def motions(self, now: Instant, state: State) -> tuple[Any, Any, Any]:
+    def motions(self, now: Instant, state: State) -> tuple[csr_matrix, csr_matrix, csr_matrix]:
         """Matrices (n, n) of small steady motions p to variations T p, velocities, accelerations.
 
         Bodies that turn carry their p with them; an axis goes along with what carries its joint.
@@ -133,7 +130,7 @@ class Spins:
 AT_REST = Spins(np.zeros(3), np.zeros(3))
 
 
-def _turning(mechanism: Mechanism, now: Instant, spin: Mapping[str, Any]) -> tuple[Turning, ...]:
+def _turning(mechanism: Mechanism, now: Instant, spin: Mapping[str, float]) -> tuple[Turning, ...]:
     """The bodies behind each joint: what joints and elements connect with its second side."""
     for name in spin:
         coordinate_of(mechanism.joints, name, "angle", "spin")
