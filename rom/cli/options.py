@@ -69,6 +69,11 @@ def vector(text: str) -> tuple[float, float, float]:
     return x, y, z
 
 
+def numbers(text: str) -> tuple[float, ...]:
+    """Numbers with commas."""
+    return tuple(map(number, text.split(",")))
+
+
 def names(text: str) -> tuple[str, ...]:
     """Names with commas."""
     return tuple(filter(None, (part.strip() for part in text.split(","))))
@@ -160,18 +165,6 @@ def add_solid(parser: argparse.ArgumentParser) -> None:
     option(parser, "--E", "Young's modulus [Pa]", number)
     option(parser, "--nu", "Poisson's ratio", number)
     option(parser, "--rho", "density [kg/m^3]", number)
-
-
-def add_material(parser: argparse.ArgumentParser) -> None:
-    """Elastic solid and element degree."""
-    add_solid(parser)
-    about = "degree of the displacement, 1 to 3 (default 2)"
-    option(parser, "--degree", about, count, default=2)
-    about = (
-        "auto (default: direct where its factor fits, else out-of-core, else iterative), direct, "
-        "low-rank, out-of-core, low-rank+out-of-core, iterative"
-    )
-    option(parser, "--solver", about, str, default="auto")
 
 
 def add_interfaces(parser: argparse.ArgumentParser) -> None:
