@@ -2,16 +2,16 @@
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rom.cli.options import assignment, material, option, reading, require, unique
 from rom.errors import ConfigError
 from rom.names import is_whole, named
 
 if TYPE_CHECKING:
-    from rom.model import FEModel
+    from rom.model import FEModel, Index
 
-GEOMETRY_OPTIONS: dict[str, Any] = {  # options of a geometry, and what they are when not given
+GEOMETRY_OPTIONS: dict[str, object] = {  # options of a geometry, and what they are when not given
     "E": None,
     "nu": None,
     "rho": None,
@@ -93,13 +93,13 @@ def read_matrices(args: argparse.Namespace) -> "FEModel":
     )
 
 
-def source(text: str) -> Any:
+def source(text: str) -> str | tuple[str, str]:
     """A file, or (file, name) from FILE:NAME."""
     path, colon, name = text.rpartition(":")
     return (path, name) if colon and path and not Path(text).exists() else text
 
 
-def _sets(args: argparse.Namespace, names: list[str]) -> dict[str, Any]:
+def _sets(args: argparse.Namespace, names: list[str]) -> "dict[str, list[int] | Index]":
     """Labels of the nodes of each interface."""
     from rom.io.matrices.node_files import read_node_sets
 

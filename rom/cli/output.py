@@ -4,7 +4,6 @@ import argparse
 import os
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any
 
 from rom.cli.options import option
 from rom.cli.ranks import on_first_rank
@@ -44,7 +43,7 @@ def claim(args: argparse.Namespace) -> Path:
     return folder
 
 
-def files_in(values: Any) -> Iterator[Path]:
+def files_in(values: object) -> Iterator[Path]:
     """The files that a description names, but for those it writes."""
     if isinstance(values, Path):
         yield values

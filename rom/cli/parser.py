@@ -3,7 +3,8 @@
 import argparse
 from collections.abc import Sequence
 from contextlib import suppress
-from typing import Any, NoReturn
+from types import ModuleType
+from typing import NoReturn
 
 from rom import fields
 from rom.cli.options import options_of
@@ -38,7 +39,7 @@ examples:
 class ShowSchema(argparse.Action):
     """Prints the JSON Schema of the answer of a verb and leaves, whatever else is missing."""
 
-    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
         """Print and leave."""
         from rom.cli.answer import to_json
         from rom.cli.schemas import schema
@@ -62,8 +63,8 @@ class Parser(argparse.ArgumentParser):
         raise ConfigError(f"{message}.", hint=hint)
 
     def parse_args(  # type: ignore[override]  # one signature for its three overloads
-        self, args: Sequence[str] | None = None, namespace: Any = None
-    ) -> Any:
+        self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
+    ) -> argparse.Namespace:
         """Parse, and suggest a spelling for an option that does not exist."""
         found, unknown = self.parse_known_args(args, namespace)
         if unknown:
@@ -88,7 +89,7 @@ def suggestion(word: str, known: list[str]) -> str:
     return nearest(word.partition("=")[0], known)
 
 
-def given(argv: list[str]) -> dict[str, Any]:
+def given(argv: list[str]) -> dict[str, object]:
     """Only the options that a command line says, by their destination."""
     parser = build_parser()
     for sub in _verb_parsers(parser):
@@ -104,7 +105,7 @@ def _verb_parsers(parser: argparse.ArgumentParser) -> list[argparse.ArgumentPars
     return []
 
 
-def verb_modules() -> dict[str, Any]:
+def verb_modules() -> dict[str, ModuleType]:
     """{verb: its module}, those of fields too, which take none of the program."""
     first, last = (
         {name: fields.follow(f"rom.cli.verbs.{name}") for name in some}

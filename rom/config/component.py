@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from rom.arguments import Quantity, typed
 from rom.config.component_keys import TABLE
-from rom.config.document import Document, KeyPath, read_document
+from rom.config.document import Document, KeyPath, Values, read_document
 from rom.config.keys import Place, as_text, read_table, read_value
 from rom.config.methods import chosen
 from rom.errors import ConfigError, RomError
@@ -18,7 +18,9 @@ if TYPE_CHECKING:
     from rom.body.damping import ModalDamping, Rayleigh
     from rom.body.flexible import FlexibleBody
     from rom.body.nonlinear.ranges import Geometric
-    from rom.model import Attachment, FEModel
+    from rom.model import Attachment, FEModel, Material, Orthotropic
+
+    Solid = Material | Orthotropic
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,9 +28,9 @@ class Described:
     """What a file describes."""
 
     document: Document
-    values: dict[str, Any]  # in SI, by the keys of its table
+    values: Values  # in SI, by the keys of its table
     # ``trust`` and limits of `read_mesh`, which no file can say
-    meshing: dict[str, Any] = field(default_factory=dict)
+    meshing: Values = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -51,7 +53,7 @@ class Component(Described):
         return self.values.get("output", {}).get("file")
 
     @property
-    def kinds(self) -> dict[str, Any]:
+    def kinds(self) -> Values:
         """Kinds of the interfaces, for `rom.reduce`."""
         from rom.reduction.interfaces.kinds import parsed
         from rom.reduction.interfaces.polynomial import FourierLegendre, Polynomial
@@ -66,7 +68,7 @@ class Component(Described):
         return found
 
     @property
-    def mesh(self) -> tuple[Path, dict[str, Any]]:
+    def mesh(self) -> tuple[Path, Values]:
         """File and keywords for `rom.fe.mesh.read.read_mesh`.
 
         Raises:
@@ -130,7 +132,7 @@ class Component(Described):
             nonlinear=self.nonlinear(), certify=reduction["certificate"],
         )  # fmt: skip
 
-    def material(self) -> Any:
+    def material(self) -> "Solid | dict[str, Solid]":
         """`Material`, `Orthotropic`, or a dictionary of them by region."""
         solids = self._section("material")
         if "regions" in solids:
@@ -175,12 +177,12 @@ class Component(Described):
                 snapshots=values["snapshots"], sampling=values.get("sampling"),
             )  # fmt: skip
 
-    def _section(self, name: str) -> dict[str, Any]:
+    def _section(self, name: str) -> Values:
         if name not in self.values:
             raise ConfigError(f"[{name}] is missing; it is needed.", where=str(self.document.path))
         return self.values[name]
 
-    def _solid(self, values: dict[str, Any], *path: str) -> Any:
+    def _solid(self, values: Values, *path: str) -> "Solid":
         from rom.model import Material, Orthotropic
 
         with self.at(*path):
@@ -188,7 +190,7 @@ class Component(Described):
                 return Material(**values)
             return Orthotropic(**{k: _tuples(v) for k, v in values.items()})
 
-    def _parameter(self, name: str, value: Any, scale: float) -> Any:
+    def _parameter(self, name: str, value: object, scale: float) -> object:
         if not isinstance(value, str):
             return value
         symbol = value.lstrip("+-.0123456789eE ") or "1"
@@ -199,10 +201,8 @@ class Component(Described):
         place = Place(self.document, ("geometry", "parameters", name))
         if found.dimension == LENGTH:
             return float(read_value(Quantity("m"), value, place)) / scale
-        try:
+        with place.told():
             return in_si(value, symbol)
-        except ConfigError as error:
-            raise place.error(f"{place.name}: {error.message}", error.hint) from None
 
     def _attachments(self) -> "list[Attachment]":
         from rom.model import Attachment
@@ -219,7 +219,7 @@ class Component(Described):
         for name in ("material", "geometry"):
             if name in self.values:
                 raise Place(self.document, (name,)).error(f"matrices need no [{name}].")
-        sets: dict[str, Any] = {
+        sets: Values = {
             name: [int(x) for x in labels] for name, labels in m.get("sets", {}).items()
         }
         remaining = tuple(name for name in self.values.get("interfaces", {}) if name not in sets)
@@ -228,7 +228,7 @@ class Component(Described):
         model = read_model(*sources, nodes=m["nodes"], interfaces=sets, units=m["units"])
         return replace(model, attachments=tuple(self._attachments()))
 
-    def _source(self, text: str) -> Any:
+    def _source(self, text: str) -> str | tuple[str, str]:
         """A file beside the document, or (file, name) from FILE:NAME."""
         folder = self.document.path.parent
         path, colon, name = text.rpartition(":")
@@ -249,14 +249,14 @@ def located(document: Document, path: KeyPath) -> Iterator[None]:
         raise
 
 
-def _tuples(value: Any) -> Any:
+def _tuples(value: object) -> Any:
     return tuple(map(_tuples, value)) if isinstance(value, list) else value
 
 
 @typed
 def read_component(
     path: str | Path,
-    changes: Mapping[tuple[str, ...], Any] | None = None,
+    changes: Mapping[tuple[str, ...], object] | None = None,
     *,
     trust: bool = False,
     time_limit: float | None = None,
@@ -287,7 +287,7 @@ def read_component(
     return Component(document, read_table(TABLE, document), meshing)
 
 
-def change(data: dict[str, Any], key: tuple[str, ...], value: Any) -> None:
+def change(data: Values, key: tuple[str, ...], value: object) -> None:
     """Put a value at a place in nested tables; None removes what is there."""
     for name in key[:-1]:
         inner = data.setdefault(name, {})

@@ -2,10 +2,11 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from rom.arguments import Number, Positive, Quantity, Whole
 from rom.config.declared import Declared
+from rom.config.document import Values
 from rom.config.keys import (
     Anything,
     Either,
@@ -21,7 +22,6 @@ from rom.config.keys import (
     Words,
 )
 from rom.config.methods import METHODS
-from rom.errors import ConfigError
 from rom.fe.mesh.picks import picks
 from rom.units import LENGTH, SYSTEMS, UNITS
 
@@ -42,7 +42,7 @@ class Solids:
     parts: ClassVar[dict[str, Table]] = {"isotropic": ISOTROPIC, "orthotropic": ORTHOTROPIC}
     summary: str = "isotropic or orthotropic table, or a table of them by region"
 
-    def read(self, value: Any, place: Place) -> dict[str, Any]:
+    def read(self, value: object, place: Place) -> Values:
         """Values of the material, or of each region under "regions"."""
         if (
             isinstance(value, Mapping)
@@ -57,7 +57,7 @@ class Solids:
 class _Solid:
     summary: str = "material"
 
-    def read(self, value: Any, place: Place) -> dict[str, Any]:
+    def read(self, value: object, place: Place) -> Values:
         """Values of one material."""
         other = isinstance(value, Mapping) and "G" in value
         return (ORTHOTROPIC if other else ISOTROPIC).read(value, place)
@@ -69,12 +69,10 @@ class Faces:
 
     summary: str = "number, point, or text as `radius:0.006`"
 
-    def read(self, value: Any, place: Place) -> Any:
+    def read(self, value: object, place: Place) -> object:
         """The value, if it picks anything."""
-        try:
+        with place.told():
             picks(value)
-        except ConfigError as error:
-            raise place.error(f"{place.name}: {error.message}", error.hint) from None
         return value
 
 

@@ -41,7 +41,7 @@ class Declared(Table):
     places: list[str]
     own: dict[str, Key]
     without: list[str]
-    defaults: Mapping[str, Any]
+    defaults: Mapping[str, object]
     kinds: Mapping[str, Kind]
 
     def __init__(
@@ -50,7 +50,7 @@ class Declared(Table):
         *keys: Key,
         about: str = "",
         without: str = "",
-        defaults: Mapping[str, Any] = MappingProxyType({}),
+        defaults: Mapping[str, object] = MappingProxyType({}),
         **kinds: Kind,
     ) -> None:
         own = {key.name: key for key in keys}
@@ -84,7 +84,7 @@ def _made(place: str) -> Any:
     return getattr(Mechanism, place)
 
 
-def _keys_of(made: Any, kinds: Mapping[str, Kind], defaults: Mapping[str, Any]) -> list[Key]:
+def _keys_of(made: Any, kinds: Mapping[str, Kind], defaults: Mapping[str, object]) -> list[Key]:
     """The keys of a function, or of all fields of a record."""
     sentences = _sentences(getdoc(made) or "")
     found = []
@@ -119,7 +119,7 @@ def _kind(annotation: object) -> Kind | None:
     return PLAIN_KINDS.get(annotation)
 
 
-def _first_paragraph(made: Any) -> str:
+def _first_paragraph(made: object) -> str:
     return (getdoc(made) or "").partition("\n\n")[0]
 
 

@@ -6,6 +6,7 @@ from itertools import pairwise
 from typing import Any
 
 from rom.arguments import Positive, Quantity
+from rom.config.document import Values
 from rom.config.expressions import formula_kind
 from rom.config.keys import Either, Key, Kind, Place, Table, Variants, raise_mistakes, read_value
 from rom.config.python_files import PYTHON_KEYS, function_of
@@ -75,7 +76,7 @@ def law_kind(unit: str, variables: tuple[str, ...] = ("t",)) -> Kind:
 class Pending:
     """A value whose unit depends on whether a joint turns or slides."""
 
-    value: Any
+    value: object
     place: Place
     kinds: tuple[Kind, Kind]
 
@@ -99,7 +100,7 @@ class ByCoordinate:
         """Both kinds."""
         return f"{self.turning.summary}; of a joint that slides {self.sliding.summary}"
 
-    def read(self, value: Any, place: Place) -> Pending:
+    def read(self, value: object, place: Place) -> Pending:
         """The value, which fits at least one of them."""
         pending = Pending(value, place, (self.turning, self.sliding))
         try:
@@ -146,7 +147,7 @@ def _polynomial(start: float, slope: float) -> Law:
     return Law(lambda t: start + slope * t, lambda t: slope + 0 * t, lambda t: 0.0 * t)
 
 
-def _harmonic(values: dict[str, Any]) -> Law:
+def _harmonic(values: Values) -> Law:
     import numpy as np
 
     A, w, phase = values["amplitude"], 2 * np.pi * values["frequency"], values["phase"]
@@ -157,7 +158,7 @@ def _harmonic(values: dict[str, Any]) -> Law:
     )
 
 
-def _check_points(values: dict[str, Any], place: Place, t_end: float | None) -> None:
+def _check_points(values: Values, place: Place, t_end: float | None) -> None:
     t, y = values["t"], values["values"]
     if len(t) != len(y) or len(t) < 2:
         raise place.error(f"{place.name} needs two times or more, and as many values.")

@@ -8,6 +8,7 @@ from typing import Any, ClassVar, NamedTuple
 
 from rom.arguments import NotNegative, Number, Positive, Quantity
 from rom.config.declared import Declared
+from rom.config.document import Values
 from rom.config.expressions import FormulaTable, formula_keys, formula_kind
 from rom.config.keys import (
     Either,
@@ -40,7 +41,7 @@ class MarkerName:
         '"body.marker", or { body = [x, y, z] } for a point of the ground or a rigid body'
     )
 
-    def read(self, value: Any, place: Place) -> tuple[str, Any]:
+    def read(self, value: object, place: Place) -> tuple[str, object]:
         """Name of the body, and name or coordinates of the marker."""
         if isinstance(value, Mapping) and len(value) == 1:
             ((body, point),) = value.items()
@@ -66,11 +67,12 @@ class Markers:
         many = "list of two markers" if self.two else "list of markers"
         return many + ', each "body.marker" or { body = [x, y, z] }'
 
-    def read(self, value: Any, place: Place) -> list[tuple[str, Any]]:
+    def read(self, value: object, place: Place) -> list[tuple[str, object]]:
         """All of them."""
         if not isinstance(value, list) or not value or (self.two and len(value) != 2):
-            what = "two markers are" if self.two else "a list of markers is"
-            raise place.error(f"{place.name} = {as_text(value)}: {what} needed.")
+            place.refuse(
+                value, f": {'two markers are' if self.two else 'a list of markers is'} needed"
+            )
         return [MarkerName().read(item, place) for item in value]
 
 
@@ -101,7 +103,7 @@ class Body:
     parts: ClassVar[dict[str, Table]] = {"rigid": RIGID, "from a file": FROM_FILE}
     summary: str = "table with a file, or with mass and inertia"
 
-    def read(self, value: Any, place: Place) -> dict[str, Any]:
+    def read(self, value: object, place: Place) -> Values:
         """Its values."""
         from_file = isinstance(value, Mapping) and "file" in value
         return (FROM_FILE if from_file else RIGID).read(value, place)

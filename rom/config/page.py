@@ -1,7 +1,6 @@
 """The page about files, from the tables that check them."""
 
 from collections.abc import Iterator
-from typing import Any
 
 from rom.config.component_keys import TABLE as COMPONENT
 from rom.config.keys import Either, Key, Kind, Named, Table, Variants
@@ -112,7 +111,7 @@ def _default(key: Key) -> str:
     """What stands in for a key, where one value does."""
     if key.default is ...:
         return "must be given"
-    value: Any = list(key.default) if isinstance(key.default, tuple) else key.default
+    value = list(key.default) if isinstance(key.default, tuple) else key.default
     if value is None or isinstance(value, dict) or value == []:
         return ""
     if isinstance(value, bool):

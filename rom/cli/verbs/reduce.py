@@ -9,7 +9,7 @@ from math import pi
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rom.cli.answer import Answer, failures, report_data
+from rom.cli.answer import Answer, Data, failures, report_data
 from rom.cli.described import component, described, keyed, rayleigh
 from rom.cli.matrices import add_matrices, read_model, solid_options
 from rom.cli.options import (
@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 
     from rom.body.damping import ModalDamping, Rayleigh
     from rom.body.flexible import FlexibleBody
+    from rom.reduction.bases.method import Method
+    from rom.reduction.interfaces.characteristic import Characteristic
 
 SUMMARY = "reduce a model to a flexible body, with its certificate"
 EXAMPLES = """\
@@ -123,7 +125,7 @@ def _damping(args: argparse.Namespace) -> "Rayleigh | ModalDamping | None":
     return None if args.rayleigh is None else Rayleigh(**rayleigh(args.rayleigh))
 
 
-def _data(body: "FlexibleBody", output: Path) -> dict[str, Any]:
+def _data(body: "FlexibleBody", output: Path) -> Data:
     return {
         "output": str(output),
         "name": body.name,
@@ -163,7 +165,7 @@ def add_method(parser: argparse.ArgumentParser) -> None:
     keyed(parser, "--tol", "--at HZ,…", "--characteristic N", "--gravity-shapes")
 
 
-def method(args: argparse.Namespace) -> Any:
+def method(args: argparse.Namespace) -> "Method | Characteristic":
     """The method the options ask for; `rom.config.methods.chosen` refuses contradictions."""
     settings = {key: getattr(args, key) for key in SETTINGS if getattr(args, key) is not None}
     return chosen(settings, full=any(kind == "full" for _, kind in args.interface))

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from shlex import quote
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rom.cli.answer import Answer, failures, report_data
 from rom.cli.described import described, mechanism
@@ -23,6 +23,7 @@ from rom.names import inside
 if TYPE_CHECKING:
     from rom.body.flexible import FlexibleBody
     from rom.mbs.integrate.keeping import Keeping
+    from rom.mbs.results.solution import Solution
     from rom.model import Report
 
 log = logging.getLogger("rom")
@@ -81,7 +82,7 @@ def _mechanism(args: argparse.Namespace) -> Answer:
     keep = _keeping(args, made_from(file))
     origin = {"command": _command(args), "version": __version__}
 
-    def rescue(solution: Any, audit: "Report") -> Path:
+    def rescue(solution: "Solution", audit: "Report") -> Path:
         motion, *_, record = Run(file, solution, audit, **origin).paths(args.output)
         Run(file, solution, audit, **origin).write_motion([motion, record])
         return motion
@@ -116,7 +117,7 @@ def _keeping(args: argparse.Namespace, made_from: dict[str, str]) -> "Keeping | 
 
 @contextmanager
 def _rescuing(
-    args: argparse.Namespace, keep: "Keeping | None", write: Callable[[Any, "Report"], Path]
+    args: argparse.Namespace, keep: "Keeping | None", write: Callable[["Solution", "Report"], Path]
 ) -> Iterator[None]:
     """Write the motion up to whatever ends it inside, and say how to go on."""
     try:
@@ -162,7 +163,9 @@ def _finishing(args: argparse.Namespace, keep: "Keeping | None") -> Iterator[Non
         keep.remove()
 
 
-def _answer(solution: Any, audit: "Report", paths: list[Path], write: Any) -> Answer:
+def _answer(
+    solution: "Solution", audit: "Report", paths: list[Path], write: Callable[[], None]
+) -> Answer:
     from rom.report.run import happened
 
     data = {
@@ -213,7 +216,7 @@ def _pendulum(args: argparse.Namespace) -> Answer:
     keep = _keeping(args, made_from | {str(args.file): file_digest(args.file)})
     record = Record(body.name, _command(args), __version__)
 
-    def rescue(solution: Any, audit: "Report") -> Path:
+    def rescue(solution: "Solution", audit: "Report") -> Path:
         _write_motion(path, tables, body, solution)
         record.write([path, *tables, args.output / RECORD_FILE], solution, audit)
         return path
@@ -237,7 +240,7 @@ def _command(args: argparse.Namespace) -> str:
 
 def _swing(
     body: "FlexibleBody", args: argparse.Namespace, keep: "Keeping | None"
-) -> tuple[Any, Any]:
+) -> tuple["Solution", "Report"]:
     from rom.mbs.integrate.simulation import simulate
     from rom.mbs.results.audit import audit
 
@@ -247,7 +250,9 @@ def _swing(
     return solution, audit(solution)
 
 
-def _write_motion(path: Path, tables: list[Path], body: "FlexibleBody", solution: Any) -> None:
+def _write_motion(
+    path: Path, tables: list[Path], body: "FlexibleBody", solution: "Solution"
+) -> None:
     from rom.io.history import write_history
 
     _write(path, body, solution)
@@ -263,7 +268,7 @@ def _check_encoder(paths: list[Path]) -> None:
         encoder()
 
 
-def _write_films(films: list[Path], solution: Any) -> None:
+def _write_films(films: list[Path], solution: "Solution") -> None:
     from rom.view.scenes.animation_files import write_animation
     from rom.view.scenes.film import animate
 
@@ -274,14 +279,14 @@ def _write_films(films: list[Path], solution: Any) -> None:
             write_animation(solution, film)
 
 
-def _write_scene(path: Path, body: "FlexibleBody", solution: Any) -> None:
+def _write_scene(path: Path, body: "FlexibleBody", solution: "Solution") -> None:
     from rom.report.scene import motion_scene
     from rom.report.scene_file import write_scene
 
     write_scene(motion_scene(solution, title=f"Motion of {body.name}"), path)
 
 
-def _write(path: Path, body: "FlexibleBody", solution: Any) -> None:
+def _write(path: Path, body: "FlexibleBody", solution: "Solution") -> None:
     """One line per time: positions of the interfaces [m], then elastic coordinates."""
     import numpy as np
 
