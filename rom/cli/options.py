@@ -224,9 +224,12 @@ def material(args: argparse.Namespace) -> "Material":
     return Material(E=args.E, nu=args.nu, rho=args.rho)
 
 
-def options_of(parser: argparse.ArgumentParser, verb: str | None) -> list[str]:
-    """Long options of a verb."""
-    for action in parser._actions:
-        if isinstance(action, argparse._SubParsersAction) and verb in action.choices:
-            parser = action.choices[verb]
+def verb_parsers(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
+    """{verb: its parser} of the whole grammar."""
+    (verbs,) = (a for a in parser._actions if isinstance(a, argparse._SubParsersAction))
+    return dict(verbs.choices)
+
+
+def options_of(parser: argparse.ArgumentParser) -> list[str]:
+    """Long options."""
     return sorted(s for s in parser._option_string_actions if s.startswith("--"))

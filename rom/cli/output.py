@@ -34,6 +34,14 @@ def checked(
     return on_first_rank(lambda: check_replaceable(path, kind, inputs=sources, force=args.force))
 
 
+def check_encoder(paths: Iterable[Path]) -> None:
+    """Refuse a film that cannot be made before the motion is computed."""
+    if any(path.suffix == ".mp4" for path in paths):
+        from rom.view.canvas.films import encoder
+
+        encoder()
+
+
 def claim(args: argparse.Namespace) -> Path:
     """The folder of ``-o``, kept from other runs until the files of this one are written."""
     from rom.io.ours import claimed

@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     Solid = Material | Orthotropic
 
 
+COUNTS = {"modes": "n_modes", "shapes": "n_shapes", "steps": "n_steps"}  # key: their name in Python
+
+
 @dataclass(frozen=True, slots=True)
 class Described:
     """What a file describes."""
@@ -85,9 +88,8 @@ class Component(Described):
             name: self._parameter(name, value, scale)
             for name, value in geometry.get("parameters", {}).items()
         }
-        keywords = {"parameters": parameters, "faces": geometry.get("faces", {}), "scale": scale,
-                    "order": geometry.get("order")}  # fmt: skip
-        return geometry["file"], keywords | self.meshing
+        how = {"faces": geometry.get("faces", {}), "scale": scale, "order": geometry.get("order")}
+        return geometry["file"], {"parameters": parameters} | how | self.meshing
 
     def model(self) -> "FEModel":
         """The finite element model; a geometry needs FEniCSx.
@@ -117,20 +119,16 @@ class Component(Described):
 
         reduction, kinds = self.values["reduction"], self.kinds
         if not kinds:
-            raise ConfigError(
-                "the component has no interface.", where=str(self.document.path),
-                hint='For example [interfaces] and pin_a = "rbe2".',
-            )  # fmt: skip
+            where, hint = str(self.document.path), 'For example [interfaces] and pin_a = "rbe2".'
+            raise ConfigError("the component has no interface.", where=where, hint=hint)
         with self.at("reduction"):
             method = chosen(reduction, full=any(kind == "full" for kind in kinds.values()))
-        reference = reduction["reference"]
-        damping = self.damping()
-        return reduce(
-            self.model(), method=method, interfaces=kinds, damping=damping, name=self.name,
-            reference=reference[0] if len(reference) == 1 else reference,
-            stress=reduction["stress"], stiffening=reduction["stiffening"],
-            nonlinear=self.nonlinear(), certify=reduction["certificate"],
-        )  # fmt: skip
+        how: Values = {key: reduction[key] for key in ("reference", "stress", "stiffening")}
+        how |= {"method": method, "damping": self.damping(), "certify": reduction["certificate"]}
+        if len(how["reference"]) == 1:
+            (how["reference"],) = how["reference"]
+        how |= {"interfaces": kinds, "name": self.name}
+        return reduce(self.model(), nonlinear=self.nonlinear(), **how)
 
     def material(self) -> "Solid | dict[str, Solid]":
         """`Material`, `Orthotropic`, or a dictionary of them by region."""
@@ -167,15 +165,10 @@ class Component(Described):
         values = self.values["reduction"].get("nonlinear")
         if values is None:
             return None
-        loads = {name: (*x["force"], *x["moment"]) for name, x in values["loads"].items()}
+        given = {COUNTS.get(key, key): _tuples(value) for key, value in values.items()}
+        given["loads"] = {name: (*x["force"], *x["moment"]) for name, x in values["loads"].items()}
         with self.at("reduction", "nonlinear"):
-            return Geometric(
-                loads=loads, n_modes=values["modes"], tol=values["tol"],
-                n_shapes=values.get("shapes"), n_steps=values["steps"],
-                fixed=tuple(values["fixed"]), spin=tuple(values["spin"]),
-                about=tuple(values["about"]) if "about" in values else None,
-                snapshots=values["snapshots"], sampling=values.get("sampling"),
-            )  # fmt: skip
+            return Geometric(**given)
 
     def _section(self, name: str) -> Values:
         if name not in self.values:
@@ -224,17 +217,17 @@ class Component(Described):
         }
         remaining = tuple(name for name in self.values.get("interfaces", {}) if name not in sets)
         sets |= read_node_sets(m["nodes"], remaining) if remaining else {}
-        sources = (self._source(m[name]) for name in ("stiffness", "mass"))
+        sources = (source(m[name], self.document.path.parent) for name in ("stiffness", "mass"))
         model = read_model(*sources, nodes=m["nodes"], interfaces=sets, units=m["units"])
         return replace(model, attachments=tuple(self._attachments()))
 
-    def _source(self, text: str) -> str | tuple[str, str]:
-        """A file beside the document, or (file, name) from FILE:NAME."""
-        folder = self.document.path.parent
-        path, colon, name = text.rpartition(":")
-        if colon and path and not (folder / text).exists():
-            return str(folder / path), name
-        return str(folder / text)
+
+def source(text: str, folder: Path = Path()) -> str | tuple[str, str]:
+    """A file in a folder, or (file, name) from FILE:NAME."""
+    path, colon, name = text.rpartition(":")
+    if colon and path and not (folder / text).exists():
+        return str(folder / path), name
+    return str(folder / text)
 
 
 @contextmanager
@@ -277,10 +270,8 @@ def read_component(
     """
     document = read_document(path)
     if "bodies" in document.data:
-        raise ConfigError(
-            "this is a mechanism; a component is needed.", where=document.where(("bodies",)),
-            hint="rom simulate moves it.",
-        )  # fmt: skip
+        where, hint = document.where(("bodies",)), "rom simulate moves it."
+        raise ConfigError("this is a mechanism; a component is needed.", where=where, hint=hint)
     for key, value in (changes or {}).items():
         change(document.data, key, value)
     meshing = {"trust": trust, "time_limit": time_limit, "memory_limit": memory_limit}

@@ -76,13 +76,14 @@ class Faces:
         return value
 
 
-INTERFACE = Either(Text(), Variants({
+KINDS = {
     "full": Table("Keeps all its dofs.", ()),
     "rbe2": Table("Moves as a rigid surface.", ()),
     "rbe3": Table("Moves freely about its mean.", ()),
     "polynomial": Declared(f"{SHAPES}:Polynomial"),
     "fourier": Declared(f"{SHAPES}:FourierLegendre"),
-}))  # fmt: skip
+}
+INTERFACE = Either(Text(), Variants(KINDS))
 TABLE = Table("A component.", (
     Key("name", Text(), "Name of the body; that of the file if missing."),
     Key("geometry", Table("The solid as a geometry or mesh; needs FEniCSx.", (

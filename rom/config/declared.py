@@ -20,9 +20,8 @@ from rom.fields import follow
 
 SHAPE_OR_UNIT = re.compile(r"^\([\dnr, ]+\)( or \([\d, ]+\))? | ?\[(?!degrees)[^]]*\]")
 NO_VALUE = re.compile("; None( for|:)")
-PLAIN_KINDS: dict[object, Kind] = {
-    float: Quantity(), int: Whole(), bool: Flag(), str: Text(), Path: FilePath(),
-}  # fmt: skip
+PLAIN_KINDS: dict[object, Kind] = {float: Quantity(), int: Whole(), bool: Flag(), str: Text()}
+PLAIN_KINDS[Path] = FilePath()
 
 
 class Declared(Table):

@@ -12,6 +12,18 @@ from rom.config.keys import Either, Key, Kind, Place, Table, Variants, raise_mis
 from rom.config.python_files import PYTHON_KEYS, function_of
 from rom.errors import ConfigError
 
+LAWS = {
+    "constant": "Always the same.",
+    "steady": "start + rate t.",
+    "run-up": "From rest to a steady rate, without a jolt: the rate is that of a cycloid, "
+    "rate (s - sin(2 pi s) / 2 pi) with s = t / duration.",
+    "ramp": "From one value to another on a cycloid, from + (to - from) (s - sin(2 pi s) / 2 pi) "
+    "with s = (t - start) / duration.",
+    "harmonic": "mean + amplitude sin(2 pi frequency t + phase).",
+    "table": "A cubic spline through points; it must cover the whole run.",
+    "expression": "A formula; its rate and acceleration are exact.",
+    "python": "which runs only with `--trust` or `trust=True`.",
+}
 Function = Callable[[Any], Any]
 
 
@@ -30,45 +42,37 @@ class Law:
 def law_kind(unit: str, variables: tuple[str, ...] = ("t",)) -> Kind:
     """How a law is written whose values have this SI unit; formulas may have other variables."""
     value, rate = Quantity(unit), Quantity("1/s" if unit == "1" else f"{unit}/s")
-    still = 0.0
-    tables = {
-        "constant": Table("Always the same.", (Key("value", value, "Its value.", ...),)),
-        "steady": Table("start + rate t.", (
+    keys = {
+        "constant": [Key("value", value, "Its value.", ...)],
+        "steady": [
             Key("rate", rate, "Change per time.", ...),
-            Key("start", value, "Value at t = 0.", still),
-        )),
-        "run-up": Table(
-            "From rest to a steady rate, without a jolt: the rate is that of a cycloid, "
-            "rate (s - sin(2 pi s) / 2 pi) with s = t / duration.", (
+            Key("start", value, "Value at t = 0.", 0.0),
+        ],
+        "run-up": [
             Key("rate", rate, "Rate at the end.", ...),
             Key("duration", Positive("s"), "Time until then.", ...),
-        )),
-        "ramp": Table(
-            "From one value to another on a cycloid, from + (to - from) (s - sin(2 pi s) / 2 pi) "
-            "with s = (t - start) / duration.", (
-            Key("from", value, "Value before.", still),
+        ],
+        "ramp": [
+            Key("from", value, "Value before.", 0.0),
             Key("to", value, "Value after.", ...),
-            Key("start", Quantity("s"), "When it begins.", still),
+            Key("start", Quantity("s"), "When it begins.", 0.0),
             Key("duration", Positive("s"), "How long it takes.", ...),
-        )),
-        "harmonic": Table("mean + amplitude sin(2 pi frequency t + phase).", (
+        ],
+        "harmonic": [
             Key("amplitude", value, "Amplitude.", ...),
             Key("frequency", Positive("Hz"), "Frequency.", ...),
-            Key("phase", Quantity("rad"), "Phase.", still),
-            Key("mean", value, "Mean.", still),
-        )),
-        "table": Table("A cubic spline through points; it must cover the whole run.", (
+            Key("phase", Quantity("rad"), "Phase.", 0.0),
+            Key("mean", value, "Mean.", 0.0),
+        ],
+        "table": [
             Key("t", Quantity("s", ((None,),)), "Times, ascending.", ...),
             Key("values", Quantity(unit, ((None,),)), "Values.", ...),
-        )),
-        "expression": formula_kind(
-            unit, variables, "A formula; its rate and acceleration are exact."
-        ),
-        "python": Table(
-            f"A function of ({', '.join(variables)}) in a Python file, which runs only with "
-            "`--trust` or `trust=True`.", PYTHON_KEYS,
-        ),
-    }  # fmt: skip
+        ],
+    }
+    tables = {kind: Table(LAWS[kind], tuple(some)) for kind, some in keys.items()}
+    tables["expression"] = formula_kind(unit, variables, LAWS["expression"])
+    about = f"A function of ({', '.join(variables)}) in a Python file, {LAWS['python']}"
+    tables["python"] = Table(about, PYTHON_KEYS)
     return Either(value, Variants(tables, {"expression": "expression", "function": "python"}))
 
 

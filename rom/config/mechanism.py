@@ -281,15 +281,13 @@ def read_mechanism(
     """
     document = read_document(path)
     if "bodies" not in document.data and {"geometry", "matrices"} & set(document.data):
-        raise ConfigError(
-            "this is a component; a mechanism is needed.", where=document.where(()),
-            hint="A mechanism has [bodies], one of which may have this file.",
-        )  # fmt: skip
+        hint = "A mechanism has [bodies], one of which may have this file."
+        where = document.where(())
+        raise ConfigError("this is a component; a mechanism is needed.", where=where, hint=hint)
     bodies = (name for name, section in sections().items() if section.bodies)
     if not {"bodies", *bodies} & set(document.data):
-        raise ConfigError(
-            "bodies is missing.", where=document.where(()), hint="Add [bodies.NAME].",
-        )  # fmt: skip
+        hint = "Add [bodies.NAME]."
+        raise ConfigError("bodies is missing.", where=document.where(()), hint=hint)
     for name in document.data.keys() - sections().keys():
         with located(document, (name,)):
             find("sections", name)  # of a field that is not here

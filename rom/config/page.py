@@ -32,8 +32,7 @@ def page(component: str, mechanism: str) -> str:
     parts += ["## Laws", LAWS_SECTION]
     parts += [f"**{name}.** {t.about}\n\n{keys(t)}" for name, t in tables(law_kind("1"))]
     parts += ["## Formulas", FORMULA_SECTION]
-    parts += ["## Units", "Products with a blank, powers with `^`, and each `/` belongs to the one"
-              " unit behind it: `kg/m^3`, `N m/rad`, `m s^-2`.", _units()]  # fmt: skip
+    parts += ["## Units", UNIT_SECTION, _units()]
     return "\n\n".join(parts) + "\n"
 
 
@@ -42,6 +41,10 @@ LAWS_SECTION = (
     "may be left out where there is an `expression` or a `function`. Values have the unit of what "
     "they prescribe: an angle or a displacement for drives, a torque or a force for motors, none "
     "for factors."
+)
+UNIT_SECTION = (
+    "Products with a blank, powers with `^`, and each `/` belongs to the one unit behind it: "
+    "`kg/m^3`, `N m/rad`, `m s^-2`."
 )
 FORMULA_SECTION = (
     "An `expression` has numbers, variables and constants of its place, `pi`, `+ - * / ^` (`**` is "

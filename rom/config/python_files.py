@@ -15,12 +15,12 @@ from rom.errors import RomError, UnsafeFileError
 from rom.io.files import check_readable
 
 Function = Callable[..., Any]  # of a file
+NUMBERS = Quantity("1", ((None,),))
 PYTHON_KEYS = (
     Key("file", FilePath(), "Python file.", ...),
     Key("function", Text(), "Name of a function in it.", ...),
-    Key("parameters", Quantity("1", ((None,),)),
-        "Numbers handed to it behind its other arguments.", []),
-)  # fmt: skip
+    Key("parameters", NUMBERS, "Numbers handed to it behind its other arguments.", []),
+)
 
 
 def function_of(values: Values, place: Place, *, trust: bool) -> Function:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from rom.cli.answer import Answer, failures, report_data
 from rom.cli.described import described, mechanism
 from rom.cli.options import OUTPUT_FLAG, add_meshing, option, positive, require, vector
-from rom.cli.output import add_force, checked, claim, files_in
+from rom.cli.output import add_force, check_encoder, checked, claim, files_in
 from rom.cli.ranks import ranks
 from rom.cli.verbs.swing import pendulum
 from rom.errors import ConfigError, ResourceError, RomError
@@ -78,7 +78,7 @@ def _mechanism(args: argparse.Namespace) -> Answer:
     paths = paths_of(file, claim(args))
     for path in paths:
         checked(args, path, inputs=files_in(file.values))
-    _check_encoder(paths)
+    check_encoder(paths)
     keep = _keeping(args, made_from(file))
     origin = {"command": _command(args), "version": __version__}
 
@@ -210,7 +210,7 @@ def _pendulum(args: argparse.Namespace) -> Answer:
     tables = [path.with_suffix(f".history.{args.history}")] if args.history else []
     last = (folder / SCENE_FILE, folder / RECORD_FILE)
     paths = [checked(args, each) for each in (path, *films, *tables, *last)]
-    _check_encoder(films)
+    check_encoder(films)
     hung = {"axis": args.axis, "gravity": args.gravity, "hinge": args.hinge}
     made_from = {f"--{name}": repr(value) for name, value in hung.items()}
     keep = _keeping(args, made_from | {str(args.file): file_digest(args.file)})
@@ -258,14 +258,6 @@ def _write_motion(
     _write(path, body, solution)
     for table in tables:
         write_history(solution, table)
-
-
-def _check_encoder(paths: list[Path]) -> None:
-    """Refuse a film that cannot be made before the motion is computed."""
-    if any(path.suffix == ".mp4" for path in paths):
-        from rom.view.canvas.films import encoder
-
-        encoder()
 
 
 def _write_films(films: list[Path], solution: "Solution") -> None:

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 from rom.cli.answer import Answer, Data, failures, report_data
 from rom.cli.options import add_geometry, count, face, option, positive, reading, unique, vector
-from rom.cli.output import add_force, checked, claim
+from rom.cli.output import add_force, check_encoder, checked, claim
 from rom.errors import ConfigError
 from rom.names import inside
 
@@ -91,22 +91,20 @@ def run(args: argparse.Namespace) -> Answer:
         "frequencies": body.frequencies(6, fixed=(hinge,)).tolist(),
         "certificate": report_data(certificate),
     }
-    return Answer(
-        data, _text(body, hinge, data), lambda: _write(files, body, (mechanism, solution), magnify),
-        tuple(text for text in failures(certificate) if not text.startswith("free:")),
-    )  # fmt: skip
+    failed = tuple(text for text in failures(certificate) if not text.startswith("free:"))
+    motion = mechanism, solution
+    text = _text(body, hinge, data)
+    return Answer(data, text, lambda: _write(files, body, motion, magnify), failed)
 
 
 def _files(args: argparse.Namespace) -> dict[str, Path]:
     """What will be written, by its ending; refused before the computation."""
     folder = claim(args)
     films = [kind for kind, asked in ((".gif", args.film), (".mp4", args.mp4)) if asked]
-    if args.mp4:
-        from rom.view.canvas.films import encoder
-
-        encoder()
     kinds = (".rom.npz", ".png", *films)
-    return {kind: checked(args, inside(folder, args.file.stem, kind)) for kind in kinds}
+    paths = {kind: checked(args, inside(folder, args.file.stem, kind)) for kind in kinds}
+    check_encoder(paths.values())
+    return paths
 
 
 def hinge_of(text: str) -> tuple[str, dict[str, str]]:
@@ -135,11 +133,9 @@ def _reduced(
     (at,), rigid = found(full, [hinge]), mass_properties(full)
     log.info("%s: %d dofs, %.4g kg of %s", args.file, full.n_dofs, rigid.mass, args.material)
     swing = planned(rigid, at.origin, args.gravity, args.t_end, axis=at.axis)
-    body = reduce(
-        full, method=CraigBampton(args.modes), interfaces={hinge: "rbe2"}, reference=hinge,
-        damping=ModalDamping(0.01, fixed=(hinge,)), name=args.file.stem,
-    )  # fmt: skip
-    return body, swing
+    how = {"method": CraigBampton(args.modes), "damping": ModalDamping(0.01, fixed=(hinge,))}
+    kinds = {hinge: "rbe2"}
+    return reduce(full, interfaces=kinds, reference=hinge, name=args.file.stem, **how), swing
 
 
 @dataclass(frozen=True, slots=True)
