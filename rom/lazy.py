@@ -58,9 +58,8 @@ class Moved:
 
         from rom.fields import names
 
-        found = (f"{new}{name[len(old) :]}" for old, new in names("moved").items()
-                 if f"{name}.".startswith(f"{old}."))  # fmt: skip
-        place = next(found, "")
+        moved = [pair for pair in names("moved").items() if f"{name}.".startswith(f"{pair[0]}.")]
+        place = next((f"{new}{name[len(old) :]}" for old, new in moved), "")
         if not place or find_spec(place) is None:
             return None
         self.module = importlib.import_module(place)

@@ -440,9 +440,8 @@ class Report:
     @property
     def advice(self) -> tuple[str, ...]:
         """What the rows that fail cost the user, and what helps."""
-        costs = (text for row in self.failures for words, text in FAILURE_COSTS.items()
-                 if words in row.quantity)  # fmt: skip
-        return tuple(dict.fromkeys(costs))
+        pairs = ((row.quantity, *cost) for row in self.failures for cost in FAILURE_COSTS.items())
+        return tuple(dict.fromkeys(text for quantity, words, text in pairs if words in quantity))
 
     def __str__(self) -> str:
         width = max((len(row.quantity) for row in self.rows), default=0)

@@ -44,51 +44,54 @@ class Range:
         return f"It is in {self.unit}."
 
 
-WAVE_SPEED = Range("the speed of sound sqrt(E/rho)", 10.0, 2.0e4, "m/s",
-                   "solids have 10 m/s (soft foam) to 20000 m/s (diamond)",
-                   "Check the units: E in Pa, rho in kg/m^3.")  # fmt: skip
-MATRIX_SPEED = Range("the speed of sound, estimated from stiffness and mass at the nodes,", 7.0,
-                     3.0e4, "m/s", "solids have 10 m/s (soft foam) to 20000 m/s (diamond)",
-                     "Check units='...' of the matrices and nodes.")  # fmt: skip
+SOUND = "the speed of sound sqrt(E/rho)"
+ALL_SOLIDS = "solids have 10 m/s (soft foam) to 20000 m/s (diamond)"
+E_AND_RHO = "Check the units: E in Pa, rho in kg/m^3."
+WAVE_SPEED = Range(SOUND, 10.0, 2.0e4, "m/s", ALL_SOLIDS, E_AND_RHO)
+ESTIMATED = "the speed of sound, estimated from stiffness and mass at the nodes,"
+OF_NODES = "Check units='...' of the matrices and nodes."
+MATRIX_SPEED = Range(ESTIMATED, 7.0, 3.0e4, "m/s", ALL_SOLIDS, OF_NODES)
 FOAM_SPEED = 1000.0  # m/s; no foam is faster
 LIGHT_SPEED = 100.0  # m/s; nothing lighter than honeycomb is faster
 HEAVY_DENSITY = 5000.0  # kg/m^3; beyond are metals, the slowest of them lead with 1190 m/s
-HEAVY_SPEED = Range("the speed of sound sqrt(E/rho)", 600.0, 2.0e4, "m/s",
-                    "solids as heavy have 1190 m/s (lead) to 7000 m/s (ceramics)",
-                    "Check the units: E in Pa, rho in kg/m^3.")  # fmt: skip
-SOLID_DENSITY = Range("the density", 0.1, 3.0e4, "kg/m^3",
-                      "solids have 0.1 kg/m^3 (aerogel) to 22600 (osmium)",
-                      "Check the units: E in Pa, rho in kg/m^3.")  # fmt: skip
-STIFF_DENSITY = Range("the density", 10.0, 3.0e4, "kg/m^3",
-                      "solids as stiff by weight have 10 kg/m^3 (honeycomb) to 22600 (osmium)",
-                      "Check the units: E in Pa, rho in kg/m^3.")  # fmt: skip
-FACTOR = Range("the factor", 1e-3, 1e3, "", "one is the model as it was made",
-               "Give factors of the number, not the number itself.")  # fmt: skip
-SIZE = Range("the size", 1e-6, 1e4, "m", "bodies have 1e-06 m (microsystems) to 10000 m",
-             "Check the unit of the coordinates: scale=1e-3 is for millimetres.")  # fmt: skip
-DENSITY = Range("the mass over the volume of the bounding box", None, 3.0e4, "kg/m^3",
-                "no solid is denser than 22600 kg/m^3 (osmium)",
-                "Check the units of mass and coordinates.")  # fmt: skip
-GRAVITY = Range("gravity", None, 100.0, "m/s^2", "the earth has 9.81 m/s^2, the largest planet 25",
-                "It is in m/s^2: 9810 belongs to millimetres.")  # fmt: skip
-DAMPING_RATIO = Range("the damping ratio", None, 0.3, "",
-                      "metal has 0.0005 to 0.01, bolted structures up to 0.1, rubber up to 0.3",
-                      "One is critical damping: write two per cent as 0.02.")  # fmt: skip
-GYRATION = Range("the radius of gyration over the reach of the markers", None, 100.0, "",
-                 "a body reaches as far as its mass",
-                 "Check the unit of the inertia: kg m^2.")  # fmt: skip
-FRICTION = Range("the coefficient of friction", None, 3.0, "", "rubber on rock reaches 2",
-                 "Thirty per cent are 0.3, an angle of 35 degrees is 0.7.")  # fmt: skip
-SPEED = Range("the speed at the start", None, 1e5, "m/s", "spacecraft reach 70000 m/s",
-              "Check the unit: m/s.")  # fmt: skip
-REACH = Range("the reach of its mass over the size of the model", None, 100.0, "",
-              "what an interface carries is not so much larger",
-              "Check the units: kg m^2 for the inertia, m for at.")  # fmt: skip
-STIFFNESS = Range("the stiffness", 0.0, None, "",
-                  "below zero it pushes away from its position without force",
-                  "Check the sign.")  # fmt: skip
-DAMPING = Range("the damping", 0.0, None, "", "below zero it gives energy to the motion",
-                "Check the sign.")  # fmt: skip
+HEAVY_SPEED = Range(
+    SOUND, 600.0, 2.0e4, "m/s", "solids as heavy have 1190 m/s (lead) to 7000 (ceramics)", E_AND_RHO
+)
+SOLID_DENSITY = Range(
+    "the density", 0.1, 3.0e4, "kg/m^3", "solids have 0.1 (aerogel) to 22600 (osmium)", E_AND_RHO
+)
+STIFF_DENSITY = Range(
+    "the density", 10.0, 3.0e4, "kg/m^3", "solids as stiff have 10 (honeycomb) to 22600", E_AND_RHO
+)
+FACTOR = Range(
+    "the factor", 1e-3, 1e3, "", "one is the model as made", "Give factors, not the number itself."
+)
+SIZE = Range(
+    "the size", 1e-6, 1e4, "m", "bodies have 1e-06 m to 10000 m", "For millimetres, scale=1e-3."
+)
+OF_BOX = "the mass over the volume of the bounding box"
+OSMIUM = "no solid is denser than 22600 kg/m^3 (osmium)"
+DENSITY = Range(OF_BOX, None, 3.0e4, "kg/m^3", OSMIUM, "Check the units of mass and coordinates.")
+GRAVITY = Range(
+    "gravity", None, 100.0, "m/s^2", "earth has 9.81, Jupiter 25", "9810 belongs to millimetres."
+)
+STRUCTURES = "metal has 0.0005 to 0.01, bolted structures up to 0.1, rubber up to 0.3"
+PER_CENT = "One is critical damping: write two per cent as 0.02."
+DAMPING_RATIO = Range("the damping ratio", None, 0.3, "", STRUCTURES, PER_CENT)
+OF_MARKERS = "the radius of gyration over the reach of the markers"
+REACHING = "a body reaches as far as its mass"
+GYRATION = Range(OF_MARKERS, None, 100.0, "", REACHING, "Check the unit of the inertia: kg m^2.")
+ANGLES = "Thirty per cent are 0.3, an angle of 35 degrees is 0.7."
+FRICTION = Range("the coefficient of friction", None, 3.0, "", "rubber on rock reaches 2", ANGLES)
+SPEED = Range(
+    "the speed at the start", None, 1e5, "m/s", "spacecraft reach 70000 m/s", "Check the unit: m/s."
+)
+OF_MODEL = "the reach of its mass over the size of the model"
+CARRIED = "what an interface carries is not so much larger"
+REACH = Range(OF_MODEL, None, 100.0, "", CARRIED, "Check the units: inertia in kg m^2, at in m.")
+SIGN = "Check the sign."
+STIFFNESS = Range("the stiffness", 0.0, None, "", "below zero it pushes from where it rests", SIGN)
+DAMPING = Range("the damping", 0.0, None, "", "below zero it gives energy to the motion", SIGN)
 
 
 SLIPS = {  # units that stand for others by mistake, and what they are

@@ -133,11 +133,9 @@ def reduce(  # noqa: PLR0913  one keyword per choice
         of_bodies = (reference != "mean-axis", damping, stress, stiffening, nonlinear)
         return taker("reduce", model)(model, method, interfaces or {}, of_bodies=any(of_bodies))
     check_name(name, "a body")
-    draft = Draft(
-        model=model, method=method, interfaces=interfaces or {}, reference=reference,
-        damping=damping, name=name, stress=stress, stiffening=stiffening, nonlinear=nonlinear,
-        certify=certify,
-    )  # fmt: skip
+    draft = Draft(model=model, method=method, interfaces=interfaces or {}, reference=reference)
+    draft.damping, draft.nonlinear, draft.certify = damping, nonlinear, certify
+    draft.name, draft.stress, draft.stiffening = name, stress, stiffening
     body = run(stages(draft), draft)
     body.provenance.update({"seconds to reduce": draft.seconds, "stages": draft.watch.table()})
     return body

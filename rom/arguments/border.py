@@ -4,20 +4,21 @@ Python finds out that an argument is of the wrong type where it is first used, d
 about attributes and subscripts. The border is the public function, and there the user is told.
 """
 
-import sys
 import types
 from collections.abc import Callable
 from difflib import get_close_matches
 from functools import wraps
-from inspect import Parameter, signature
-from typing import Any, TypeVar
+from inspect import Parameter
+from typing import TypeVar
 
-from rom.arguments.kinds import Names, Taken, Unfit, call_of, taken_by
+from rom.arguments.kinds import Taken, Unfit, call_of, parameters_of, taken_by
 from rom.arguments.values import is_number, shortened
 from rom.errors import ConfigError, UnknownNameError
 from rom.plausible import USUAL, warn_outside
 
-Public = TypeVar("Public", bound=Callable[..., Any])
+Public = TypeVar("Public", bound=Callable[..., object])
+Given = tuple[object, ...]  # arguments by place
+Named = dict[str, object]  # and by name
 MAX_NEAR = 6  # names that are offered for an unknown one
 OF_STATES = "Ask rom.snapshot(mechanism, state), which has what motions have."
 NAMES_ELSEWHERE = {  # class: {name that its objects do not have: what to write instead}
@@ -57,9 +58,10 @@ def typed(public: Public) -> Public:
     return public
 
 
-def _unknown(record: Any, name: str) -> Any:
+def _unknown(record: object, name: str) -> object:
     """What a field gives, see `rom.fields`; else raise what Python would, with the names near."""
-    if getattr(type(type(record)), "bind", None) and type(record).bind(name):
+    bind = getattr(type(type(record)), "bind", None)
+    if bind and bind(type(record), name):
         return getattr(record, name)
     kind = type(record).__name__
     text = f"{kind!r} object has no attribute {name!r}"
@@ -71,11 +73,11 @@ def _unknown(record: Any, name: str) -> Any:
     raise UnknownNameError(f"{text}.", hint=hint)
 
 
-def _typed_function(function: Callable[..., Any]) -> Callable[..., Any]:
+def _typed_function(function: Callable[..., object]) -> Callable[..., object]:
     border: list[_Border] = []
 
     @wraps(function)
-    def at_border(*args: Any, **named: Any) -> Any:
+    def at_border(*args: object, **named: object) -> object:
         if not border:
             border.append(_Border(function))
         taken, named = border[0].passed(args, named)
@@ -87,14 +89,13 @@ def _typed_function(function: Callable[..., Any]) -> Callable[..., Any]:
 class _Border:
     """What a function takes, by place and by name."""
 
-    def __init__(self, function: Any):
+    def __init__(self, function: Callable[..., object]):
         self.name = function.__name__
-        known = Names(vars(sys.modules[function.__module__]))
-        parameters = signature(function).parameters.values()
+        parameters = parameters_of(function)
         # a function beside the class can be a method of it too
         named = [p.name for p in parameters]
         self.method = "." in function.__qualname__ or named[:1] == ["self"]
-        takes = {p.name: taken_by(p.annotation, known) for p in parameters}
+        takes = {p.name: taken_by(p.annotation) for p in parameters}
         self.more = [takes.pop(p.name) for p in parameters if p.kind is p.VAR_KEYWORD]
         rest = [(p.name, takes[p.name]) for p in parameters if p.kind is p.VAR_POSITIONAL]
         self.rest = rest or [("", None)]  # more than Python will let through
@@ -104,9 +105,7 @@ class _Border:
         ranges = ((p, USUAL.get(f"{owner}.{p}", USUAL.get(p))) for p in takes)
         self.usual = {p: limits for p, limits in ranges if limits}
 
-    def passed(
-        self, args: tuple[Any, ...], named: dict[str, Any]
-    ) -> tuple[list[Any], dict[str, Any]]:
+    def passed(self, args: Given, named: Named) -> tuple[list[object], Named]:
         """The arguments as the function gets them."""
         for name, value in named.items():
             owners = getattr(type(value), "TAKEN_BY", None)
@@ -129,7 +128,7 @@ class _Border:
             self._doubt(taken, more)
         return taken, more
 
-    def _doubt(self, taken: list[Any], named: dict[str, Any]) -> None:
+    def _doubt(self, taken: list[object], named: Named) -> None:
         """Warn of numbers that no machine has, as those in another unit are."""
         given = dict(zip((name for name, _ in self.places), taken, strict=False)) | named
         for name, limits in self.usual.items():
@@ -141,7 +140,7 @@ class _Border:
         beyond = n - len(self.places)
         return self.places[:n] if beyond <= 0 else self.places + self.rest * beyond
 
-    def _label(self, args: tuple[Any, ...], named: dict[str, Any]) -> str:
+    def _label(self, args: Given, named: Named) -> str:
         """The function and, where it makes something that has a name, that name."""
         by_place = dict(zip((name for name, _ in self.places), args, strict=False))
         made = (by_place | named).get("name")
@@ -152,7 +151,7 @@ class _Border:
         return (owner if self.name == "__init__" else f"{owner}.{self.name}") + about
 
 
-def _taken(name: str, take: Taken | None, value: Any) -> Any:
+def _taken(name: str, take: Taken | None, value: object) -> object:
     if take is None:
         return value
     try:

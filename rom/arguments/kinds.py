@@ -5,9 +5,10 @@ import collections.abc
 import math
 import operator
 import os
+import sys
 import types
 import typing
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sized
 from dataclasses import dataclass, replace
 from inspect import Parameter, signature
 from numbers import Integral, Real
@@ -23,7 +24,7 @@ from rom.errors import ConfigError, RomError
 
 MAX_NUMBER = 1e150  # the square of it is still a finite number
 LARGEST_WHOLE = 2**63 - 1  # that compiled code can count to
-KINDS_OF_NUMBERS = {  # scalar type of an array -> kinds of types that may stand for it
+KINDS_OF_NUMBERS: dict[Any, str] = {  # scalar type of an array -> kinds that may stand for it
     np.bool_: "b",
     np.int64: "iu",
     np.integer: "iu",
@@ -45,6 +46,7 @@ SOURCES = {  # class -> where its objects come from, for people who have somethi
     "Solution": "from rom.simulate",
 }
 EXAMPLE_VALUES = {"n_modes": 20, "order": 3}  # of arguments, in what a message proposes to write
+Take = Callable[[Any], Any]  # gives what the function gets, or raises
 ARRAY_LIKE = frozenset(typing.get_args(npt.ArrayLike))  # none from NumPy 2.5 on: a kind by itself
 
 
@@ -55,7 +57,7 @@ class Unfit(Exception):
     A sentence is said of it behind its name where that is more than what is wanted.
     """
 
-    value: Any
+    value: object
     wanted: str
     place: str = ""
     sentence: str = ""
@@ -71,9 +73,9 @@ class Taken:
     """What a function takes for one argument."""
 
     words: str
-    take: Callable[[Any], Any]  # gives what the function gets, or raises
+    take: Take
 
-    def __call__(self, value: Any) -> Any:
+    def __call__(self, value: object) -> object:
         """The value as the function gets it."""
         try:
             return self.take(value)
@@ -81,18 +83,24 @@ class Taken:
             raise Unfit(value, self.words) from error
 
 
-class Names(dict[str, Any]):
+class _Names(dict[str, object]):
     """Names in the annotations of a module; unknown ones are classes known by name only."""
 
-    def __missing__(self, name: str) -> Any:
+    def __missing__(self, name: str) -> object:
         return getattr(builtins, name, None) or _Named(name, (), {})
 
 
 class _Named(type):
     """A class that is not imported here."""
 
-    def __instancecheck__(cls, value: Any) -> bool:
+    def __instancecheck__(cls, value: object) -> bool:
         return any(kind.__name__ == cls.__name__ for kind in type(value).__mro__)
+
+
+def parameters_of(function: Callable[..., object]) -> list[Parameter]:
+    """Its parameters, with annotations that are written as text read as Python would."""
+    names = _Names(vars(sys.modules[function.__module__]))
+    return list(signature(function, locals=names, eval_str=True).parameters.values())
 
 
 # records that the layers do not let every module import
@@ -103,47 +111,43 @@ AnySector = Annotated[Any, _Named("CyclicSector", (), {})]
 AnySolution = Annotated[Any, _Named("Solution", (), {})]
 
 
-def evaluated(annotation: Any, known: Names) -> Any:
-    """What an annotation stands for that is written as text."""
-    if isinstance(annotation, str):
-        return eval(annotation, {}, known)  # our own source, as Python would
-    return annotation
-
-
-def taken_by(annotation: Any, known: Names) -> Taken | None:
+def taken_by(annotation: object) -> Taken | None:
     """What an annotation takes; None for anything."""
-    annotation = evaluated(annotation, known)
     origin, inner = typing.get_origin(annotation), typing.get_args(annotation)
     if annotation in PLAIN_KINDS:
         return PLAIN_KINDS[annotation]
     if origin is Annotated:
-        return _annotated(inner[0], inner[1], known)
+        return _annotated(inner[0], inner[1])
     if origin in (typing.Union, types.UnionType):
-        return _one_of([taken_by(kind, known) for kind in _alternatives(inner)])
+        return _one_of([taken_by(kind) for kind in _alternatives(inner)])
     if origin is typing.Literal:
         return _word_of(inner)
     if origin is np.ndarray:
         return _array(*typing.get_args(inner[1]))
     if origin is tuple and inner[-1] is not ...:
-        return _row([taken_by(kind, known) for kind in inner])
+        return _row([taken_by(kind) for kind in inner])
     if origin in (tuple, list, collections.abc.Sequence):
-        return _several(taken_by(inner[0], known), list if origin is list else tuple)
+        return _several(taken_by(inner[0]), list if origin is list else tuple)
     if origin in (dict, Mapping):
-        return _mapping(*(taken_by(kind, known) for kind in inner))
+        return _mapping(*map(taken_by, inner))
     if origin is collections.abc.Callable:
         return ANY_FUNCTION
+    if isinstance(annotation, str):  # within another one
+        annotation = _Named(annotation, (), {})
     return _instance(annotation) if isinstance(annotation, type) else None
 
 
-def _annotated(kind: Any, more: Any, known: Names) -> Taken:
+def _annotated(kind: object, more: object) -> Taken | None:
     """A class by its name; or what a kind takes, in other words or within limits."""
     if isinstance(more, type):
         return _instance(more)
-    taken = taken_by(kind, known)
-    return _limited(more, taken) if isinstance(more, Quantity | Whole) else _in_words(more, taken)
+    taken = taken_by(kind)
+    if isinstance(more, Quantity | Whole):
+        return _limited(more, taken)
+    return _in_words(more, taken) if isinstance(more, str) else taken
 
 
-def _alternatives(kinds: Iterable[Any]) -> list[Any]:
+def _alternatives(kinds: Iterable[object]) -> list[object]:
     """Members of a union; those that make up an array-like or a path stand for one thing."""
     found = list(kinds)
     if ARRAY_LIKE and ARRAY_LIKE.issubset(found):
@@ -154,7 +158,7 @@ def _alternatives(kinds: Iterable[Any]) -> list[Any]:
 
 
 def _in_words(words: str, taken: Taken | None) -> Taken:
-    def take(value: Any) -> Any:
+    def take(value: object) -> object:
         try:
             return value if taken is None else taken(value)
         except Unfit as unfit:
@@ -169,7 +173,7 @@ def _limited(kind: Quantity | Whole, taken: Taken | None) -> Taken:
     one = taken or ANY_VALUE
     words = kind.words if isinstance(kind, Whole) else one.words
 
-    def take(value: Any) -> Any:
+    def take(value: object) -> object:
         found = one.take(value)
         if fault := kind.fault(found):
             raise Unfit(value, words, sentence=fault, error=kind.error)
@@ -184,7 +188,7 @@ def _one_of(several: list[Taken | None]) -> Taken | None:
         return None
     words = _either([take.words for take in takes] + ["None"] * (NONE_ONLY in several))
 
-    def take(value: Any) -> Any:
+    def take(value: object) -> object:
         if value is None and NONE_ONLY in several:
             return None
         deepest = Unfit(value, words)
@@ -202,28 +206,36 @@ def _either(words: list[str]) -> str:
     return " or ".join([", ".join(words[:-1]), words[-1]] if words[1:] else words)
 
 
-def _word_of(known: tuple[Any, ...]) -> Taken:
-    def take(value: Any) -> Any:
-        if np.ndim(value):  # which NumPy would compare entry by entry
-            raise TypeError(value)
-        return known[known.index(value)]
+def _such(fits: Callable[[Any], object], become: Take = lambda value: value) -> Take:
+    """Takes what fits, as it is or as what it becomes."""
 
+    def take(value: object) -> object:
+        if not fits(value):
+            raise TypeError(value)
+        return become(value)
+
+    return take
+
+
+def _word_of(known: tuple[object, ...]) -> Taken:
+    def fits(value: npt.ArrayLike) -> bool:
+        return not np.ndim(value) and value in known  # an array would be compared by entries
+
+    take = _such(fits, lambda value: known[known.index(value)])
     return Taken(_either(list(map(repr, known))), take)
 
 
 def _instance(kind: type) -> Taken:
     verbs = _verbs(kind)
 
-    def take(value: Any) -> Any:
+    def fits(value: object) -> bool:
         if isinstance(value, type) and not issubclass(kind, type):
-            raise TypeError(value)  # it may have the verbs, but not the values
-        fits = (hasattr(type(value), verb) or hasattr(value, verb) for verb in verbs)
-        if not (all(fits) if verbs else isinstance(value, kind)):
-            raise TypeError(kind)
-        return value
+            return False  # it may have the verbs, but not the values
+        known = (hasattr(type(value), verb) or hasattr(value, verb) for verb in verbs)
+        return all(known) if verbs else isinstance(value, kind)
 
     source = SOURCES.get(kind.__name__)
-    return Taken(f"of type {kind.__name__}" + (f" ({source})" if source else ""), take)
+    return Taken(f"of type {kind.__name__}" + (f" ({source})" if source else ""), _such(fits))
 
 
 def call_of(kind: type) -> str:
@@ -245,7 +257,7 @@ def _verbs(kind: type) -> set[str]:
 def _several(one: Taken | None, kind: type) -> Taken:
     what = "" if one is None else f", each {one.words}"
 
-    def take(value: Any) -> Any:
+    def take(value: Iterable[object]) -> object:
         if isinstance(value, str) and one is ANY_TEXT:
             return kind([value])
         if isinstance(value, str | bytes | Mapping):
@@ -258,16 +270,18 @@ def _several(one: Taken | None, kind: type) -> Taken:
 def _row(takes: list[Taken | None]) -> Taken:
     each = [ANY_VALUE if take is None else take for take in takes]
 
-    def take(value: Any) -> Any:
-        if isinstance(value, str | bytes | Mapping) or len(value) != len(each):
-            raise TypeError(value)
+    def fits(value: Sized) -> bool:
+        return not isinstance(value, str | bytes | Mapping) and len(value) == len(each)
+
+    def become(value: Iterable[object]) -> tuple[object, ...]:
         pairs = zip(each, enumerate(value), strict=True)
         return tuple(x for one, item in pairs for x in _each(one, [item]))
 
+    take = _such(fits, become)
     return Taken(f"a row of {len(each)} ({', '.join(one.words for one in each)})", take)
 
 
-def _each(one: Taken, items: Iterable[tuple[Any, Any]]) -> Iterator[Any]:
+def _each(one: Taken, items: Iterable[tuple[object, object]]) -> Iterator[object]:
     for key, x in items:
         try:
             yield one(x)
@@ -278,9 +292,7 @@ def _each(one: Taken, items: Iterable[tuple[Any, Any]]) -> Iterator[Any]:
 def _mapping(key: Taken | None, one: Taken | None) -> Taken:
     words = "a dictionary" + (f" whose values are {one.words}" if one else "")
 
-    def take(value: Any) -> Any:
-        if not isinstance(value, Mapping):
-            raise TypeError(value)
+    def become(value: Mapping[object, object]) -> Mapping[object, object]:
         for name in value:
             (key or ANY_VALUE)(name)
         # one that makes its values when they are asked for may take long: they are not asked for
@@ -288,17 +300,17 @@ def _mapping(key: Taken | None, one: Taken | None) -> Taken:
             return value
         return dict(zip(value, _each(one, value.items()), strict=True))
 
-    return Taken(words, take)
+    return Taken(words, _such(lambda value: isinstance(value, Mapping), become))
 
 
-def _array(scalar: Any) -> Taken | None:
+def _array(dtype: Any) -> Taken | None:
     """An array that was computed; whoever uses it judges its entries."""
-    scalar = typing.get_origin(scalar) or scalar
+    scalar = typing.get_origin(dtype) or dtype
     if scalar not in KINDS_OF_NUMBERS:
         return None
     kinds = KINDS_OF_NUMBERS[scalar]
 
-    def take(value: Any) -> Any:
+    def take(value: object) -> object:
         found = _numbers(value, kinds)
         return value if isinstance(value, np.ndarray) else found.astype(scalar)
 
@@ -306,14 +318,14 @@ def _array(scalar: Any) -> Taken | None:
     return Taken(words.get(kinds, "an array of numbers"), take)
 
 
-def _array_like(value: Any) -> Any:
+def _array_like(value: object) -> object:
     found = _numbers(value, "iuf")
     for entry in (found.min(), found.max()) if found.size else ():
         _number(entry)
     return value
 
 
-def _numbers(value: Any, kinds: str) -> npt.NDArray[Any]:
+def _numbers(value: object, kinds: str) -> npt.NDArray[Any]:
     given = isinstance(value, np.ndarray)
     if not given:  # refuses rows of unequal length, of which NumPy would make objects
         np.array(value, dtype=complex)
@@ -336,40 +348,18 @@ def _number(value: Any) -> Any:
     return value
 
 
-def _whole(value: Any) -> int:
+def _is_whole(value: object) -> bool:
     if isinstance(value, bool) or not isinstance(value, Integral):
-        raise TypeError(value)
-    whole = operator.index(value)
-    if abs(whole) > LARGEST_WHOLE:
-        raise ValueError(value)
-    return whole
+        return False
+    return abs(operator.index(value)) <= LARGEST_WHOLE
 
 
-def _truth(value: Any) -> bool:
-    if not isinstance(value, bool | np.bool_):
-        raise TypeError(value)
-    return bool(value)
-
-
-def _path(value: Any) -> Any:
+def _is_path(value: str | os.PathLike[str]) -> bool:
     text = os.fspath(value)
-    if not isinstance(text, str) or "\0" in text:
-        raise TypeError(value)
-    return value
+    return isinstance(text, str) and "\0" not in text
 
 
-def _such(fits: Callable[[Any], bool]) -> Callable[[Any], Any]:
-    """Takes what fits as it is."""
-
-    def take(value: Any) -> Any:
-        if not fits(value):
-            raise TypeError(value)
-        return value
-
-    return take
-
-
-def _text(value: Any) -> str:
+def _text(value: object) -> str:
     if not isinstance(value, str):
         name = getattr(value, "name", None)
         raise Unfit(value, "a text" + (f": write {name!r}" if isinstance(name, str) else ""))
@@ -380,12 +370,12 @@ ANY_VALUE = Taken("anything", lambda value: value)
 NONE_ONLY = Taken("None", _such(lambda value: value is None))
 ANY_TEXT = Taken("a text", _text)
 ANY_FUNCTION = Taken("a function", _such(callable))
-PLAIN_KINDS: dict[Any, Taken | None] = {
+PLAIN_KINDS: dict[object, Taken | None] = {
     float: Taken("a finite number", _number),
-    int: Taken("a whole number", _whole),
-    bool: Taken("True or False", _truth),
+    int: Taken("a whole number", _such(_is_whole, operator.index)),
+    bool: Taken("True or False", _such(lambda value: isinstance(value, bool | np.bool_), bool)),
     str: ANY_TEXT,
-    Path: Taken("a path", _path),
+    Path: Taken("a path", _such(_is_path)),
     npt.ArrayLike: Taken("finite numbers", _array_like),
     type(None): NONE_ONLY,
     None: NONE_ONLY,

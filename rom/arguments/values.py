@@ -5,7 +5,7 @@ import operator
 import reprlib
 from collections.abc import Iterable
 from numbers import Integral, Real
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 import numpy.typing as npt
@@ -98,7 +98,7 @@ def rows_at(name: str, at: Any, A: npt.NDArray[Any]) -> npt.NDArray[Any]:
     return A[wanted.astype(np.int64)]
 
 
-def is_number(value: Any) -> bool:
+def is_number(value: object) -> TypeGuard[float]:
     """Whether a value is one finite real number; True and False are none."""
     try:
         return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)

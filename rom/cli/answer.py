@@ -8,12 +8,14 @@ from typing import Any
 
 from rom.model import Report
 
+Data = dict[str, Any]  # for ``--json``: plain numbers, texts, lists, dictionaries
+
 
 @dataclass(frozen=True, slots=True)
 class Answer:
     """Result of a verb; nothing is printed or written before the verb has come to its end."""
 
-    data: dict[str, Any]  # for ``--json``: plain numbers, texts, lists, dictionaries
+    data: Data
     text: str  # for people
     write: Callable[[], object] | None = None  # makes the output files, on one rank
     failed: tuple[str, ...] = field(default=())  # what did not hold: exit code 5
@@ -32,7 +34,7 @@ def table(header: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
     )
 
 
-def report_data(report: Report) -> dict[str, Any]:
+def report_data(report: Report) -> Data:
     """A report for ``--json``."""
     rows = [
         {"quantity": r.quantity, "value": r.value, "limit": r.limit, "ok": r.ok}
@@ -46,12 +48,12 @@ def failures(report: Report) -> tuple[str, ...]:
     return tuple(f"{r.quantity} = {r.value:.5g}, limit {r.limit}" for r in report.failures)
 
 
-def to_json(data: Any) -> str:
+def to_json(data: object) -> str:
     """Strict JSON: numbers that are not finite become null."""
     return json.dumps(_strict(data), indent=2, ensure_ascii=False, default=_plain)
 
 
-def _strict(value: Any) -> Any:
+def _strict(value: object) -> object:
     if isinstance(value, float):
         return float(value) if math.isfinite(value) else None
     if isinstance(value, dict):
@@ -61,6 +63,6 @@ def _strict(value: Any) -> Any:
     return value
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: object) -> object:
     """NumPy scalars and arrays, paths."""
     return _strict(value.tolist()) if hasattr(value, "tolist") else str(value)

@@ -4,7 +4,21 @@ import argparse
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from rom.cli.options import faces, meshing, number_or_text, unique
+from rom.arguments import Quantity, Whole
+from rom.cli.options import (
+    count,
+    faces,
+    meshing,
+    names,
+    number,
+    number_or_text,
+    numbers,
+    option,
+    positive,
+    unique,
+)
+from rom.config.component_keys import TABLE
+from rom.config.keys import Kind, Text, Words
 from rom.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -12,11 +26,8 @@ if TYPE_CHECKING:
     from rom.config.mechanism import MechanismFile
 
 TOML_SUFFIX = ".toml"
-COMMON_OPTIONS = {
-    "verb", "file", "run", "output", "force", "json", "quiet", "verbose", "strict", "debug",
-    "version", "resume", "parser",
-}  # fmt: skip
-COMMON_OPTIONS |= {"trust", "time_limit", "memory_limit"}  # no file may say them
+COMMON_OPTIONS = "verb file run output force json quiet verbose strict debug version resume parser"
+UNSAID_OPTIONS = "trust time_limit memory_limit"  # no file may say them
 Changes = dict[tuple[str, ...], Any]
 SECTION_KEYS = {  # section: keys whose options are called as they are
     "material": "E nu rho",
@@ -37,12 +48,39 @@ MOTION_KEYS: dict[str, tuple[str, ...]] = {
     "film": ("output", "film"),
     "history": ("output", "history"),
 }
+VALUES: dict[type, Callable[[str], object]] = {Whole: count, Words: names, Text: str}  # of options
 REPLACED_KEYS = {  # an option takes the place of what contradicts it
     "modes": (("reduction", "f_max"), ("reduction", "tol")),
     "f_max": (("reduction", "modes"),),
     "tol": (("reduction", "modes"),),
     "damping_ratio": (("damping", "alpha"), ("damping", "beta")),
 }
+
+
+def keyed(to: argparse._ActionsContainer, *several: str) -> None:
+    """Add options, each by its flags and what stands for its value, as keys of files are meant."""
+    for words in several:
+        place = PLACES[words.partition("--")[2].split()[0].replace("-", "_")]
+        kind: Any = TABLE
+        for name in place:
+            key = next(key for key in kind.keys if key.name == name)
+            kind = key.kind
+        unit = getattr(kind, "unit", "1")
+        about = key.about[0].lower() + key.about[1:].rstrip(".").replace("`", "")
+        about += f" [{unit}]" if unit != "1" else ""
+        if key.default:
+            default = key.default if isinstance(key.default, tuple) else (key.default,)
+            about += f" (default {', '.join(map(str, default))})"
+        how = {"choices": kind.choices} if getattr(kind, "choices", ()) else {}
+        option(to, words, about, _value(kind), default=key.default, **how)
+
+
+def _value(kind: Kind) -> Callable[[str], object] | None:
+    """What reads the value of an option in SI; None for a flag, which has none."""
+    if isinstance(kind, Quantity):
+        one = number if kind.low < 0.0 else positive
+        return one if kind.shapes == ((),) else numbers
+    return VALUES.get(type(kind))
 
 
 def described(args: argparse.Namespace) -> bool:
@@ -67,18 +105,18 @@ def mechanism(args: argparse.Namespace, *extra: str) -> "MechanismFile":
 def changes(given: dict[str, Any], places: dict[str, tuple[str, ...]], extra: Any) -> Changes:
     """What options say, by the keys of the file."""
     found: Changes = {}
-    for option, value in given.items():
-        if option in COMMON_OPTIONS or option in extra:
+    for name, value in given.items():
+        if name in (*COMMON_OPTIONS.split(), *UNSAID_OPTIONS.split(), *extra):
             continue
-        if option in places:
-            found |= dict.fromkeys(REPLACED_KEYS.get(option, ()))
-            found[places[option]] = list(value) if isinstance(value, tuple) else value
-        elif option in SPECIAL_KEYS and places is PLACES:
-            found |= SPECIAL_KEYS[option](value)
+        if name in places:
+            found |= dict.fromkeys(REPLACED_KEYS.get(name, ()))
+            found[places[name]] = list(value) if isinstance(value, tuple) else value
+        elif name in SPECIAL_KEYS and places is PLACES:
+            found |= SPECIAL_KEYS[name](value)
         else:
-            name = "--" + option.replace("_", "-")
             raise ConfigError(
-                f"{name} does not go with a {TOML_SUFFIX} file.", hint="Write it there."
+                f"--{name.replace('_', '-')} does not go with a {TOML_SUFFIX} file.",
+                hint="Write it there.",
             )
     return found
 

@@ -2,16 +2,16 @@
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rom.cli.options import assignment, material, option, reading, require, unique
 from rom.errors import ConfigError
 from rom.names import is_whole, named
 
 if TYPE_CHECKING:
-    from rom.model import FEModel
+    from rom.model import FEModel, Index
 
-GEOMETRY_OPTIONS: dict[str, Any] = {  # options of a geometry, and what they are when not given
+GEOMETRY_OPTIONS: dict[str, object] = {  # options of a geometry, and what they are when not given
     "E": None,
     "nu": None,
     "rho": None,
@@ -42,15 +42,6 @@ def add_matrices(parser: argparse.ArgumentParser) -> None:
     option(group, "--units", "SI (default), mm-t-s or mm-kg-ms", str)
 
 
-def check_geometry(args: argparse.Namespace) -> None:
-    """A geometry needs a material, and options of matrices need a mass."""
-    given = [f"--{name}" for name in ("nodes", "set", "units") if getattr(args, name)]
-    if given:
-        raise ConfigError(f"{given[0]} needs --mass FILE: it is for matrices.")
-    hint = "For matrices of another program give --mass and --nodes instead."
-    require(solid_options(args), hint)
-
-
 def solid_options(args: argparse.Namespace) -> dict[str, float | None]:
     """What a geometry needs and matrices do not, by option."""
     names = ("E", "nu", "rho") if args.mass is None else ()
@@ -61,7 +52,11 @@ def read_model(args: argparse.Namespace) -> "FEModel":
     """The model that options ask for, of a geometry or of matrices."""
     if args.mass is not None:
         return read_matrices(args)
-    check_geometry(args)
+    given = [f"--{name}" for name in ("nodes", "set", "units") if getattr(args, name)]
+    if given:
+        raise ConfigError(f"{given[0]} needs --mass FILE: it is for matrices.")
+    hint = "For matrices of another program give --mass and --nodes instead."
+    require(solid_options(args), hint)
     numbers = {"material": material(args), "degree": args.degree, "solver": args.solver}
     how = numbers | reading(args)  # refused before dolfinx is loaded
     from rom.fe.elasticity import model
@@ -71,6 +66,7 @@ def read_model(args: argparse.Namespace) -> "FEModel":
 
 def read_matrices(args: argparse.Namespace) -> "FEModel":
     """The model of the matrices the options name."""
+    from rom.config.component import source
     from rom.io.matrices.read_model import read_model
 
     odd = [
@@ -93,13 +89,7 @@ def read_matrices(args: argparse.Namespace) -> "FEModel":
     )
 
 
-def source(text: str) -> Any:
-    """A file, or (file, name) from FILE:NAME."""
-    path, colon, name = text.rpartition(":")
-    return (path, name) if colon and path and not Path(text).exists() else text
-
-
-def _sets(args: argparse.Namespace, names: list[str]) -> dict[str, Any]:
+def _sets(args: argparse.Namespace, names: list[str]) -> "dict[str, list[int] | Index]":
     """Labels of the nodes of each interface."""
     from rom.io.matrices.node_files import read_node_sets
 

@@ -1,9 +1,9 @@
 """Options several verbs share, and the forms their values may take."""
 
 import argparse
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from rom.errors import ConfigError
 from rom.names import check_once, is_whole
@@ -11,7 +11,9 @@ from rom.names import check_once, is_whole
 if TYPE_CHECKING:
     from rom.model import Material
 
-
+T = TypeVar("T")
+Kind = Callable[[str], object]  # what reads the value of an option
+Keywords = dict[str, Any]
 BYTES_PER_GIGABYTE = 1e9
 OUTPUT_FLAG = "-o/--output"
 
@@ -69,12 +71,17 @@ def vector(text: str) -> tuple[float, float, float]:
     return x, y, z
 
 
+def numbers(text: str) -> tuple[float, ...]:
+    """Numbers with commas."""
+    return tuple(map(number, text.split(",")))
+
+
 def names(text: str) -> tuple[str, ...]:
     """Names with commas."""
     return tuple(filter(None, (part.strip() for part in text.split(","))))
 
 
-def require(needed: Mapping[str, Any], hint: str = "") -> None:
+def require(needed: Mapping[str, object], hint: str = "") -> None:
     """Name at once all options that a verb needs and nobody gave."""
     if missing := [name for name, value in needed.items() if value is None or value == []]:
         raise ConfigError(f"the following arguments are required: {', '.join(missing)}.", hint=hint)
@@ -88,7 +95,7 @@ def assignment(text: str) -> tuple[str, str]:
     return name, value
 
 
-def number_or_text(pair: tuple[str, str]) -> tuple[str, Any]:
+def number_or_text(pair: tuple[str, str]) -> tuple[str, float | str]:
     """The value of an assignment as a number where it is one."""
     name, value = pair
     try:
@@ -97,25 +104,27 @@ def number_or_text(pair: tuple[str, str]) -> tuple[str, Any]:
         return name, value
 
 
-def unique(pairs: list[tuple[str, Any]], option: str) -> dict[str, Any]:
+def unique(pairs: list[tuple[str, T]], option: str) -> dict[str, T]:
     """A dictionary of assignments."""
     check_once([name for name, _ in pairs], option)
     return dict(pairs)
 
 
-def option(to: Any, words: str, about: str, kind: Any = None, **more: Any) -> None:
+def option(
+    to: argparse._ActionsContainer, words: str, about: str, kind: Kind | None = None, **more: Any
+) -> None:
     """Add an option to a parser or group, by its flags and, if need be, what stands for the value.
 
     One without a kind is a flag; assignments may be repeated, names be missing.
     """
     flags = [word for word in words.split() if word.startswith("-")]
     shown = [word for word in words.split() if word not in flags]
-    how = {"action": "store_true"} if kind is None else {"type": kind} | NOT_GIVEN.get(kind, {})
-    how |= {"metavar": shown[0]} if shown else {}
-    to.add_argument(*flags, help=about, **(how | more))
+    how: Keywords = {"action": "store_true"} if kind is None else {"type": kind}
+    how |= NOT_GIVEN.get(kind, {}) | ({"metavar": shown[0]} if shown else {}) | more
+    to.add_argument(*flags, help=about, **how)
 
 
-NOT_GIVEN: dict[Any, dict[str, Any]] = {
+NOT_GIVEN: dict[Kind | None, Keywords] = {
     assignment: {"action": "append", "default": []},
     names: {"default": ()},
 }
@@ -162,18 +171,6 @@ def add_solid(parser: argparse.ArgumentParser) -> None:
     option(parser, "--rho", "density [kg/m^3]", number)
 
 
-def add_material(parser: argparse.ArgumentParser) -> None:
-    """Elastic solid and element degree."""
-    add_solid(parser)
-    about = "degree of the displacement, 1 to 3 (default 2)"
-    option(parser, "--degree", about, count, default=2)
-    about = (
-        "auto (default: direct where its factor fits, else out-of-core, else iterative), direct, "
-        "low-rank, out-of-core, low-rank+out-of-core, iterative"
-    )
-    option(parser, "--solver", about, str, default="auto")
-
-
 def add_interfaces(parser: argparse.ArgumentParser) -> None:
     """Interfaces by name and kind."""
     about = (
@@ -183,7 +180,7 @@ def add_interfaces(parser: argparse.ArgumentParser) -> None:
     option(parser, "-i --interface NAME=KIND", about, assignment)
 
 
-def reading(args: argparse.Namespace) -> dict[str, Any]:
+def reading(args: argparse.Namespace) -> Keywords:
     """Keyword arguments of `rom.fe.mesh.read.read_mesh`."""
     pairs = [number_or_text(pair) for pair in args.parameter]
     return {
@@ -214,7 +211,7 @@ def face(text: str, option: str) -> str:
     return text
 
 
-def meshing(args: argparse.Namespace) -> dict[str, Any]:
+def meshing(args: argparse.Namespace) -> Keywords:
     """Those of them that `add_meshing` asks for."""
     memory = None if args.memory_limit is None else BYTES_PER_GIGABYTE * args.memory_limit
     return {"trust": args.trust, "time_limit": args.time_limit, "memory_limit": memory}
@@ -227,9 +224,12 @@ def material(args: argparse.Namespace) -> "Material":
     return Material(E=args.E, nu=args.nu, rho=args.rho)
 
 
-def options_of(parser: argparse.ArgumentParser, verb: str | None) -> list[str]:
-    """Long options of a verb."""
-    for action in parser._actions:
-        if isinstance(action, argparse._SubParsersAction) and verb in action.choices:
-            parser = action.choices[verb]
+def verb_parsers(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
+    """{verb: its parser} of the whole grammar."""
+    (verbs,) = (a for a in parser._actions if isinstance(a, argparse._SubParsersAction))
+    return dict(verbs.choices)
+
+
+def options_of(parser: argparse.ArgumentParser) -> list[str]:
+    """Long options."""
     return sorted(s for s in parser._option_string_actions if s.startswith("--"))

@@ -4,7 +4,6 @@ import argparse
 import os
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any
 
 from rom.cli.options import option
 from rom.cli.ranks import on_first_rank
@@ -35,6 +34,14 @@ def checked(
     return on_first_rank(lambda: check_replaceable(path, kind, inputs=sources, force=args.force))
 
 
+def check_encoder(paths: Iterable[Path]) -> None:
+    """Refuse a film that cannot be made before the motion is computed."""
+    if any(path.suffix == ".mp4" for path in paths):
+        from rom.view.canvas.films import encoder
+
+        encoder()
+
+
 def claim(args: argparse.Namespace) -> Path:
     """The folder of ``-o``, kept from other runs until the files of this one are written."""
     from rom.io.ours import claimed
@@ -44,7 +51,7 @@ def claim(args: argparse.Namespace) -> Path:
     return folder
 
 
-def files_in(values: Any) -> Iterator[Path]:
+def files_in(values: object) -> Iterator[Path]:
     """The files that a description names, but for those it writes."""
     if isinstance(values, Path):
         yield values

@@ -3,10 +3,11 @@
 import argparse
 from collections.abc import Sequence
 from contextlib import suppress
-from typing import Any, NoReturn
+from types import ModuleType
+from typing import NoReturn
 
 from rom import fields
-from rom.cli.options import options_of
+from rom.cli.options import options_of, verb_parsers
 from rom.config.keys import nearest
 from rom.errors import ConfigError, UnknownNameError
 
@@ -38,7 +39,7 @@ examples:
 class ShowSchema(argparse.Action):
     """Prints the JSON Schema of the answer of a verb and leaves, whatever else is missing."""
 
-    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
         """Print and leave."""
         from rom.cli.answer import to_json
         from rom.cli.schemas import schema
@@ -62,49 +63,33 @@ class Parser(argparse.ArgumentParser):
         raise ConfigError(f"{message}.", hint=hint)
 
     def parse_args(  # type: ignore[override]  # one signature for its three overloads
-        self, args: Sequence[str] | None = None, namespace: Any = None
-    ) -> Any:
+        self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
+    ) -> argparse.Namespace:
         """Parse, and suggest a spelling for an option that does not exist."""
         found, unknown = self.parse_known_args(args, namespace)
         if unknown:
-            known = options_of(self, getattr(found, "verb", None))
-            raise ConfigError(
-                f"unknown option or argument {unknown[0]!r}.", hint=suggestion(unknown[0], known)
-            )
+            known = options_of(verb_parsers(self).get(found.verb, self))
+            hint = nearest(unknown[0].partition("=")[0], known)
+            raise ConfigError(f"unknown option or argument {unknown[0]!r}.", hint=hint)
         return found
 
     def _check_value(self, action: argparse.Action, value: object) -> None:
         if action.choices is not None and value not in action.choices:
             fields.find("verbs", str(value))  # of a field that is not here
-            known = [str(choice) for choice in action.choices]
-            raise ConfigError(
-                f"the {action.dest} {str(value)!r} does not exist.",
-                hint=suggestion(str(value), known),
-            )
+            hint = nearest(str(value), action.choices)
+            raise ConfigError(f"the {action.dest} {str(value)!r} does not exist.", hint=hint)
 
 
-def suggestion(word: str, known: list[str]) -> str:
-    """The nearest known word, and the list of them."""
-    return nearest(word.partition("=")[0], known)
-
-
-def given(argv: list[str]) -> dict[str, Any]:
+def given(argv: list[str]) -> dict[str, object]:
     """Only the options that a command line says, by their destination."""
     parser = build_parser()
-    for sub in _verb_parsers(parser):
+    for sub in verb_parsers(parser).values():
         for action in sub._actions:
             action.default = argparse.SUPPRESS
     return dict(vars(parser.parse_args(argv)))
 
 
-def _verb_parsers(parser: argparse.ArgumentParser) -> list[argparse.ArgumentParser]:
-    for action in parser._actions:
-        if isinstance(action, argparse._SubParsersAction):
-            return list(action.choices.values())
-    return []
-
-
-def verb_modules() -> dict[str, Any]:
+def verb_modules() -> dict[str, ModuleType]:
     """{verb: its module}, those of fields too, which take none of the program."""
     first, last = (
         {name: fields.follow(f"rom.cli.verbs.{name}") for name in some}

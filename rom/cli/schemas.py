@@ -4,6 +4,7 @@ They are the contract: a key may be added, none removed or given another meaning
 version. Numbers that are not finite are null.
 """
 
+from collections.abc import Callable
 from typing import Any
 
 from rom.fields import find
@@ -12,24 +13,12 @@ Schema = dict[str, Any]
 SCHEMA_DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
-def text(about: str) -> Schema:
-    """A text."""
-    return {"type": "string", "description": about}
+def _plain(kind: object) -> Callable[[str], Schema]:
+    return lambda about: {"type": kind, "description": about}
 
 
-def number(about: str) -> Schema:
-    """A number, null when it is not finite."""
-    return {"type": ["number", "null"], "description": about}
-
-
-def whole(about: str) -> Schema:
-    """A whole number."""
-    return {"type": "integer", "description": about}
-
-
-def flag(about: str) -> Schema:
-    """True or false."""
-    return {"type": "boolean", "description": about}
+text, whole, flag = map(_plain, ("string", "integer", "boolean"))
+number = _plain(["number", "null"])  # null when it is not finite
 
 
 def each(item: Schema, about: str) -> Schema:
@@ -53,9 +42,24 @@ def record(about: str, optional: tuple[str, ...] = (), **keys: Schema) -> Schema
     }
 
 
+def rows(about: str, **keys: Schema) -> Schema:
+    """A list of objects with these keys."""
+    return each(record(about, (), **keys), about)
+
+
 def maybe(schema: Schema) -> Schema:
     """Or null."""
     return {"anyOf": [schema, {"type": "null"}], "description": schema["description"]}
+
+
+def metres(about: str) -> Schema:
+    """A place."""
+    return each(number("[m]"), f"{about} [m]")
+
+
+def direction(about: str) -> Schema:
+    """A vector of length one."""
+    return each(number("unit"), about)
 
 
 FILE, OUTPUT = text("the file read"), text("the file written")
@@ -64,15 +68,12 @@ REPORT = record(
     "outcome of checks",
     title=text("what was checked"),
     ok=flag("whether every row holds"),
-    rows=each(
-        record(
-            "one check",
-            quantity=text("what"),
-            value=number("its value"),
-            limit=text("its limit in words"),
-            ok=flag("whether it holds"),
-        ),
+    rows=rows(
         "the checks",
+        quantity=text("what"),
+        value=number("its value"),
+        limit=text("its limit in words"),
+        ok=flag("whether it holds"),
     ),
 )
 STIFFENED = {"geometric stiffness": each(text("load"), "unit loads it stiffens under")}
@@ -80,16 +81,13 @@ VERBS: dict[str, Schema] = {
     "doctor": record(
         "what is installed and works",
         rom=text("version of rom"),
-        findings=each(
-            record(
-                "one thing looked at",
-                topic=text("heading"),
-                name=text("what"),
-                value=text("version, place or number"),
-                state={"enum": ["ok", "note", "missing", "broken"], "description": "verdict"},
-                advice=text("what to type; empty if nothing"),
-            ),
+        findings=rows(
             "everything looked at",
+            topic=text("heading"),
+            name=text("what"),
+            value=text("version, place or number"),
+            state={"enum": ["ok", "note", "missing", "broken"], "description": "verdict"},
+            advice=text("what to type; empty if nothing"),
         ),
     ),
     "mesh": record(
@@ -110,26 +108,23 @@ VERBS: dict[str, Schema] = {
                 optional=("axis", "point"),
                 facets=whole("number of facets"),
                 nodes=whole("number of nodes"),
-                middle=each(number("[m]"), "middle of its box [m]"),
-                axis=each(number("unit"), "axis of its cylinder faces"),
-                point=each(number("[m]"), "on that axis, where joints sit [m]"),
+                middle=metres("middle of its box"),
+                axis=direction("axis of its cylinder faces"),
+                point=metres("on that axis, where joints sit"),
             ),
             "interfaces",
         ),
-        faces=each(
-            record(
-                "a face of a .step file, from its geometry; null is what it has not",
-                number=whole("by which it is picked"),
-                kind=text("plane, cylinder, cone, sphere, torus or other"),
-                area=number("[m^2]"),
-                middle=each(number("[m]"), "centroid [m]"),
-                radius=number("of a cylinder, a sphere or the tube of a torus [m]"),
-                axis=maybe(each(number("unit"), "axis of a cylinder, a cone or a torus")),
-                point=maybe(each(number("[m]"), "on that axis; centre of a sphere [m]")),
-                normal=maybe(each(number("unit"), "outward normal of a plane")),
-                name=text("interface it belongs to; may be empty"),
-            ),
-            "all faces, with --faces",
+        faces=rows(
+            "all faces of a .step file, with --faces; null is what one has not",
+            number=whole("by which it is picked"),
+            kind=text("plane, cylinder, cone, sphere, torus or other"),
+            area=number("[m^2]"),
+            middle=metres("centroid"),
+            radius=number("of a cylinder, a sphere or the tube of a torus [m]"),
+            axis=maybe(direction("axis of a cylinder, a cone or a torus")),
+            point=maybe(metres("on that axis; centre of a sphere")),
+            normal=maybe(direction("outward normal of a plane")),
+            name=text("interface it belongs to; may be empty"),
         ),
         quality=by_name(number("figure"), "figures of quality"),
         parameters=by_name(number("as used"), "those of the geometry that are numbers, e.g. lc"),
@@ -193,7 +188,7 @@ VERBS: dict[str, Schema] = {
         files=each(text("file"), "files written"),
         mass=number("[kg]"),
         gravity=each(number("[m/s^2]"), "gravity [m/s^2]"),
-        axis=each(number("unit"), "about which it turns"),
+        axis=direction("about which it turns"),
         t_end=number("duration [s]"),
         magnify=number("deformations are drawn so much larger"),
         frequencies=FREQUENCIES,
@@ -203,17 +198,14 @@ VERBS: dict[str, Schema] = {
         "figures of speed and memory; with --list the benchmarks",
         optional=("figures", "benchmarks"),
         benchmarks=by_name(text("what it measures"), "the benchmarks there are"),
-        figures=each(
-            record(
-                "one figure",
-                benchmark=text("its name"),
-                case=text("what was run"),
-                quantity=text("what was measured"),
-                value=number("the number"),
-                unit=text("its unit; empty for a ratio"),
-                aim=text("what it should be; empty if for information"),
-            ),
+        figures=rows(
             "what was measured",
+            benchmark=text("its name"),
+            case=text("what was run"),
+            quantity=text("what was measured"),
+            value=number("the number"),
+            unit=text("its unit; empty for a ratio"),
+            aim=text("what it should be; empty if for information"),
         ),
     ),
     "completion": record("completion", shell=text("bash or zsh"), text=text("the script")),

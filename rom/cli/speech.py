@@ -6,7 +6,6 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
 
 from rom.cli.answer import Answer, to_json
 from rom.errors import QualityGateError, RomError, RomWarning
@@ -67,7 +66,7 @@ def speaking(options: OutputOptions, *, verbose: bool) -> Iterator[list[str]]:
     """
     remarks: list[str] = []
 
-    def show(message: Any, category: type, *_: Any, **__: Any) -> None:
+    def show(message: object, category: type, *_: object, **__: object) -> None:
         text = " ".join(str(message).split())
         if not issubclass(category, RomWarning) or text in remarks:
             return

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from rom.arguments import Quantity, typed
 from rom.config.component_keys import TABLE
-from rom.config.document import Document, KeyPath, read_document
+from rom.config.document import Document, KeyPath, Values, read_document
 from rom.config.keys import Place, as_text, read_table, read_value
 from rom.config.methods import chosen
 from rom.errors import ConfigError, RomError
@@ -18,7 +18,12 @@ if TYPE_CHECKING:
     from rom.body.damping import ModalDamping, Rayleigh
     from rom.body.flexible import FlexibleBody
     from rom.body.nonlinear.ranges import Geometric
-    from rom.model import Attachment, FEModel
+    from rom.model import Attachment, FEModel, Material, Orthotropic
+
+    Solid = Material | Orthotropic
+
+
+COUNTS = {"modes": "n_modes", "shapes": "n_shapes", "steps": "n_steps"}  # key: their name in Python
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,9 +31,9 @@ class Described:
     """What a file describes."""
 
     document: Document
-    values: dict[str, Any]  # in SI, by the keys of its table
+    values: Values  # in SI, by the keys of its table
     # ``trust`` and limits of `read_mesh`, which no file can say
-    meshing: dict[str, Any] = field(default_factory=dict)
+    meshing: Values = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -51,7 +56,7 @@ class Component(Described):
         return self.values.get("output", {}).get("file")
 
     @property
-    def kinds(self) -> dict[str, Any]:
+    def kinds(self) -> Values:
         """Kinds of the interfaces, for `rom.reduce`."""
         from rom.reduction.interfaces.kinds import parsed
         from rom.reduction.interfaces.polynomial import FourierLegendre, Polynomial
@@ -66,7 +71,7 @@ class Component(Described):
         return found
 
     @property
-    def mesh(self) -> tuple[Path, dict[str, Any]]:
+    def mesh(self) -> tuple[Path, Values]:
         """File and keywords for `rom.fe.mesh.read.read_mesh`.
 
         Raises:
@@ -83,9 +88,8 @@ class Component(Described):
             name: self._parameter(name, value, scale)
             for name, value in geometry.get("parameters", {}).items()
         }
-        keywords = {"parameters": parameters, "faces": geometry.get("faces", {}), "scale": scale,
-                    "order": geometry.get("order")}  # fmt: skip
-        return geometry["file"], keywords | self.meshing
+        how = {"faces": geometry.get("faces", {}), "scale": scale, "order": geometry.get("order")}
+        return geometry["file"], {"parameters": parameters} | how | self.meshing
 
     def model(self) -> "FEModel":
         """The finite element model; a geometry needs FEniCSx.
@@ -115,22 +119,18 @@ class Component(Described):
 
         reduction, kinds = self.values["reduction"], self.kinds
         if not kinds:
-            raise ConfigError(
-                "the component has no interface.", where=str(self.document.path),
-                hint='For example [interfaces] and pin_a = "rbe2".',
-            )  # fmt: skip
+            where, hint = str(self.document.path), 'For example [interfaces] and pin_a = "rbe2".'
+            raise ConfigError("the component has no interface.", where=where, hint=hint)
         with self.at("reduction"):
             method = chosen(reduction, full=any(kind == "full" for kind in kinds.values()))
-        reference = reduction["reference"]
-        damping = self.damping()
-        return reduce(
-            self.model(), method=method, interfaces=kinds, damping=damping, name=self.name,
-            reference=reference[0] if len(reference) == 1 else reference,
-            stress=reduction["stress"], stiffening=reduction["stiffening"],
-            nonlinear=self.nonlinear(), certify=reduction["certificate"],
-        )  # fmt: skip
+        how: Values = {key: reduction[key] for key in ("reference", "stress", "stiffening")}
+        how |= {"method": method, "damping": self.damping(), "certify": reduction["certificate"]}
+        if len(how["reference"]) == 1:
+            (how["reference"],) = how["reference"]
+        how |= {"interfaces": kinds, "name": self.name}
+        return reduce(self.model(), nonlinear=self.nonlinear(), **how)
 
-    def material(self) -> Any:
+    def material(self) -> "Solid | dict[str, Solid]":
         """`Material`, `Orthotropic`, or a dictionary of them by region."""
         solids = self._section("material")
         if "regions" in solids:
@@ -165,22 +165,17 @@ class Component(Described):
         values = self.values["reduction"].get("nonlinear")
         if values is None:
             return None
-        loads = {name: (*x["force"], *x["moment"]) for name, x in values["loads"].items()}
+        given = {COUNTS.get(key, key): _tuples(value) for key, value in values.items()}
+        given["loads"] = {name: (*x["force"], *x["moment"]) for name, x in values["loads"].items()}
         with self.at("reduction", "nonlinear"):
-            return Geometric(
-                loads=loads, n_modes=values["modes"], tol=values["tol"],
-                n_shapes=values.get("shapes"), n_steps=values["steps"],
-                fixed=tuple(values["fixed"]), spin=tuple(values["spin"]),
-                about=tuple(values["about"]) if "about" in values else None,
-                snapshots=values["snapshots"], sampling=values.get("sampling"),
-            )  # fmt: skip
+            return Geometric(**given)
 
-    def _section(self, name: str) -> dict[str, Any]:
+    def _section(self, name: str) -> Values:
         if name not in self.values:
             raise ConfigError(f"[{name}] is missing; it is needed.", where=str(self.document.path))
         return self.values[name]
 
-    def _solid(self, values: dict[str, Any], *path: str) -> Any:
+    def _solid(self, values: Values, *path: str) -> "Solid":
         from rom.model import Material, Orthotropic
 
         with self.at(*path):
@@ -188,7 +183,7 @@ class Component(Described):
                 return Material(**values)
             return Orthotropic(**{k: _tuples(v) for k, v in values.items()})
 
-    def _parameter(self, name: str, value: Any, scale: float) -> Any:
+    def _parameter(self, name: str, value: object, scale: float) -> object:
         if not isinstance(value, str):
             return value
         symbol = value.lstrip("+-.0123456789eE ") or "1"
@@ -199,10 +194,8 @@ class Component(Described):
         place = Place(self.document, ("geometry", "parameters", name))
         if found.dimension == LENGTH:
             return float(read_value(Quantity("m"), value, place)) / scale
-        try:
+        with place.told():
             return in_si(value, symbol)
-        except ConfigError as error:
-            raise place.error(f"{place.name}: {error.message}", error.hint) from None
 
     def _attachments(self) -> "list[Attachment]":
         from rom.model import Attachment
@@ -219,22 +212,22 @@ class Component(Described):
         for name in ("material", "geometry"):
             if name in self.values:
                 raise Place(self.document, (name,)).error(f"matrices need no [{name}].")
-        sets: dict[str, Any] = {
+        sets: Values = {
             name: [int(x) for x in labels] for name, labels in m.get("sets", {}).items()
         }
         remaining = tuple(name for name in self.values.get("interfaces", {}) if name not in sets)
         sets |= read_node_sets(m["nodes"], remaining) if remaining else {}
-        sources = (self._source(m[name]) for name in ("stiffness", "mass"))
+        sources = (source(m[name], self.document.path.parent) for name in ("stiffness", "mass"))
         model = read_model(*sources, nodes=m["nodes"], interfaces=sets, units=m["units"])
         return replace(model, attachments=tuple(self._attachments()))
 
-    def _source(self, text: str) -> Any:
-        """A file beside the document, or (file, name) from FILE:NAME."""
-        folder = self.document.path.parent
-        path, colon, name = text.rpartition(":")
-        if colon and path and not (folder / text).exists():
-            return str(folder / path), name
-        return str(folder / text)
+
+def source(text: str, folder: Path = Path()) -> str | tuple[str, str]:
+    """A file in a folder, or (file, name) from FILE:NAME."""
+    path, colon, name = text.rpartition(":")
+    if colon and path and not (folder / text).exists():
+        return str(folder / path), name
+    return str(folder / text)
 
 
 @contextmanager
@@ -249,14 +242,14 @@ def located(document: Document, path: KeyPath) -> Iterator[None]:
         raise
 
 
-def _tuples(value: Any) -> Any:
+def _tuples(value: object) -> Any:
     return tuple(map(_tuples, value)) if isinstance(value, list) else value
 
 
 @typed
 def read_component(
     path: str | Path,
-    changes: Mapping[tuple[str, ...], Any] | None = None,
+    changes: Mapping[tuple[str, ...], object] | None = None,
     *,
     trust: bool = False,
     time_limit: float | None = None,
@@ -277,17 +270,15 @@ def read_component(
     """
     document = read_document(path)
     if "bodies" in document.data:
-        raise ConfigError(
-            "this is a mechanism; a component is needed.", where=document.where(("bodies",)),
-            hint="rom simulate moves it.",
-        )  # fmt: skip
+        where, hint = document.where(("bodies",)), "rom simulate moves it."
+        raise ConfigError("this is a mechanism; a component is needed.", where=where, hint=hint)
     for key, value in (changes or {}).items():
         change(document.data, key, value)
     meshing = {"trust": trust, "time_limit": time_limit, "memory_limit": memory_limit}
     return Component(document, read_table(TABLE, document), meshing)
 
 
-def change(data: dict[str, Any], key: tuple[str, ...], value: Any) -> None:
+def change(data: Values, key: tuple[str, ...], value: object) -> None:
     """Put a value at a place in nested tables; None removes what is there."""
     for name in key[:-1]:
         inner = data.setdefault(name, {})

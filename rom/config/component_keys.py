@@ -2,10 +2,11 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from rom.arguments import Number, Positive, Quantity, Whole
 from rom.config.declared import Declared
+from rom.config.document import Values
 from rom.config.keys import (
     Anything,
     Either,
@@ -21,7 +22,6 @@ from rom.config.keys import (
     Words,
 )
 from rom.config.methods import METHODS
-from rom.errors import ConfigError
 from rom.fe.mesh.picks import picks
 from rom.units import LENGTH, SYSTEMS, UNITS
 
@@ -42,7 +42,7 @@ class Solids:
     parts: ClassVar[dict[str, Table]] = {"isotropic": ISOTROPIC, "orthotropic": ORTHOTROPIC}
     summary: str = "isotropic or orthotropic table, or a table of them by region"
 
-    def read(self, value: Any, place: Place) -> dict[str, Any]:
+    def read(self, value: object, place: Place) -> Values:
         """Values of the material, or of each region under "regions"."""
         if (
             isinstance(value, Mapping)
@@ -57,7 +57,7 @@ class Solids:
 class _Solid:
     summary: str = "material"
 
-    def read(self, value: Any, place: Place) -> dict[str, Any]:
+    def read(self, value: object, place: Place) -> Values:
         """Values of one material."""
         other = isinstance(value, Mapping) and "G" in value
         return (ORTHOTROPIC if other else ISOTROPIC).read(value, place)
@@ -69,31 +69,32 @@ class Faces:
 
     summary: str = "number, point, or text as `radius:0.006`"
 
-    def read(self, value: Any, place: Place) -> Any:
+    def read(self, value: object, place: Place) -> object:
         """The value, if it picks anything."""
-        try:
+        with place.told():
             picks(value)
-        except ConfigError as error:
-            raise place.error(f"{place.name}: {error.message}", error.hint) from None
         return value
 
 
-INTERFACE = Either(Text(), Variants({
+KINDS = {
     "full": Table("Keeps all its dofs.", ()),
     "rbe2": Table("Moves as a rigid surface.", ()),
     "rbe3": Table("Moves freely about its mean.", ()),
     "polynomial": Declared(f"{SHAPES}:Polynomial"),
     "fourier": Declared(f"{SHAPES}:FourierLegendre"),
-}))  # fmt: skip
+}
+INTERFACE = Either(Text(), Variants(KINDS))
 TABLE = Table("A component.", (
     Key("name", Text(), "Name of the body; that of the file if missing."),
     Key("geometry", Table("The solid as a geometry or mesh; needs FEniCSx.", (
         Key("file", FilePath(), "`.geo`, `.py`, `.step`, `.msh`, `.inp` or `.bdf`.", ...),
         Key("unit", Text(LENGTHS), "Length unit of its coordinates; a `.step` knows its own.", "m"),
-        Key("degree", Whole(1, 3), "Degree of the displacement.", 2),
+        Key("degree", Whole(1, 3), "Degree of the displacement, 1 to 3.", 2),
         Key("order", Whole(1, 2), "Degree of the cells' edges: 1 straight, 2 curved; 2 where the "
             "geometry is curved if missing."),
-        Key("solver", Text(), "How equations are solved, as `rom reduce --solver`.", "auto"),
+        Key("solver", Text(), "How equations are solved: direct, low-rank, out-of-core, "
+            "low-rank+out-of-core or iterative; auto is direct where its factor fits, else "
+            "out-of-core, else iterative.", "auto"),
         Key("parameters", Named(Anything("number or text"), "parameters"),
             "Parameters of the geometry. A plain number goes there as it is; a length with its "
             "unit is converted to that of the geometry (`.step`: to metres), another quantity "
@@ -118,18 +119,23 @@ TABLE = Table("A component.", (
         "rom.model:Attachment", about="A rigid body on an interface.", mass=Positive("kg"),
     ), "attachments"), "Rigid bodies and point masses it carries."),
     Key("reduction", Table("How it is reduced.", (
-        Key("method", Text(tuple(METHODS)), "Which modes are kept.", "craig-bampton"),
-        Key("modes", Whole(), "How many; if missing, as many as the certificate needs, of methods "
-            "other than craig-bampton 20, of moment-matching blocks 2."),
-        Key("f_max", Positive("Hz"), "Craig-Bampton: all modes up to here instead."),
-        Key("tol", Positive("1"),
-            "The fewest modes with this relative error up to f_max, or of the lowest six."),
-        Key("at", Quantity("Hz", ((None,),)), "Moment-matching: where to be exact; 0 if missing."),
+        Key("method", Text(tuple(METHODS)), "Which modes are kept: craig-bampton, enhanced (the "
+            "same, corrected), guyan (none), rubin or herting (free-free modes and statics), "
+            "moment-matching (exact somewhere), balanced (what the interfaces know), free-free "
+            "(no joint may clamp it), assumed (those under the reference alone).", "craig-bampton"),
+        Key("modes", Whole(), "How many modes; if missing, as many as the certificate needs, of "
+            "methods other than craig-bampton 20, of moment-matching blocks per frequency 2."),
+        Key("f_max", Positive("Hz"), "All modes of craig-bampton up to here instead."),
+        Key("tol", Positive("1"), "The fewest modes of craig-bampton with this relative error up "
+            "to f_max, or else of the lowest six in every support; 5e-4 if missing."),
+        Key("at", Quantity("Hz", ((None,),)),
+            "Where moment-matching is to be exact; 0 if missing."),
         Key("characteristic", Whole(), "Full interfaces follow so many characteristic modes."),
         Key("gravity_shapes", Flag(), "Keep the answers to gravity along each axis.", False),
         Key("reference", Words(), "The frame: mean-axis, an interface, or two of them.",
             ("mean-axis",)),
-        Key("stiffening", Flag(), "Add the geometric stiffness of rotation and loads.", False),
+        Key("stiffening", Flag(), "Add the geometric stiffness of rotation and of loads on "
+            "interfaces.", False),
         Key("nonlinear", Table("Loads under which it is to deflect far, and shapes for them.", (
             Key("loads", Named(Table("The largest load on an interface, of either sign.", (
                 Key("force", Quantity("N", ((3,),)), "Along the axes of the geometry.", (0.0,) * 3),
@@ -153,7 +159,7 @@ TABLE = Table("A component.", (
             "however long it takes.", True),
     )), "How it is reduced.", {}),
     Key("damping", Table("Structural damping: a ratio, or alpha and beta.", (
-        Key("ratio", Quantity(), "Damping ratio of every mode."),
+        Key("ratio", Quantity(), "Damping ratio of every mode, e.g. 0.01."),
         Key("fixed", Words(), "Interfaces held where the ratio is meant, wholly or as `name:yz`; "
             "those of the free body without it.", ()),
         Key("alpha", Quantity("1/s"), "D = alpha M + beta K."),

@@ -6,6 +6,7 @@ from inspect import signature
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
+from rom.config.document import Values
 from rom.config.keys import Place, Variants, nearest
 from rom.config.laws import Law, law_of
 from rom.config.mechanism_keys import sections
@@ -33,7 +34,7 @@ class Entry:
     name: str
     ends: list[Any]  # markers, or joints
     marker_names: list[str]  # "body.marker", as written
-    values: dict[str, Any]  # its other values, in SI
+    values: Values  # its other values, in SI
     place: Place
     t_end: float  # until when functions of time are asked for [s]
     trust: bool  # run functions of Python files
@@ -215,7 +216,7 @@ class Condition:
         return x, float(gap @ slide) / x if x > 0.0 else 0.0
 
 
-def condition_of(ends: list[Any], values: dict[str, Any], place: Place) -> Condition:
+def condition_of(ends: list[Any], values: Values, place: Place) -> Condition:
     """The condition of an entry of [events]."""
     if ("value" in values) == ("expression" in values):
         what = "both a value and an expression" if "value" in values else "no value it passes"
@@ -273,12 +274,13 @@ def check_name(name: str) -> None:
         raise ConfigError(f"{name!r} is no name for a body; use one without a dot, not {GROUND!r}.")
 
 
-def pose_of(values: Mapping[str, Any]) -> dict[str, Any]:
+def pose_of(values: Values) -> Values:
     """Where the frame of a body is at the start, and how it moves."""
     from rom import rotation
     from rom.arguments import unit_vector
 
-    pose = {key: values[key] for key in ("at", "orientation", "velocity", "omega") if key in values}
+    given = ("at", "orientation", "velocity", "omega")
+    pose: Values = {key: values[key] for key in given if key in values}
     turned = pose.get("orientation")
     if isinstance(turned, Mapping):
         axis = unit_vector("axis", turned["axis"])

@@ -4,26 +4,24 @@ Keys are the arguments that a method takes by keyword alone, and all arguments o
 """
 
 import re
-import sys
 import typing
 from collections.abc import Mapping, Sequence
 from dataclasses import is_dataclass, replace
 from functools import cached_property
-from inspect import Parameter, getdoc, signature
+from inspect import Parameter, getdoc
 from pathlib import Path
 from types import MappingProxyType, UnionType
 from typing import Any, Literal
 
 from rom.arguments import Quantity, Whole
-from rom.arguments.kinds import Names, evaluated
+from rom.arguments.kinds import parameters_of
 from rom.config.keys import FilePath, Flag, Key, Kind, Named, Table, Text, Words
 from rom.fields import follow
 
 SHAPE_OR_UNIT = re.compile(r"^\([\dnr, ]+\)( or \([\d, ]+\))? | ?\[(?!degrees)[^]]*\]")
 NO_VALUE = re.compile("; None( for|:)")
-PLAIN_KINDS: dict[Any, Kind] = {
-    float: Quantity(), int: Whole(), bool: Flag(), str: Text(), Path: FilePath(),
-}  # fmt: skip
+PLAIN_KINDS: dict[object, Kind] = {float: Quantity(), int: Whole(), bool: Flag(), str: Text()}
+PLAIN_KINDS[Path] = FilePath()
 
 
 class Declared(Table):
@@ -42,7 +40,7 @@ class Declared(Table):
     places: list[str]
     own: dict[str, Key]
     without: list[str]
-    defaults: Mapping[str, Any]
+    defaults: Mapping[str, object]
     kinds: Mapping[str, Kind]
 
     def __init__(
@@ -51,7 +49,7 @@ class Declared(Table):
         *keys: Key,
         about: str = "",
         without: str = "",
-        defaults: Mapping[str, Any] = MappingProxyType({}),
+        defaults: Mapping[str, object] = MappingProxyType({}),
         **kinds: Kind,
     ) -> None:
         own = {key.name: key for key in keys}
@@ -85,44 +83,42 @@ def _made(place: str) -> Any:
     return getattr(Mechanism, place)
 
 
-def _keys_of(made: Any, kinds: Mapping[str, Kind], defaults: Mapping[str, Any]) -> list[Key]:
+def _keys_of(made: Any, kinds: Mapping[str, Kind], defaults: Mapping[str, object]) -> list[Key]:
     """The keys of a function, or of all fields of a record."""
     sentences = _sentences(getdoc(made) or "")
-    known = Names(vars(sys.modules[made.__module__]))
     found = []
-    for one in signature(made).parameters.values():
+    for one in parameters_of(made):
         if one.kind is not Parameter.KEYWORD_ONLY and not is_dataclass(made):
             continue
         default = ... if one.default is Parameter.empty else one.default
-        if (kind := kinds.get(one.name) or _kind(one.annotation, known)) is not None:
+        if (kind := kinds.get(one.name) or _kind(one.annotation)) is not None:
             about = sentences.get(one.name) or f"{one.name.replace('_', ' ').capitalize()}."
             found.append(Key(one.name, kind, about, defaults.get(one.name, default)))
     return found
 
 
-def _kind(annotation: Any, known: Names) -> Kind | None:
+def _kind(annotation: object) -> Kind | None:
     """How a value of an annotation is written; None if it is written in no way."""
-    annotation = evaluated(annotation, known)
     origin, inner = typing.get_origin(annotation), typing.get_args(annotation)
     if origin is typing.Annotated:
-        return inner[1] if isinstance(inner[1], Quantity | Whole) else _kind(inner[0], known)
+        return inner[1] if isinstance(inner[1], Quantity | Whole) else _kind(inner[0])
     if origin in (typing.Union, UnionType):
-        kinds = (_kind(one, known) for one in inner)
+        kinds = (_kind(one) for one in inner)
         return next((kind for kind in kinds if kind is not None), None)
     if origin is Literal:
         return Text(inner)
-    if origin in (dict, Mapping) and (kind := _kind(inner[1], known)) is not None:
+    if origin in (dict, Mapping) and (kind := _kind(inner[1])) is not None:
         return Named(kind, "values")
     if origin in (tuple, list, Sequence) and inner[0] is str:
         return Words()
-    if origin is tuple and isinstance(kind := _kind(inner[0], known), Quantity):
+    if origin is tuple and isinstance(kind := _kind(inner[0]), Quantity):
         return replace(kind, shapes=((None if inner[-1] is ... else len(inner),),))
     if is_dataclass(annotation):
         return Table(_first_paragraph(annotation), tuple(_keys_of(annotation, {}, {})))
     return PLAIN_KINDS.get(annotation)
 
 
-def _first_paragraph(made: Any) -> str:
+def _first_paragraph(made: object) -> str:
     return (getdoc(made) or "").partition("\n\n")[0]
 
 

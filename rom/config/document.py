@@ -16,6 +16,7 @@ STRING_PATTERN = r'"""(?:\\.|[^\\])*?"""' + r"|'''.*?'''" + r'|"(?:\\.|[^"\\\n])
 TOKEN_PATTERN = re.compile(STRING_PATTERN + r"|\#[^\n]*|[^\"'\#\[\]{}=\n]+|.", re.S | re.X)
 WORD_PATTERN = re.compile(r'"(?:\\.|[^"\\])*"|\'[^\']*\'|[A-Za-z0-9_-]+')
 KeyPath = tuple[str, ...]
+Values = dict[str, Any]  # of a table, by key
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +24,7 @@ class Document:
     """What a file says, and where."""
 
     path: Path
-    data: dict[str, Any]
+    data: Values
     lines: dict[KeyPath, int] = field(default_factory=dict)  # of keys on lines of their own
 
     def where(self, path: KeyPath) -> str:

@@ -13,8 +13,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple, NoReturn
 
-from rom.config.keys import Key, Named, Place, Table, Text, as_text, nearest
-from rom.errors import ConfigError
+from rom.config.document import Values
+from rom.config.keys import Key, Named, Place, Table, Text, nearest
 from rom.mbs.elements.formulas.codes import (
     ADD,
     DIV,
@@ -214,17 +214,15 @@ class AnyQuantity:
 
     summary: str = "number, or number with any unit"
 
-    def read(self, value: Any, place: Place) -> float:
+    def read(self, value: object, place: Place) -> float:
         """The number in SI."""
         if isinstance(value, str) and (number := QUANTITY_NUMBER.match(value.strip())):
             symbol = value.strip()[number.end() :].strip()
-            try:
+            with place.told():
                 return in_si(value, symbol or "1")
-            except ConfigError as error:
-                raise place.error(f"{place.name}: {error.message}", error.hint) from None
         if isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e300:
             return float(value)
-        raise place.error(f"{place.name} = {as_text(value)} must be a {self.summary}.")
+        place.refuse(value, f" must be a {self.summary}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -238,13 +236,11 @@ class UnitName:
         """Unit of what."""
         return f"unit such as {self.unit}"
 
-    def read(self, value: Any, place: Place) -> float:
+    def read(self, value: object, place: Place) -> float:
         """How many SI units it is."""
         text = Text().read(value, place)
-        try:
+        with place.told():
             return in_si(f"1 {text}", self.unit)
-        except ConfigError as error:
-            raise place.error(f"{place.name}: {error.message}", error.hint) from None
 
 
 @dataclass(frozen=True, slots=True)
@@ -253,7 +249,7 @@ class FormulaTable(Table):
 
     variables: tuple[str, ...] = ("t",)
 
-    def read(self, value: Any, place: Place) -> dict[str, Any]:
+    def read(self, value: Any, place: Place) -> Values:
         """Its other values, and the instructions under "expression", times the unit."""
         found = Table.read(self, value, place)
         constants = found.pop("constants", {})

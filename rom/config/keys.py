@@ -1,14 +1,15 @@
 """The keys of a file as a table: validation, error messages and documentation follow from it."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, NoReturn, Protocol
 
 from rom.arguments import Quantity, Whole
-from rom.config.document import Document, KeyPath
+from rom.config.document import Document, KeyPath, Values
 from rom.errors import ConfigError
 from rom.names import check_text
 from rom.units import in_si
@@ -38,6 +39,18 @@ class Place:
         """An error about this key, which says file and line."""
         return ConfigError(message, where=self.document.where(self.path), hint=hint)
 
+    def refuse(self, value: object, wanted: str) -> NoReturn:
+        """Raise the error of a value, with a sentence about what is wanted behind it."""
+        raise self.error(f"{self.name} = {as_text(value)}{wanted}.")
+
+    @contextmanager
+    def told(self) -> Iterator[None]:
+        """Errors from within are about this key."""
+        try:
+            yield
+        except ConfigError as error:
+            raise self.error(f"{self.name}: {error.message}", error.hint) from None
+
 
 class Written(Protocol):
     """How the value of a key is written, where it is no number."""
@@ -46,7 +59,7 @@ class Written(Protocol):
     def summary(self) -> str:
         """In a few words, for the documentation."""
 
-    def read(self, value: Any, place: Place) -> Any:
+    def read(self, value: object, place: Place) -> Any:
         """The value, checked and in SI.
 
         Raises:
@@ -54,7 +67,7 @@ class Written(Protocol):
         """
 
 
-def read_value(kind: "Kind", value: Any, place: Place) -> Any:
+def read_value(kind: "Kind", value: object, place: Place) -> Any:
     """The value of a key, checked and in SI."""
     if isinstance(kind, Quantity):
         return _quantity(kind, value, place)
@@ -63,33 +76,31 @@ def read_value(kind: "Kind", value: Any, place: Place) -> Any:
     return kind.read(value, place)
 
 
-def _quantity(kind: Quantity, value: Any, place: Place) -> Any:
+def _quantity(kind: Quantity, value: object, place: Place) -> object:
     """Number or nested lists of numbers, each a text with its unit or plain in SI."""
     found = _shape(value)
     if found is None or not kind.has_shape(found):
-        raise place.error(f"{place.name} = {as_text(value)}: needed is a {kind.summary}.")
+        place.refuse(value, f": needed is a {kind.summary}")
     return _number(kind, value, place)
 
 
-def _number(kind: Quantity, value: Any, place: Place) -> Any:
+def _number(kind: Quantity, value: object, place: Place) -> object:
     if isinstance(value, list):
         return [_number(kind, item, place) for item in value]
     if isinstance(value, str):
-        try:
+        with place.told():
             x = in_si(value, kind.unit)
-        except ConfigError as error:
-            raise place.error(f"{place.name}: {error.message}", error.hint) from None
     elif isinstance(value, int | float) and not isinstance(value, bool):
         x = float(value) if abs(value) <= 1e300 else math.inf
     else:
-        raise place.error(f"{place.name} = {as_text(value)} must be a {kind.summary}.")
+        place.refuse(value, f" must be a {kind.summary}")
     if not math.isfinite(x) or not kind.holds(x):
         must = kind.must if math.isfinite(x) else "must be a finite number"
-        raise place.error(f"{place.name} = {as_text(value)} {must}.")
+        place.refuse(value, f" {must}")
     return x
 
 
-def _shape(value: Any) -> tuple[int, ...] | None:
+def _shape(value: object) -> tuple[int, ...] | None:
     """Lengths of nested lists, None when they differ."""
     if not isinstance(value, list):
         return ()
@@ -100,11 +111,11 @@ def _shape(value: Any) -> tuple[int, ...] | None:
     return (len(value), *first)
 
 
-def _whole(kind: Whole, value: Any, place: Place) -> int:
-    fits = isinstance(value, int) and not isinstance(value, bool)
-    if not fits or not kind.holds(value) or value > LARGEST_WHOLE:
-        raise place.error(f"{place.name} = {as_text(value)} must be a {kind.summary}.")
-    return int(value)
+def _whole(kind: Whole, value: object, place: Place) -> int:
+    if isinstance(value, int) and not isinstance(value, bool):
+        if kind.holds(value) and value <= LARGEST_WHOLE:
+            return value
+    place.refuse(value, f" must be a {kind.summary}")
 
 
 Kind = Written | Quantity | Whole
@@ -121,11 +132,13 @@ class Flag:
         """What it may be."""
         return f'true, false or "{self.more}"' if self.more else "true or false"
 
-    def read(self, value: Any, place: Place) -> bool | str:
+    def read(self, value: object, place: Place) -> bool | str:
         """The value."""
-        if isinstance(value, bool) or (self.more and value == self.more):
+        if isinstance(value, bool):
             return value
-        raise place.error(f"{place.name} = {as_text(value)} must be {self.summary}.")
+        if self.more and value == self.more:
+            return self.more
+        place.refuse(value, f" must be {self.summary}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,10 +152,10 @@ class Text:
         """Text, or the choices."""
         return ", ".join(f'"{c}"' for c in self.choices) or "text"
 
-    def read(self, value: Any, place: Place) -> str:
+    def read(self, value: object, place: Place) -> str:
         """The text."""
         if not isinstance(value, str) or not value or "\0" in value:
-            raise place.error(f"{place.name} = {as_text(value)} must be a text.")
+            place.refuse(value, " must be a text")
         if self.choices and value not in self.choices:
             hint = nearest(value, self.choices)
             raise place.error(f"{place.name} = {value!r} does not exist.", hint)
@@ -155,7 +168,7 @@ class Words:
 
     summary: str = "text, or list of texts"
 
-    def read(self, value: Any, place: Place) -> tuple[str, ...]:
+    def read(self, value: object, place: Place) -> tuple[str, ...]:
         """The texts."""
         values = value if isinstance(value, list) else [value]
         return tuple(Text().read(item, place) for item in values)
@@ -167,7 +180,7 @@ class FilePath:
 
     summary: str = "file"
 
-    def read(self, value: Any, place: Place) -> Path:
+    def read(self, value: object, place: Place) -> Path:
         """The path."""
         return place.document.path.parent / Text().read(value, place)
 
@@ -178,14 +191,12 @@ class OutputPath:
 
     summary: str = "file"
 
-    def read(self, value: Any, place: Place) -> Path:
+    def read(self, value: object, place: Place) -> Path:
         """The path."""
         path, folder = FilePath().read(value, place), place.document.path.parent
         if not path.resolve().is_relative_to(folder.resolve()):
-            raise place.error(
-                f"{place.name} = {as_text(value)} leads out of the folder of its file, "
-                f"{folder.resolve()}; -o on the command line may name any place."
-            )
+            outside = f" leads out of the folder of its file, {folder.resolve()}"
+            place.refuse(value, f"{outside}; -o on the command line may name any place")
         return path
 
 
@@ -195,11 +206,11 @@ class Anything:
 
     summary: str
 
-    def read(self, value: Any, place: Place) -> Any:
+    def read(self, value: object, place: Place) -> object:
         """The value as it is."""
         if isinstance(value, int | float | str | list | dict):
             return value
-        raise place.error(f"{place.name} = {as_text(value)} must be a {self.summary}.")
+        place.refuse(value, f" must be a {self.summary}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -209,7 +220,7 @@ class Key:
     name: str
     kind: Kind
     about: str  # one sentence
-    default: Any = None  # ... where a value must be given, {} for a table of defaults
+    default: object = None  # ... where a value must be given, {} for a table of defaults
 
 
 @dataclass(frozen=True, slots=True)
@@ -224,15 +235,15 @@ class Table:
         """Called a table."""
         return "table"
 
-    def read(self, value: Any, place: Place) -> dict[str, Any]:
+    def read(self, value: object, place: Place) -> Values:
         """Values by key: those given, and defaults that are values."""
         if not isinstance(value, Mapping):
-            raise place.error(f"{place.name} = {as_text(value)}: needed is a table [{place.name}].")
+            place.refuse(value, f": needed is a table [{place.name}]")
         known = {key.name: key for key in self.keys}
         for name in value:
             if name not in known:
                 place.mistakes.append(unknown(name, tuple(known), place))
-        found: dict[str, Any] = {}
+        found: Values = {}
         for key in self.keys:
             if key.name in value:
                 collect(found, key.name, key.kind, value[key.name], place)
@@ -262,11 +273,11 @@ class Named:
         """Called a table by name."""
         return f"table of {self.what} by name"
 
-    def read(self, value: Any, place: Place) -> dict[str, Any]:
+    def read(self, value: object, place: Place) -> Values:
         """Values by name."""
         if not isinstance(value, Mapping):
-            raise place.error(f"{place.name} = {as_text(value)}: needed is a {self.summary}.")
-        found: dict[str, Any] = {}
+            place.refuse(value, f": needed is a {self.summary}")
+        found: Values = {}
         for name, item in value.items():
             try:
                 check_text(name, self.what)
@@ -290,10 +301,10 @@ class Variants:
         """The kinds."""
         return "table with a kind: " + ", ".join(self.tables)
 
-    def read(self, value: Any, place: Place) -> dict[str, Any]:
+    def read(self, value: object, place: Place) -> Values:
         """Values by key, ``kind`` among them."""
         if not isinstance(value, Mapping):
-            raise place.error(f"{place.name} = {as_text(value)}: needed is a table [{place.name}].")
+            place.refuse(value, f": needed is a table [{place.name}]")
         written = [kind for key, kind in self.telling.items() if key in value]
         if "kind" not in value and not written:
             raise place.error(f"kind is missing in [{place.name}].", nearest("", self.tables))
@@ -315,12 +326,12 @@ class Either:
         """Both forms."""
         return f"{self.short.summary}; or {self.table.summary}"
 
-    def read(self, value: Any, place: Place) -> Any:
+    def read(self, value: object, place: Place) -> object:
         """Either form."""
         return read_value(self.table if isinstance(value, Mapping) else self.short, value, place)
 
 
-def collect(found: dict[str, Any], name: str, kind: Kind, value: Any, place: Place) -> None:
+def collect(found: Values, name: str, kind: Kind, value: object, place: Place) -> None:
     """Read one value into a dictionary; a mistake goes to the others."""
     try:
         found[name] = read_value(kind, value, place.at(name))
@@ -334,20 +345,20 @@ def unknown(name: str, known: tuple[str, ...], place: Place) -> ConfigError:
     return place.at(name).error(f"there is no key {name!r}{inside}.", nearest(name, known))
 
 
-def nearest(word: str, known: Any) -> str:
+def nearest(word: str, known: Iterable[object]) -> str:
     """The nearest known word, and the list of them."""
     words = [str(k) for k in known]
     near = get_close_matches(word, words, n=1)
     return (f"Did you mean {near[0]}? " if near else "") + f"Known: {', '.join(words)}."
 
 
-def as_text(value: Any) -> str:
+def as_text(value: object) -> str:
     """A value, not longer than a line."""
     text = repr(value) if not isinstance(value, int) or abs(value) < 10**18 else "a huge number"
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-def read_table(table: Table, document: Document) -> dict[str, Any]:
+def read_table(table: Table, document: Document) -> Values:
     """The values of a document."""
     place = Place(document)
     values = table.read(document.data, place)

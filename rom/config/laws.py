@@ -6,11 +6,24 @@ from itertools import pairwise
 from typing import Any
 
 from rom.arguments import Positive, Quantity
+from rom.config.document import Values
 from rom.config.expressions import formula_kind
 from rom.config.keys import Either, Key, Kind, Place, Table, Variants, raise_mistakes, read_value
 from rom.config.python_files import PYTHON_KEYS, function_of
 from rom.errors import ConfigError
 
+LAWS = {
+    "constant": "Always the same.",
+    "steady": "start + rate t.",
+    "run-up": "From rest to a steady rate, without a jolt: the rate is that of a cycloid, "
+    "rate (s - sin(2 pi s) / 2 pi) with s = t / duration.",
+    "ramp": "From one value to another on a cycloid, from + (to - from) (s - sin(2 pi s) / 2 pi) "
+    "with s = (t - start) / duration.",
+    "harmonic": "mean + amplitude sin(2 pi frequency t + phase).",
+    "table": "A cubic spline through points; it must cover the whole run.",
+    "expression": "A formula; its rate and acceleration are exact.",
+    "python": "which runs only with `--trust` or `trust=True`.",
+}
 Function = Callable[[Any], Any]
 
 
@@ -29,45 +42,37 @@ class Law:
 def law_kind(unit: str, variables: tuple[str, ...] = ("t",)) -> Kind:
     """How a law is written whose values have this SI unit; formulas may have other variables."""
     value, rate = Quantity(unit), Quantity("1/s" if unit == "1" else f"{unit}/s")
-    still = 0.0
-    tables = {
-        "constant": Table("Always the same.", (Key("value", value, "Its value.", ...),)),
-        "steady": Table("start + rate t.", (
+    keys = {
+        "constant": [Key("value", value, "Its value.", ...)],
+        "steady": [
             Key("rate", rate, "Change per time.", ...),
-            Key("start", value, "Value at t = 0.", still),
-        )),
-        "run-up": Table(
-            "From rest to a steady rate, without a jolt: the rate is that of a cycloid, "
-            "rate (s - sin(2 pi s) / 2 pi) with s = t / duration.", (
+            Key("start", value, "Value at t = 0.", 0.0),
+        ],
+        "run-up": [
             Key("rate", rate, "Rate at the end.", ...),
             Key("duration", Positive("s"), "Time until then.", ...),
-        )),
-        "ramp": Table(
-            "From one value to another on a cycloid, from + (to - from) (s - sin(2 pi s) / 2 pi) "
-            "with s = (t - start) / duration.", (
-            Key("from", value, "Value before.", still),
+        ],
+        "ramp": [
+            Key("from", value, "Value before.", 0.0),
             Key("to", value, "Value after.", ...),
-            Key("start", Quantity("s"), "When it begins.", still),
+            Key("start", Quantity("s"), "When it begins.", 0.0),
             Key("duration", Positive("s"), "How long it takes.", ...),
-        )),
-        "harmonic": Table("mean + amplitude sin(2 pi frequency t + phase).", (
+        ],
+        "harmonic": [
             Key("amplitude", value, "Amplitude.", ...),
             Key("frequency", Positive("Hz"), "Frequency.", ...),
-            Key("phase", Quantity("rad"), "Phase.", still),
-            Key("mean", value, "Mean.", still),
-        )),
-        "table": Table("A cubic spline through points; it must cover the whole run.", (
+            Key("phase", Quantity("rad"), "Phase.", 0.0),
+            Key("mean", value, "Mean.", 0.0),
+        ],
+        "table": [
             Key("t", Quantity("s", ((None,),)), "Times, ascending.", ...),
             Key("values", Quantity(unit, ((None,),)), "Values.", ...),
-        )),
-        "expression": formula_kind(
-            unit, variables, "A formula; its rate and acceleration are exact."
-        ),
-        "python": Table(
-            f"A function of ({', '.join(variables)}) in a Python file, which runs only with "
-            "`--trust` or `trust=True`.", PYTHON_KEYS,
-        ),
-    }  # fmt: skip
+        ],
+    }
+    tables = {kind: Table(LAWS[kind], tuple(some)) for kind, some in keys.items()}
+    tables["expression"] = formula_kind(unit, variables, LAWS["expression"])
+    about = f"A function of ({', '.join(variables)}) in a Python file, {LAWS['python']}"
+    tables["python"] = Table(about, PYTHON_KEYS)
     return Either(value, Variants(tables, {"expression": "expression", "function": "python"}))
 
 
@@ -75,7 +80,7 @@ def law_kind(unit: str, variables: tuple[str, ...] = ("t",)) -> Kind:
 class Pending:
     """A value whose unit depends on whether a joint turns or slides."""
 
-    value: Any
+    value: object
     place: Place
     kinds: tuple[Kind, Kind]
 
@@ -99,7 +104,7 @@ class ByCoordinate:
         """Both kinds."""
         return f"{self.turning.summary}; of a joint that slides {self.sliding.summary}"
 
-    def read(self, value: Any, place: Place) -> Pending:
+    def read(self, value: object, place: Place) -> Pending:
         """The value, which fits at least one of them."""
         pending = Pending(value, place, (self.turning, self.sliding))
         try:
@@ -146,7 +151,7 @@ def _polynomial(start: float, slope: float) -> Law:
     return Law(lambda t: start + slope * t, lambda t: slope + 0 * t, lambda t: 0.0 * t)
 
 
-def _harmonic(values: dict[str, Any]) -> Law:
+def _harmonic(values: Values) -> Law:
     import numpy as np
 
     A, w, phase = values["amplitude"], 2 * np.pi * values["frequency"], values["phase"]
@@ -157,7 +162,7 @@ def _harmonic(values: dict[str, Any]) -> Law:
     )
 
 
-def _check_points(values: dict[str, Any], place: Place, t_end: float | None) -> None:
+def _check_points(values: Values, place: Place, t_end: float | None) -> None:
     t, y = values["t"], values["values"]
     if len(t) != len(y) or len(t) < 2:
         raise place.error(f"{place.name} needs two times or more, and as many values.")

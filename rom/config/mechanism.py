@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from rom.arguments import typed
 from rom.config.component import Described, change, located, read_component
 from rom.config.connections import GROUND, Entry, check_name, pose_of
-from rom.config.document import read_document
+from rom.config.document import Values, read_document
 from rom.config.keys import Place, nearest, raise_mistakes, read_table
 from rom.config.laws import Pending
 from rom.config.mechanism_keys import mechanism_table, sections
@@ -16,15 +16,18 @@ from rom.errors import ConfigError, warn
 from rom.fields import find
 
 if TYPE_CHECKING:
+    from rom.body.flexible import FlexibleBody
     from rom.mbs.integrate.keeping import Keeping
     from rom.mbs.mechanism import Mechanism
     from rom.mbs.results.solution import Solution
+    from rom.model import Array
+
+    MassProperties = tuple[float, Array, Array, dict[str, Array]]  # mass, centre, inertia, markers
 
 # of the mechanism's size; bores of a mesh are polygons, so that small gaps are normal
 GAP_RTOL = 1e-2
 MARKER_KEYS = ("between", "marker", "markers", "path")
 JOINT_KEYS = ("joint", "joint1", "joint2")
-MassProperties = tuple[float, Any, Any, dict[str, Any]]  # mass, centre, inertia, markers
 
 
 class MechanismFile(Described):
@@ -80,19 +83,19 @@ class MechanismFile(Described):
         with self.at("simulation"):
             return simulate(made, progress=progress, keep=keep, **self.values["simulation"])
 
-    def _entries(self, *, bodies: bool) -> list[tuple[str, str, dict[str, Any]]]:
+    def _entries(self, *, bodies: bool) -> list[tuple[str, str, Values]]:
         """Section, name and values of all sections of bodies, or of all others."""
         some = [name for name, section in sections().items() if section.bodies is bodies]
         return [(s, name, values) for s in some for name, values in self.values[s].items()]
 
-    def _connections(self) -> list[tuple[str, str, dict[str, Any]]]:
+    def _connections(self) -> list[tuple[str, str, Values]]:
         """Section, name and values; gears behind the joints they couple."""
         entries = self._entries(bodies=False)
         gears = [entry for entry in entries if entry[2].get("kind") == "gear"]
         joints = [e for e in entries if e[0] == "joints" and e not in gears]
         return [*joints, *gears, *(entry for entry in entries if entry[0] != "joints")]
 
-    def _connect(self, made: "Mechanism", section: str, name: str, values: dict[str, Any]) -> None:
+    def _connect(self, made: "Mechanism", section: str, name: str, values: Values) -> None:
         """Call the method of the mechanism with what the entry says."""
         place = Place(self.document, (section, name))
         markers = [marker for key in MARKER_KEYS for marker in _markers(values.pop(key, []))]
@@ -147,9 +150,9 @@ class MechanismFile(Described):
                     self._note_unknown(made, marker, place)
         raise_mistakes(top)
 
-    def _note_unknown(self, made: "Mechanism", marker: tuple[str, Any], place: Place) -> None:
+    def _note_unknown(self, made: "Mechanism", marker: tuple[str, object], place: Place) -> None:
         body, where = marker
-        names: dict[str, Any] = {GROUND: self.values["ground"]}
+        names: Values = {GROUND: self.values["ground"]}
         names |= {key: made.parts[key].names for key in self.values["bodies"]}
         names |= {key: _places(made, key) for key in made.nonlinear}
         if body not in names:
@@ -186,9 +189,7 @@ def _turns(made: "Mechanism", joint: str, coordinate: str | None) -> bool:
     return found.coordinate is None or found.coordinate is found.turn
 
 
-def _add_body(
-    made: "Mechanism", name: str, values: dict[str, Any], meshing: dict[str, Any]
-) -> None:
+def _add_body(made: "Mechanism", name: str, values: Values, meshing: Values) -> None:
     check_name(name)
     values |= pose_of(values)
     if "file" not in values:
@@ -207,15 +208,13 @@ def _add_body(
     made.add_flexible(name, body, **values)
 
 
-def _body_of(file: Path, meshing: dict[str, Any]) -> Any:
+def _body_of(file: Path, meshing: Values) -> "FlexibleBody":
     from rom.io.native import load
 
     return read_component(file, **meshing).body() if file.suffix == ".toml" else load(file)
 
 
-def _add_rigid_from(
-    made: "Mechanism", name: str, known: MassProperties, values: dict[str, Any]
-) -> None:
+def _add_rigid_from(made: "Mechanism", name: str, known: "MassProperties", values: Values) -> None:
     """A rigid body with the mass properties and interfaces of a body or a component."""
     import numpy as np
 
@@ -239,7 +238,7 @@ def _add_rigid_from(
     )
 
 
-def _mass_of(file: Path, meshing: dict[str, Any]) -> MassProperties:
+def _mass_of(file: Path, meshing: Values) -> "MassProperties":
     """Mass, centre (3,), inertia (3, 3) about it, and interface points by name."""
     import numpy as np
 
@@ -261,7 +260,7 @@ def _mass_of(file: Path, meshing: dict[str, Any]) -> MassProperties:
 @typed
 def read_mechanism(
     path: str | Path,
-    changes: Mapping[tuple[str, ...], Any] | None = None,
+    changes: Mapping[tuple[str, ...], object] | None = None,
     *,
     trust: bool = False,
     time_limit: float | None = None,
@@ -282,15 +281,13 @@ def read_mechanism(
     """
     document = read_document(path)
     if "bodies" not in document.data and {"geometry", "matrices"} & set(document.data):
-        raise ConfigError(
-            "this is a component; a mechanism is needed.", where=document.where(()),
-            hint="A mechanism has [bodies], one of which may have this file.",
-        )  # fmt: skip
+        hint = "A mechanism has [bodies], one of which may have this file."
+        where = document.where(())
+        raise ConfigError("this is a component; a mechanism is needed.", where=where, hint=hint)
     bodies = (name for name, section in sections().items() if section.bodies)
     if not {"bodies", *bodies} & set(document.data):
-        raise ConfigError(
-            "bodies is missing.", where=document.where(()), hint="Add [bodies.NAME].",
-        )  # fmt: skip
+        hint = "Add [bodies.NAME]."
+        raise ConfigError("bodies is missing.", where=document.where(()), hint=hint)
     for name in document.data.keys() - sections().keys():
         with located(document, (name,)):
             find("sections", name)  # of a field that is not here
@@ -303,7 +300,7 @@ def read_mechanism(
     return file
 
 
-def _check_step(simulation: dict[str, Any]) -> None:
+def _check_step(simulation: Values) -> None:
     t_end, dt = simulation["t_end"], simulation.get("dt")
     if dt is not None and dt > t_end:
         raise ConfigError(f"dt = {dt:g} s must be at most t_end = {t_end:g} s.")

@@ -2,11 +2,11 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from rom.arguments import typed
+from rom.config.document import KeyPath, Values
 from rom.config.mechanism import MechanismFile
 from rom.config.python_files import python_entries
 from rom.errors import ConfigError
@@ -103,10 +103,10 @@ def _refuse_ends(file: MechanismFile) -> None:
             )
 
 
-def _programs(file: MechanismFile, folder: Path) -> tuple[dict[tuple[str, ...], str], list[Path]]:
+def _programs(file: MechanismFile, folder: Path) -> tuple[dict[KeyPath, str], list[Path]]:
     """What replaces Python files, and copies of them."""
     copies: dict[Path, Path] = {}
-    changes: dict[tuple[str, ...], str] = {}
+    changes: dict[KeyPath, str] = {}
     for key, path in python_entries(file.document):
         if path not in copies:
             copies[path] = folder / f"functions {len(copies)} {path.name}"
@@ -117,9 +117,9 @@ def _programs(file: MechanismFile, folder: Path) -> tuple[dict[tuple[str, ...], 
 
 def _bodies(
     file: MechanismFile, made: Mechanism, folder: Path
-) -> tuple[dict[tuple[str, ...], Any], list[Path]]:
+) -> tuple[dict[KeyPath, object], list[Path]]:
     """What replaces the bodies from other files, and the files that it names."""
-    changes: dict[tuple[str, ...], Any] = {}
+    changes: dict[KeyPath, object] = {}
     files: list[Path] = []
     for name, values in file.document.data.get("bodies", {}).items():
         if "file" not in values:
@@ -134,7 +134,7 @@ def _bodies(
     return changes, files
 
 
-def _numbers(part: Part) -> dict[str, Any]:
+def _numbers(part: Part) -> Values:
     """A rigid body by its numbers, in SI."""
     vectors = {
         "inertia": np.trace(part.second) * np.eye(3) - part.second,

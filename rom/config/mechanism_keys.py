@@ -8,6 +8,7 @@ from typing import Any, ClassVar, NamedTuple
 
 from rom.arguments import NotNegative, Number, Positive, Quantity
 from rom.config.declared import Declared
+from rom.config.document import Values
 from rom.config.expressions import FormulaTable, formula_keys, formula_kind
 from rom.config.keys import (
     Either,
@@ -40,7 +41,7 @@ class MarkerName:
         '"body.marker", or { body = [x, y, z] } for a point of the ground or a rigid body'
     )
 
-    def read(self, value: Any, place: Place) -> tuple[str, Any]:
+    def read(self, value: object, place: Place) -> tuple[str, object]:
         """Name of the body, and name or coordinates of the marker."""
         if isinstance(value, Mapping) and len(value) == 1:
             ((body, point),) = value.items()
@@ -66,19 +67,19 @@ class Markers:
         many = "list of two markers" if self.two else "list of markers"
         return many + ', each "body.marker" or { body = [x, y, z] }'
 
-    def read(self, value: Any, place: Place) -> list[tuple[str, Any]]:
+    def read(self, value: object, place: Place) -> list[tuple[str, object]]:
         """All of them."""
         if not isinstance(value, list) or not value or (self.two and len(value) != 2):
-            what = "two markers are" if self.two else "a list of markers is"
-            raise place.error(f"{place.name} = {as_text(value)}: {what} needed.")
+            place.refuse(
+                value, f": {'two markers are' if self.two else 'a list of markers is'} needed"
+            )
         return [MarkerName().read(item, place) for item in value]
 
 
-ORIENTATION = Key("orientation", Either(Number("1", (4,), (3, 3)), Table("A rotation.", (
-    Key("axis", DIRECTION, "Axis.", ...),
-    Key("angle", Quantity("rad"), "Angle, right-handed.", ...),
-))), "Body to world: quaternion (scalar first), matrix, or { axis, angle }."
-)  # fmt: skip
+ANGLE = Key("angle", Quantity("rad"), "Angle, right-handed.", ...)
+ROTATION = Table("A rotation.", (Key("axis", DIRECTION, "Axis.", ...), ANGLE))
+TURNED = "Body to world: quaternion (scalar first), matrix, or { axis, angle }."
+ORIENTATION = Key("orientation", Either(Number("1", (4,), (3, 3)), ROTATION), TURNED)
 RIGID = Declared(
     "add_rigid",
     ORIENTATION,
@@ -101,7 +102,7 @@ class Body:
     parts: ClassVar[dict[str, Table]] = {"rigid": RIGID, "from a file": FROM_FILE}
     summary: str = "table with a file, or with mass and inertia"
 
-    def read(self, value: Any, place: Place) -> dict[str, Any]:
+    def read(self, value: object, place: Place) -> Values:
         """Its values."""
         from_file = isinstance(value, Mapping) and "file" in value
         return (FROM_FILE if from_file else RIGID).read(value, place)
@@ -126,8 +127,10 @@ JOINTS = {
 }
 WHICH = Key("coordinate", Text(("angle", "displacement", "way")), "Which, where it has two.")
 WAY = ByCoordinate(Quantity("rad"), Quantity("m"))
+PASSED = Key("value", WAY, "Value.")
 SPEED = ByCoordinate(Positive("rad/s"), Positive("m/s"))
 IMPACT = "rom.mbs.elements.contact.impact:Impact"
+MASSIVE = Key("body", Text(), "Flexible body.", ...)
 FLEXIBLE = Key("body", Text(), "Flexible body that carries a surface.", ...)
 WHERE = Key("where", Text(), "Deformable interface that is the part of it; all of it if missing.")
 ON_MARKERS = "sphere_on_plane disc_on_plane sphere_on_sphere sphere_on_cylinder capsule_on_capsule"
@@ -143,67 +146,64 @@ CONTACTS = {kind: Declared(f"{kind} {IMPACT}", BETWEEN) for kind in ON_MARKERS.s
 MARKER = Key("marker", MarkerName(), "Where it acts.", ...)
 FACTOR = Key("factor", law_kind("1"), "A law that multiplies the vector; constant if missing.")
 MOTION = ("t", "x", "v")
+PRESSURE = Key("pressure", Quantity("Pa"), "Pressure.", ...)
+TRACTION = Key("traction", Quantity("Pa", ((3,),)), "Force per area.", ...)
+PER_MASS = Key("acceleration", Quantity("m/s^2", ((3,),)), "Force per mass.", ...)
+AXES = Key("frame", Text(("body", "world")), "Axes in which it keeps its direction.", "body")
 SPREAD_LOADS = {
-    "pressure": Table("A pressure on the surface of a body, pushing inwards.", (
-        FLEXIBLE, Key("pressure", Quantity("Pa"), "Pressure.", ...), WHERE,
-    )),
-    "traction": Table("A force per area on the surface of a body.", (
-        FLEXIBLE, Key("traction", Quantity("Pa", ((3,),)), "Force per area.", ...), WHERE,
-    )),
-    "acceleration": Table("A force per mass on all of a body.", (
-        Key("body", Text(), "Flexible body.", ...),
-        Key("acceleration", Quantity("m/s^2", ((3,),)), "Force per mass.", ...),
-    )),
-}  # fmt: skip
-SPREAD_KEYS = (
-    FACTOR,
-    Key("frame", Text(("body", "world")), "Axes in which it keeps its direction.", "body"),
-)
+    kind: Table(about, (*keys, FACTOR, AXES))
+    for kind, about, *keys in (
+        ("pressure", "A pressure on the surface, pushing inwards.", FLEXIBLE, PRESSURE, WHERE),
+        ("traction", "A force per area on the surface.", FLEXIBLE, TRACTION, WHERE),
+        ("acceleration", "A force per mass on all of a body.", MASSIVE, PER_MASS),
+    )
+}
 MANY = Key("markers", Markers(), "On which it acts.", ...)
+ALONG_LINE = (
+    "A force along the line between two markers, positive when it pushes them apart: x is its "
+    "length, v its rate."
+)
+CURVES = "Nowhere beyond neighbours, or of continuous curvature."
+POINTS = (
+    BETWEEN,
+    Key("x", Quantity("m", ((None,),)), "Lengths, ascending.", ...),
+    Key("values", Quantity("N", ((None,),)), "Forces there.", ...),
+    Key("interpolation", Text(("monotone", "cubic")), CURVES, "monotone"),
+)
+USER_FORCE = (MANY, *PYTHON_KEYS)
+LAW = (
+    *USER_FORCE,
+    Key("memory", Quantity("1", ((None,),)), "Numbers it remembers, at the start.", []),
+    Key("outputs", Words(), "Names of its own outputs.", ()),
+    Key("energy", Flag(), "Whether it tells stored energy and lost power.", False),
+)
 LAWS = {
-    "line": formula_kind("N", MOTION, "A force along the line between two markers, positive when "
-                         "it pushes them apart: x is its length, v its rate.", BETWEEN),
-    "points": Table("The same by points; it goes on straight beyond them.", (
-        BETWEEN,
-        Key("x", Quantity("m", ((None,),)), "Lengths, ascending.", ...),
-        Key("values", Quantity("N", ((None,),)), "Forces there.", ...),
-        Key("interpolation", Text(("monotone", "cubic")), "Nowhere beyond neighbours, or of "
-            "continuous curvature.", "monotone"),
-    )),
-    "python": Table("A law in Python between any markers, as `mechanism.law` takes it.", (
-        MANY, *PYTHON_KEYS,
-        Key("memory", Quantity("1", ((None,),)), "Numbers it remembers, at the start.", []),
-        Key("outputs", Words(), "Names of its own outputs.", ()),
-        Key("energy", Flag(), "Whether it tells stored energy and lost power.", False),
-    )),
-    "user_force": Table("A force and moment in Python, as `mechanism.user_force` takes it.", (
-        MANY, *PYTHON_KEYS,
-    )),
-}  # fmt: skip
-PASSES = (
-    *(key for key in formula_keys("1", MOTION) if key.name == "constants"),
-    Key("expression", Text(), "Formula of t, the measured x and its rate v whose zeros are looked "
-        "for, in place of a value."),
-)  # fmt: skip
+    "line": formula_kind("N", MOTION, ALONG_LINE, BETWEEN),
+    "points": Table("The same by points; it goes on straight beyond them.", POINTS),
+    "python": Table("A law in Python between any markers, as `mechanism.law` takes it.", LAW),
+    "user_force": Table("A force and moment in Python, as `user_force` takes it.", USER_FORCE),
+}
+ZEROS = (
+    "Formula of t, the measured x and its rate v whose zeros are looked for, in place of a value."
+)
 WHEN = (
     Key("direction", Text(("rising", "falling", "both")), "Which way it passes.", "both"),
     Key("terminal", Flag(), "Whether the run ends there.", False),
-)  # fmt: skip
+)
+(CONSTANTS,) = (key for key in formula_keys("1", MOTION) if key.name == "constants")
+PASSES = (CONSTANTS, Key("expression", Text(), ZEROS), *WHEN)
+MEASURED = Key("axis", DIRECTION, "Along which its position is measured, in the world.", ...)
+POSITION, DISTANCE = (Key("value", Quantity("m"), f"{what}.") for what in ("Position", "Distance"))
+ASKED = Key("markers", Markers(), "It asks for, beyond those with names.")
 EVENTS = {
-    "coordinate": FormulaTable("A joint coordinate passes a value.", (
-        JOINT, WHICH, Key("value", WAY, "Value."), *PASSES, *WHEN,
-    ), MOTION),
-    "position": FormulaTable("A marker passes a plane.", (
-        MARKER, Key("axis", DIRECTION, "Along which its position is measured, in the world.", ...),
-        Key("value", Quantity("m"), "Position."), *PASSES, *WHEN,
-    ), MOTION),
-    "distance": FormulaTable("Two markers are so far apart.", (
-        BETWEEN, Key("value", Quantity("m"), "Distance."), *PASSES, *WHEN,
-    ), MOTION),
-    "python": Table("A function of (t, instant) in Python, as `mechanism.event` takes it.", (
-        Key("markers", Markers(), "It asks for, beyond those with names."), *PYTHON_KEYS, *WHEN,
-    )),
-}  # fmt: skip
+    kind: FormulaTable(about, (*keys, *PASSES), MOTION)
+    for kind, about, *keys in (
+        ("coordinate", "A joint coordinate passes a value.", JOINT, WHICH, PASSED),
+        ("position", "A marker passes a plane.", MARKER, MEASURED, POSITION),
+        ("distance", "Two markers are so far apart.", BETWEEN, DISTANCE),
+    )
+}
+IN_PYTHON = "A function of (t, instant) in Python, as `mechanism.event` takes it."
 
 
 class Section(NamedTuple):
@@ -279,14 +279,17 @@ BEHIND_FIELDS: dict[str, tuple[str, Kind]] = {
     )),
     "stops": ("stops of joints", Declared(f"stop {IMPACT}", JOINT, lower=WAY, upper=WAY)),
     "contacts": ("contacts", Variants(CONTACTS)),
-    "spread_loads": ("loads spread over bodies", Variants({
-        kind: Table(table.about, (*table.keys, *SPREAD_KEYS))
-        for kind, table in SPREAD_LOADS.items()
-    }, {kind: kind for kind in SPREAD_LOADS})),
+    "spread_loads": (
+        "loads spread over bodies",
+        Variants(SPREAD_LOADS, {kind: kind for kind in SPREAD_LOADS}),
+    ),
     "laws": ("laws of force", Variants(LAWS, {
         "expression": "line", "values": "points", "function": "python",
     })),
-    "events": ("events", Variants(EVENTS, {"function": "python"})),
+    "events": ("events", Variants(
+        {**EVENTS, "python": Table(IN_PYTHON, (ASKED, *PYTHON_KEYS, *WHEN))},
+        {"function": "python"},
+    )),
 }  # fmt: skip
 SIMULATION = Declared(
     "rom.mbs.integrate.simulation:simulate",
@@ -294,17 +297,18 @@ SIMULATION = Declared(
     without="atol progress t_start state keep",
     t_end=Positive("s"),
 )
-OUTPUT = Table("What `rom simulate` writes beside the table `motion.csv`.", (
-    Key("history", Text(("csv", "h5")), "Form of the table of all motions, loads and energies.",
-        "csv"),
-    Key("film", Text(("gif", "mp4", "glb", "vtkhdf")),
-        "A film: pictures, pictures by ffmpeg, to turn around in browsers, ParaView."),
+FORMS = "Form of the table of all motions, loads and energies."
+FILMS = "A film: pictures, pictures by ffmpeg, to turn around in browsers, ParaView."
+WRITTEN = (
+    Key("history", Text(("csv", "h5")), FORMS, "csv"),
+    Key("film", Text(("gif", "mp4", "glb", "vtkhdf")), FILMS),
     Key("picture", Flag(), "A picture of four instants.", False),
     Key("plot", Words(), "Columns of the table to draw over time, without their unit.", ()),
     Key("magnify", Positive("1"), "Deformations are drawn so much larger.", 1.0),
     Key("view", DIRECTION, "Direction to the eye."),
     Key("up", DIRECTION, "Upright direction."),
-))  # fmt: skip
+)
+OUTPUT = Table("What `rom simulate` writes beside the table `motion.csv`.", WRITTEN)
 BEFORE_BODIES = (
     Key("name", Text(), "Its name; that of the file if missing."),
     Key("gravity", Quantity("m/s^2", ((3,),)), "Acceleration of gravity.", [0.0, 0.0, -9.81]),
@@ -324,14 +328,13 @@ def sections() -> dict[str, Section]:
     for name in names("sections"):
         with suppress(UnknownNameError):  # told where a file has the section
             of_fields[name] = find("sections", name)
-    first, last = ({name: Section(*one) for name, one in some.items()}
-                   for some in (BEFORE_FIELDS, BEHIND_FIELDS))  # fmt: skip
-    return first | of_fields | last
+    first = {name: Section(*one) for name, one in BEFORE_FIELDS.items()}
+    return first | of_fields | {name: Section(*one) for name, one in BEHIND_FIELDS.items()}
 
 
 @cache
 def mechanism_table() -> Table:
     """All keys of a mechanism file."""
-    bodies, others = ([one.key(name) for name, one in sections().items() if one.bodies is which]
-                      for which in (True, False))  # fmt: skip
+    bodies = [one.key(name) for name, one in sections().items() if one.bodies]
+    others = [one.key(name) for name, one in sections().items() if not one.bodies]
     return Table("A mechanism.", (*BEFORE_BODIES, *bodies, GROUND_POINTS, *others, *HOW))

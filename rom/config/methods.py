@@ -1,8 +1,9 @@
 """Reduction methods by name."""
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from rom.config.document import Values
 from rom.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -26,7 +27,7 @@ OWN_SETTINGS = {"f_max": CRAIG_BAMPTON, "tol": CRAIG_BAMPTON, "at": "moment-matc
 SETTINGS = ("method", "modes", *OWN_SETTINGS, "characteristic", "gravity_shapes")
 
 
-def chosen(settings: dict[str, Any], *, full: bool) -> "Method | Characteristic":
+def chosen(settings: Values, *, full: bool) -> "Method | Characteristic":
     """The method of a table [reduction], by the keys of `SETTINGS` that somebody chose."""
     from rom.reduction.bases.loads import WithLoads
     from rom.reduction.interfaces.characteristic import Characteristic
@@ -41,7 +42,7 @@ def chosen(settings: dict[str, Any], *, full: bool) -> "Method | Characteristic"
     return Characteristic(method, settings["characteristic"])
 
 
-def _plain(settings: dict[str, Any]) -> "Method":
+def _plain(settings: Values) -> "Method":
     name = settings["method"]
     module, kind, default = METHODS[name]
     modes, f_max = settings.get("modes"), settings.get("f_max")
@@ -52,7 +53,7 @@ def _plain(settings: dict[str, Any]) -> "Method":
         raise ConfigError(f"{name} has {'tol' if f_max is None else 'f_max'}; leave modes out.")
     if modes is not None and default is None:
         raise ConfigError(f"{name} keeps no modes; leave modes out.")
-    make: Any = getattr(import_module(f"rom.reduction.bases.{module}"), kind)
+    make = getattr(import_module(f"rom.reduction.bases.{module}"), kind)
     if name == CRAIG_BAMPTON:
         return make(modes, f_max, settings.get("tol"))
     if name == "moment-matching":

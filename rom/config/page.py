@@ -1,7 +1,6 @@
 """The page about files, from the tables that check them."""
 
 from collections.abc import Iterator
-from typing import Any
 
 from rom.config.component_keys import TABLE as COMPONENT
 from rom.config.keys import Either, Key, Kind, Named, Table, Variants
@@ -33,8 +32,7 @@ def page(component: str, mechanism: str) -> str:
     parts += ["## Laws", LAWS_SECTION]
     parts += [f"**{name}.** {t.about}\n\n{keys(t)}" for name, t in tables(law_kind("1"))]
     parts += ["## Formulas", FORMULA_SECTION]
-    parts += ["## Units", "Products with a blank, powers with `^`, and each `/` belongs to the one"
-              " unit behind it: `kg/m^3`, `N m/rad`, `m s^-2`.", _units()]  # fmt: skip
+    parts += ["## Units", UNIT_SECTION, _units()]
     return "\n\n".join(parts) + "\n"
 
 
@@ -43,6 +41,10 @@ LAWS_SECTION = (
     "may be left out where there is an `expression` or a `function`. Values have the unit of what "
     "they prescribe: an angle or a displacement for drives, a torque or a force for motors, none "
     "for factors."
+)
+UNIT_SECTION = (
+    "Products with a blank, powers with `^`, and each `/` belongs to the one unit behind it: "
+    "`kg/m^3`, `N m/rad`, `m s^-2`."
 )
 FORMULA_SECTION = (
     "An `expression` has numbers, variables and constants of its place, `pi`, `+ - * / ^` (`**` is "
@@ -112,7 +114,7 @@ def _default(key: Key) -> str:
     """What stands in for a key, where one value does."""
     if key.default is ...:
         return "must be given"
-    value: Any = list(key.default) if isinstance(key.default, tuple) else key.default
+    value = list(key.default) if isinstance(key.default, tuple) else key.default
     if value is None or isinstance(value, dict) or value == []:
         return ""
     if isinstance(value, bool):

@@ -9,29 +9,28 @@ from pathlib import Path
 from typing import Any
 
 from rom.arguments import Quantity
-from rom.config.document import Document, KeyPath
+from rom.config.document import Document, KeyPath, Values
 from rom.config.keys import FilePath, Key, Place, Text, nearest
 from rom.errors import RomError, UnsafeFileError
 from rom.io.files import check_readable
 
+Function = Callable[..., Any]  # of a file
+NUMBERS = Quantity("1", ((None,),))
 PYTHON_KEYS = (
     Key("file", FilePath(), "Python file.", ...),
     Key("function", Text(), "Name of a function in it.", ...),
-    Key("parameters", Quantity("1", ((None,),)),
-        "Numbers handed to it behind its other arguments.", []),
-)  # fmt: skip
+    Key("parameters", NUMBERS, "Numbers handed to it behind its other arguments.", []),
+)
 
 
-def function_of(values: Mapping[str, Any], place: Place, *, trust: bool) -> Callable[..., Any]:
+def function_of(values: Values, place: Place, *, trust: bool) -> Function:
     """The function, with its parameters behind the other arguments."""
     function = plain_function_of(values, place, trust=trust)
     given = tuple(values["parameters"])
     return (lambda *arguments: function(*arguments, *given)) if given else function
 
 
-def plain_function_of(
-    values: Mapping[str, Any], place: Place, *, trust: bool
-) -> Callable[..., Any]:
+def plain_function_of(values: Values, place: Place, *, trust: bool) -> Function:
     """The function alone; errors as of `function_of`."""
     path = check_readable(values["file"])
     check_trust(path, place, trust=trust)
@@ -58,7 +57,7 @@ def plain_function_of(
     if values["function"] not in known:
         what = f"{path} has no function {values['function']!r}."
         raise place.error(what, nearest(values["function"], known))
-    found: Callable[..., Any] = known[values["function"]]
+    found: Function = known[values["function"]]
     return found
 
 
@@ -78,7 +77,7 @@ def python_entries(document: Document) -> Iterator[tuple[KeyPath, Path]]:
     yield from _entries(document.data, (), document.path.parent)
 
 
-def _entries(data: Any, path: KeyPath, folder: Path) -> Iterator[tuple[KeyPath, Path]]:
+def _entries(data: object, path: KeyPath, folder: Path) -> Iterator[tuple[KeyPath, Path]]:
     if not isinstance(data, Mapping):
         return
     if isinstance(data.get("file"), str) and "function" in data:

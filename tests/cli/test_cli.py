@@ -207,18 +207,14 @@ def warned(monkeypatch, text="E looks like GPa."):
     monkeypatch.setattr(check, "run", run)
 
 
-@pytest.mark.parametrize(
-    ("option", "code", "said"),
-    [
-        ("--debug", 0, ("done\n", "warning: E looks like GPa.\n")),
-        ("-q", 0, ("done\n", "")),
-        (
-            "--strict",
-            5,
-            ("", "error: E looks like GPa.\nhint: Without --strict this is a warning.\n"),
-        ),
-    ],
-)
+STRICT = "error: E looks like GPa.\nhint: Without --strict this is a warning.\n"
+
+
+@pytest.mark.parametrize(("option", "code", "said"), [
+    ("--debug", 0, ("done\n", "warning: E looks like GPa.\n")),
+    ("-q", 0, ("done\n", "")),
+    ("--strict", 5, ("", STRICT)),
+])  # fmt: skip
 def test_warnings_are_said_once_or_not_at_all_or_end_it(option, code, said, monkeypatch, capsys):
     warned(monkeypatch)
     assert main(["check", "x", option]) == code
@@ -458,27 +454,22 @@ def test_fixed_interfaces_may_be_written_with_blanks():
     assert args.fixed == ("a", "b")
 
 
-@pytest.mark.fenicsx
-@pytest.mark.parametrize(
-    ("options", "label", "n_modes"),
-    few(
-        2,
-        [
-            (("--method", "rubin", "-m", 30), "free 30", 15 + 30),
-            (("--method", "herting", "-m", 25), "free 25", 15 + 25),
-            (("--f-max", 700, "--tol", 1e-3), "fixed-interface", None),
-            (("--method", "moment-matching", "--at", "0,300", "-m", 1), "moment", None),
-            (("--method", "balanced", "-m", 12, "--gravity-shapes"), "balanced", 9 + 12 + 3),
-        ],
-    ),
+METHODS = (
+    ("--method rubin -m 30", "free 30", 15 + 30),
+    ("--method herting -m 25", "free 25", 15 + 25),
+    ("--f-max 700 --tol 1e-3", "fixed-interface", None),
+    ("--method moment-matching --at 0,300 -m 1", "moment", None),
+    ("--method balanced -m 12 --gravity-shapes", "balanced", 9 + 12 + 3),
 )
+
+
+@pytest.mark.fenicsx
+@pytest.mark.parametrize(("options", "label", "n_modes"), few(2, METHODS))
 def test_reduce_takes_a_method_or_a_tolerance(geometry, tmp_path, capsys, options, label, n_modes):
     """A rigid end and one with linear functions: 6 and 9 coordinates."""
     path = tmp_path / "beam.rom.npz"
-    kinds = ("-i", "root=rbe2", "-i", "tip=polynomial:1")
-    found = answer(
-        capsys, "reduce", geometry, *STEEL, *kinds, *options, "--no-certificate", "-o", path
-    )
+    more = f"-i root=rbe2 -i tip=polynomial:1 --no-certificate -o {path} {options}".split()
+    found = answer(capsys, "reduce", geometry, *STEEL, *more)
     body = rom.load(path)
     assert body.provenance["reduction"]["columns"][-1].startswith(label)
     assert n_modes is None or found["n_modes"] == n_modes
@@ -487,17 +478,9 @@ def test_reduce_takes_a_method_or_a_tolerance(geometry, tmp_path, capsys, option
     assert body.frequencies(7)[6] == pytest.approx(full[6], rel=1e-3)
 
 
-@pytest.mark.parametrize(
-    "options",
-    [
-        ("--method", "guyan", "-m", 3),
-        ("--method", "rubin", "--f-max", 10),
-        ("--tol", 1e-3, "-m", 4),
-        ("--at", 5),
-        ("--characteristic", 8),
-    ],
-)
+@pytest.mark.parametrize("options", ["--method guyan -m 3", "--method rubin --f-max 10", "--at 5",
+                                     "--tol 1e-3 -m 4", "--characteristic 8"])  # fmt: skip
 def test_options_that_contradict_each_other_are_refused(options, tmp_path, capsys):
-    steel = ("reduce", "meshes/beam.geo", *STEEL, "-i", "root=rbe2", "-o", tmp_path / "b.npz")
-    assert main([*map(str, steel), *map(str, options)]) == 2
+    words = f"reduce meshes/beam.geo -i root=rbe2 -o {tmp_path}/b.npz {options}".split()
+    assert main([*words, *STEEL]) == 2
     assert capsys.readouterr().err.startswith("error: ")

@@ -11,7 +11,8 @@ from numpy.testing import assert_allclose
 import rom
 from cases.paths import TESTS
 from rom.cli.main import main
-from rom.cli.matrices import labels, source
+from rom.cli.matrices import labels
+from rom.config.component import source
 from rom.errors import ConfigError
 
 HERE = TESTS / "reference" / "foreign"

@@ -6,12 +6,16 @@ import logging
 import sys
 from collections.abc import Iterator
 from dataclasses import asdict
-from typing import Any
+from types import ModuleType
+from typing import TYPE_CHECKING
 
-from rom.cli.answer import Answer, table
+from rom.cli.answer import Answer, Data, table
 from rom.cli.options import option
 from rom.errors import ConfigError
 from rom.places import FOLDER_ABOVE
+
+if TYPE_CHECKING:
+    from benchmarks.benchmarks import Figure
 
 log = logging.getLogger("rom")
 SOURCE_FILES = ("pyproject.toml", "benchmarks/benchmarks.py")  # beside the package
@@ -37,7 +41,7 @@ def run(args: argparse.Namespace) -> Answer:
     return _answer(list(_told(known.run(tuple(args.names)))))
 
 
-def _of_the_source() -> Any:
+def _of_the_source() -> ModuleType:
     """The module of all benchmarks, which stand beside the package and are not installed."""
     if not all((FOLDER_ABOVE / file).is_file() for file in SOURCE_FILES):
         raise ConfigError(
@@ -48,17 +52,17 @@ def _of_the_source() -> Any:
     return importlib.import_module("benchmarks.benchmarks")
 
 
-def _told(figures: Iterator[Any]) -> Iterator[Any]:
+def _told(figures: "Iterator[Figure]") -> "Iterator[Figure]":
     """The figures, each said as soon as it is measured: a benchmark takes minutes."""
     for figure in figures:
         log.info("%s: %s %.4g %s", figure.case, figure.quantity, figure.value, figure.unit)
         yield figure
 
 
-def _answer(figures: list[Any]) -> Answer:
+def _answer(figures: "list[Figure]") -> Answer:
     rows = [
         (f"{f.benchmark}, {f.case}: {f.quantity}", f"{f.value:.4g} {f.unit}".strip(), f.aim)
         for f in figures
     ]
-    data: dict[str, Any] = {"figures": [asdict(f) for f in figures]}
+    data: Data = {"figures": [asdict(f) for f in figures]}
     return Answer(data, table(("figure", "value", "aim"), rows))

@@ -2,9 +2,8 @@
 
 import argparse
 from pathlib import Path
-from typing import Any
 
-from rom.cli.answer import Answer, failures, report_data
+from rom.cli.answer import Answer, Data, failures, report_data
 
 SUMMARY = "check a body file and print its certificate"
 EXAMPLES = """\
@@ -24,7 +23,7 @@ def run(args: argparse.Namespace) -> Answer:
     from rom.checks.gates import check
     from rom.io.native import load
 
-    data: dict[str, Any] = {"file": str(args.file)}
+    data: Data = {"file": str(args.file)}
     if args.file.suffix.lower() == ".sid_fem":
         from rom.io.sid.dialect import check_sid, read_sid
 

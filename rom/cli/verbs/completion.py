@@ -33,16 +33,14 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> Answer:
     """Build the text from the grammar, so that it never lags behind."""
-    from rom.cli.options import options_of
+    from rom.cli.options import options_of, verb_parsers
 
-    parser = args.parser
-    (verbs,) = (a for a in parser._actions if isinstance(a, argparse._SubParsersAction))
-    names = list(verbs.choices)
+    verbs = verb_parsers(args.parser)
     cases = "\n".join(
         f'        {name}) [[ "$word" == -* ]] && COMPREPLY=($(compgen -W '
-        f'"{" ".join(options_of(parser, name))}" -- "$word")) || COMPREPLY=() ;;'
-        for name in names
+        f'"{" ".join(options_of(parser))}" -- "$word")) || COMPREPLY=() ;;'
+        for name, parser in verbs.items()
     )
-    text = BASH_SCRIPT.format(verbs=" ".join([*names, *options_of(parser, None)]), cases=cases)
+    text = BASH_SCRIPT.format(verbs=" ".join([*verbs, *options_of(args.parser)]), cases=cases)
     text = (ZSH_SCRIPT if args.shell == "zsh" else "") + text.rstrip("\n")
     return Answer({"shell": args.shell, "text": text}, text)

@@ -10,6 +10,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from rom.cli.answer import Answer
+from rom.cli.options import option
 
 if TYPE_CHECKING:
     from rom.doctor.probes import Finding
@@ -26,11 +27,9 @@ EXAMPLES = """\
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of the verb."""
-    parser.add_argument("--fix", action="store_true", help="remove damaged files from the caches")
-    parser.add_argument(
-        "--compile", nargs="?", const="all", choices=("all", "demo"), metavar="demo",
-        help="compile what is not yet; with 'demo' only what first motions need",
-    )  # fmt: skip
+    option(parser, "--fix", "remove damaged files from the caches")
+    about = "compile what is not yet; with 'demo' only what first motions need"
+    option(parser, "--compile demo", about, str, nargs="?", const="all", choices=("all", "demo"))
 
 
 def run(args: argparse.Namespace) -> Answer:

@@ -1,11 +1,12 @@
 """Make or read a mesh, check it, and say what it holds."""
 
 import argparse
+from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from rom.cli.answer import Answer, table
+from rom.cli.answer import Answer, Data, table
 from rom.cli.described import component, described
 from rom.cli.options import add_geometry, add_solid, material, option, reading
 from rom.cli.output import add_force, checked
@@ -13,6 +14,7 @@ from rom.errors import ConfigError
 from rom.names import check_ending
 
 if TYPE_CHECKING:
+    from rom.config.component import Solid
     from rom.fe.mesh.solid import SolidMesh
     from rom.model import Material
 
@@ -94,7 +96,7 @@ def _solid(args: argparse.Namespace) -> "Material | None":
     return material(args)
 
 
-def _save(mesh: "SolidMesh", path: Path, solid: "Material | None") -> None:
+def _save(mesh: "SolidMesh", path: Path, solid: "Solid | dict[str, Solid] | None") -> None:
     from rom.fe.mesh.input_deck import input_deck
     from rom.fe.mesh.summary import vtk_cells
     from rom.io.fields.vtu import grid
@@ -120,7 +122,7 @@ def _draw(mesh: "SolidMesh", path: Path) -> None:
     faces(mesh.points, patches, path, title=Path(mesh.provenance["path"]).name)
 
 
-def _text(data: dict[str, Any]) -> str:
+def _text(data: Data) -> str:
     listed = data.get("faces", [])
     numbered = {_numbered(face) for face in listed}
     size = max(high - low for low, high in data["box"])
@@ -161,7 +163,7 @@ def _text(data: dict[str, Any]) -> str:
     return "\n".join(parts)
 
 
-def _row(face: dict[str, Any], size: float) -> tuple[str, ...]:
+def _row(face: Data, size: float) -> tuple[str, ...]:
     """One line of the list of faces; the name only where somebody gave one."""
     radius = "" if face["radius"] is None else f"{face['radius']:.6g}"
     direction = _words(face["axis"] or face["normal"] or ())
@@ -170,12 +172,12 @@ def _row(face: dict[str, Any], size: float) -> tuple[str, ...]:
     return number, face["kind"], radius, area, middle, direction, name
 
 
-def _numbered(face: dict[str, Any]) -> str:
+def _numbered(face: Data) -> str:
     """Name of a face without another one."""
     return f"{FACE_WORD} {face['number']}"
 
 
-def _words(x: Any, size: float = 1.0) -> str:
+def _words(x: Iterable[float], size: float = 1.0) -> str:
     """Numbers as they may be copied into --face; what the CAD integrates no closer is zero."""
     least = CAD_RTOL * size
     return ",".join(f"{value if abs(value) > least else 0.0:.4g}" for value in x)

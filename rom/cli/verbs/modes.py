@@ -3,15 +3,13 @@
 import argparse
 
 from rom.cli.answer import Answer, table
-from rom.cli.described import component, described
+from rom.cli.described import component, described, keyed
 from rom.cli.matrices import add_matrices, read_model
 from rom.cli.options import (
     add_geometry,
     add_interfaces,
-    add_material,
+    add_solid,
     assignment,
-    count,
-    names,
     option,
     typed_number,
     unique,
@@ -32,12 +30,11 @@ EXAMPLES = """\
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of the verb."""
     add_geometry(parser)
-    add_material(parser)
+    add_solid(parser)
+    keyed(parser, "--degree", "--solver")
     add_interfaces(parser)
     add_matrices(parser)
-    about = "number of modes; rigid ones count too"
-    option(parser, "-n --number", about, count, default=12)
-    option(parser, "--fixed NAME,...", "interfaces held, wholly or as NAME:yz", names)
+    keyed(parser, "-n --number", "--fixed NAME,...")
     about = (
         "stiffness from an interface to the ground, three translations [N/m] or those and three "
         "rotations [N m/rad]"

@@ -9,24 +9,20 @@ from math import pi
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rom.cli.answer import Answer, failures, report_data
-from rom.cli.described import component, described, rayleigh
+from rom.cli.answer import Answer, Data, failures, report_data
+from rom.cli.described import component, described, keyed, rayleigh
 from rom.cli.matrices import add_matrices, read_model, solid_options
 from rom.cli.options import (
     OUTPUT_FLAG,
     add_geometry,
     add_interfaces,
-    add_material,
-    count,
-    names,
-    number,
+    add_solid,
     option,
-    positive,
     require,
     unique,
 )
 from rom.cli.output import add_force, checked, files_in
-from rom.config.methods import CRAIG_BAMPTON, METHODS, SETTINGS, chosen
+from rom.config.methods import SETTINGS, chosen
 from rom.errors import ConfigError
 from rom.names import check_name
 
@@ -35,6 +31,8 @@ if TYPE_CHECKING:
 
     from rom.body.damping import ModalDamping, Rayleigh
     from rom.body.flexible import FlexibleBody
+    from rom.reduction.bases.method import Method
+    from rom.reduction.interfaces.characteristic import Characteristic
 
 SUMMARY = "reduce a model to a flexible body, with its certificate"
 EXAMPLES = """\
@@ -53,21 +51,16 @@ EXAMPLES = """\
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of the verb."""
     add_geometry(parser)
-    add_material(parser)
+    add_solid(parser)
+    keyed(parser, "--degree", "--solver")
     add_interfaces(parser)
     add_matrices(parser)
     add_method(parser)
-    about = "frame: mean-axis, an interface, or two interfaces A,B (default mean-axis)"
-    option(parser, "--reference FRAME", about, names, default=("mean-axis",))
+    keyed(parser, "--reference NAME,...")
     damping = parser.add_mutually_exclusive_group()
-    option(damping, "--damping-ratio", "of every mode of the free body, e.g. 0.01", number)
+    keyed(damping, "--damping-ratio")
     option(damping, "--rayleigh ALPHA,BETA", "D = ALPHA M + BETA K [1/s], [s]", str)
-    about = "of every mode with these interfaces held, wholly or as NAME:yz"
-    option(parser, "--damping-fixed NAME,...", about, names)
-    about = "add the geometric stiffness of rotation and of loads on the interfaces"
-    option(parser, "--stiffening", about)
-    option(parser, "--name", "name of the body (default: that of the file)", str)
-    option(parser, "--stress", "make surface stress recoverable")
+    keyed(parser, "--damping-fixed NAME,...", "--stiffening", "--name", "--stress")
     evidence = parser.add_mutually_exclusive_group()
     option(evidence, "--no-certificate", "skip the comparison")
     about = "full modes in every support, however long it takes"
@@ -132,7 +125,7 @@ def _damping(args: argparse.Namespace) -> "Rayleigh | ModalDamping | None":
     return None if args.rayleigh is None else Rayleigh(**rayleigh(args.rayleigh))
 
 
-def _data(body: "FlexibleBody", output: Path) -> dict[str, Any]:
+def _data(body: "FlexibleBody", output: Path) -> Data:
     return {
         "output": str(output),
         "name": body.name,
@@ -165,41 +158,14 @@ def _lowest(body: "FlexibleBody") -> str:
     return f"lowest elastic frequency: {lowest}; it depends on how the body is held"
 
 
-def frequencies(text: str) -> tuple[float, ...]:
-    """Numbers with commas."""
-    return tuple(map(number, text.split(",")))
-
-
 def add_method(parser: argparse.ArgumentParser) -> None:
     """What is kept of the body."""
-    about = (
-        "craig-bampton (default), enhanced (the same, corrected), guyan (statics only), "
-        "rubin or herting (free-free modes and statics), moment-matching (exact at --at), "
-        "balanced (what the interfaces know of the modes), free-free (no joint may clamp it), "
-        "assumed (modes under the --reference alone)"
-    )
-    option(parser, "--method", about, str, choices=METHODS, default=CRAIG_BAMPTON)
-    kept = parser.add_mutually_exclusive_group()
-    about = (
-        "modes kept; if missing, as many as the certificate needs for craig-bampton, 20 for "
-        "others; blocks per frequency for moment-matching (default 2)"
-    )
-    option(kept, "-m --modes", about, count)
-    about = "craig-bampton: keep all modes up to this frequency [Hz]"
-    option(kept, "--f-max", about, positive)
-    about = (
-        "craig-bampton: the fewest modes with this relative error of all frequencies up to "
-        "--f-max, or else of the lowest six in every support (default 5e-4)"
-    )
-    option(parser, "--tol", about, positive)
-    option(parser, "--at HZ,…", "moment-matching: where (default 0) [Hz]", frequencies)
-    about = "full interfaces follow N characteristic constraint modes"
-    option(parser, "--characteristic N", about, count)
-    about = "keep the answers to gravity along each axis (static correction)"
-    option(parser, "--gravity-shapes", about)
+    keyed(parser, "--method")
+    keyed(parser.add_mutually_exclusive_group(), "-m --modes", "--f-max")
+    keyed(parser, "--tol", "--at HZ,…", "--characteristic N", "--gravity-shapes")
 
 
-def method(args: argparse.Namespace) -> Any:
+def method(args: argparse.Namespace) -> "Method | Characteristic":
     """The method the options ask for; `rom.config.methods.chosen` refuses contradictions."""
     settings = {key: getattr(args, key) for key in SETTINGS if getattr(args, key) is not None}
     return chosen(settings, full=any(kind == "full" for _, kind in args.interface))

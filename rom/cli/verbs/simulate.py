@@ -9,12 +9,12 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from shlex import quote
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rom.cli.answer import Answer, failures, report_data
 from rom.cli.described import described, mechanism
 from rom.cli.options import OUTPUT_FLAG, add_meshing, option, positive, require, vector
-from rom.cli.output import add_force, checked, claim, files_in
+from rom.cli.output import add_force, check_encoder, checked, claim, files_in
 from rom.cli.ranks import ranks
 from rom.cli.verbs.swing import pendulum
 from rom.errors import ConfigError, ResourceError, RomError
@@ -23,6 +23,7 @@ from rom.names import inside
 if TYPE_CHECKING:
     from rom.body.flexible import FlexibleBody
     from rom.mbs.integrate.keeping import Keeping
+    from rom.mbs.results.solution import Solution
     from rom.model import Report
 
 log = logging.getLogger("rom")
@@ -77,11 +78,11 @@ def _mechanism(args: argparse.Namespace) -> Answer:
     paths = paths_of(file, claim(args))
     for path in paths:
         checked(args, path, inputs=files_in(file.values))
-    _check_encoder(paths)
+    check_encoder(paths)
     keep = _keeping(args, made_from(file))
     origin = {"command": _command(args), "version": __version__}
 
-    def rescue(solution: Any, audit: "Report") -> Path:
+    def rescue(solution: "Solution", audit: "Report") -> Path:
         motion, *_, record = Run(file, solution, audit, **origin).paths(args.output)
         Run(file, solution, audit, **origin).write_motion([motion, record])
         return motion
@@ -116,7 +117,7 @@ def _keeping(args: argparse.Namespace, made_from: dict[str, str]) -> "Keeping | 
 
 @contextmanager
 def _rescuing(
-    args: argparse.Namespace, keep: "Keeping | None", write: Callable[[Any, "Report"], Path]
+    args: argparse.Namespace, keep: "Keeping | None", write: Callable[["Solution", "Report"], Path]
 ) -> Iterator[None]:
     """Write the motion up to whatever ends it inside, and say how to go on."""
     try:
@@ -162,7 +163,9 @@ def _finishing(args: argparse.Namespace, keep: "Keeping | None") -> Iterator[Non
         keep.remove()
 
 
-def _answer(solution: Any, audit: "Report", paths: list[Path], write: Any) -> Answer:
+def _answer(
+    solution: "Solution", audit: "Report", paths: list[Path], write: Callable[[], None]
+) -> Answer:
     from rom.report.run import happened
 
     data = {
@@ -207,13 +210,13 @@ def _pendulum(args: argparse.Namespace) -> Answer:
     tables = [path.with_suffix(f".history.{args.history}")] if args.history else []
     last = (folder / SCENE_FILE, folder / RECORD_FILE)
     paths = [checked(args, each) for each in (path, *films, *tables, *last)]
-    _check_encoder(films)
+    check_encoder(films)
     hung = {"axis": args.axis, "gravity": args.gravity, "hinge": args.hinge}
     made_from = {f"--{name}": repr(value) for name, value in hung.items()}
     keep = _keeping(args, made_from | {str(args.file): file_digest(args.file)})
     record = Record(body.name, _command(args), __version__)
 
-    def rescue(solution: Any, audit: "Report") -> Path:
+    def rescue(solution: "Solution", audit: "Report") -> Path:
         _write_motion(path, tables, body, solution)
         record.write([path, *tables, args.output / RECORD_FILE], solution, audit)
         return path
@@ -237,7 +240,7 @@ def _command(args: argparse.Namespace) -> str:
 
 def _swing(
     body: "FlexibleBody", args: argparse.Namespace, keep: "Keeping | None"
-) -> tuple[Any, Any]:
+) -> tuple["Solution", "Report"]:
     from rom.mbs.integrate.simulation import simulate
     from rom.mbs.results.audit import audit
 
@@ -247,7 +250,9 @@ def _swing(
     return solution, audit(solution)
 
 
-def _write_motion(path: Path, tables: list[Path], body: "FlexibleBody", solution: Any) -> None:
+def _write_motion(
+    path: Path, tables: list[Path], body: "FlexibleBody", solution: "Solution"
+) -> None:
     from rom.io.history import write_history
 
     _write(path, body, solution)
@@ -255,15 +260,7 @@ def _write_motion(path: Path, tables: list[Path], body: "FlexibleBody", solution
         write_history(solution, table)
 
 
-def _check_encoder(paths: list[Path]) -> None:
-    """Refuse a film that cannot be made before the motion is computed."""
-    if any(path.suffix == ".mp4" for path in paths):
-        from rom.view.canvas.films import encoder
-
-        encoder()
-
-
-def _write_films(films: list[Path], solution: Any) -> None:
+def _write_films(films: list[Path], solution: "Solution") -> None:
     from rom.view.scenes.animation_files import write_animation
     from rom.view.scenes.film import animate
 
@@ -274,14 +271,14 @@ def _write_films(films: list[Path], solution: Any) -> None:
             write_animation(solution, film)
 
 
-def _write_scene(path: Path, body: "FlexibleBody", solution: Any) -> None:
+def _write_scene(path: Path, body: "FlexibleBody", solution: "Solution") -> None:
     from rom.report.scene import motion_scene
     from rom.report.scene_file import write_scene
 
     write_scene(motion_scene(solution, title=f"Motion of {body.name}"), path)
 
 
-def _write(path: Path, body: "FlexibleBody", solution: Any) -> None:
+def _write(path: Path, body: "FlexibleBody", solution: "Solution") -> None:
     """One line per time: positions of the interfaces [m], then elastic coordinates."""
     import numpy as np
 

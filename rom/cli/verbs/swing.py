@@ -14,17 +14,21 @@ import sys
 from dataclasses import dataclass
 from math import pi, sqrt
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from rom.cli.answer import Answer, failures, report_data
+from rom.cli.answer import Answer, Data, failures, report_data
 from rom.cli.options import add_geometry, count, face, option, positive, reading, unique, vector
-from rom.cli.output import add_force, checked, claim
+from rom.cli.output import add_force, check_encoder, checked, claim
 from rom.errors import ConfigError
 from rom.names import inside
 
 if TYPE_CHECKING:
+    import numpy.typing as npt
+
     from rom.body.flexible import FlexibleBody
     from rom.mbs.mechanism import Mechanism
+    from rom.mbs.results.solution import Solution
+    from rom.model import Array
     from rom.reduction.full_model import MassProperties
 
 log = logging.getLogger("rom")
@@ -87,25 +91,23 @@ def run(args: argparse.Namespace) -> Answer:
         "frequencies": body.frequencies(6, fixed=(hinge,)).tolist(),
         "certificate": report_data(certificate),
     }
-    return Answer(
-        data, _text(body, hinge, data), lambda: _write(files, body, (mechanism, solution), magnify),
-        tuple(text for text in failures(certificate) if not text.startswith("free:")),
-    )  # fmt: skip
+    failed = tuple(text for text in failures(certificate) if not text.startswith("free:"))
+    motion = mechanism, solution
+    text = _text(body, hinge, data)
+    return Answer(data, text, lambda: _write(files, body, motion, magnify), failed)
 
 
 def _files(args: argparse.Namespace) -> dict[str, Path]:
     """What will be written, by its ending; refused before the computation."""
     folder = claim(args)
     films = [kind for kind, asked in ((".gif", args.film), (".mp4", args.mp4)) if asked]
-    if args.mp4:
-        from rom.view.canvas.films import encoder
-
-        encoder()
     kinds = (".rom.npz", ".png", *films)
-    return {kind: checked(args, inside(folder, args.file.stem, kind)) for kind in kinds}
+    paths = {kind: checked(args, inside(folder, args.file.stem, kind)) for kind in kinds}
+    check_encoder(paths.values())
+    return paths
 
 
-def hinge_of(text: str) -> tuple[str, dict[str, Any]]:
+def hinge_of(text: str) -> tuple[str, dict[str, str]]:
     """Name of the interface, and the face to pick for it if it has none."""
     from rom.fe.mesh.picks import is_pick
 
@@ -113,7 +115,7 @@ def hinge_of(text: str) -> tuple[str, dict[str, Any]]:
 
 
 def _reduced(
-    args: argparse.Namespace, hinge: str, faces: dict[str, Any]
+    args: argparse.Namespace, hinge: str, faces: dict[str, str]
 ) -> "tuple[FlexibleBody, Swing]":
     """The body, and how it will swing, which is refused before the reduction."""
     how = reading(args)  # refused before dolfinx is loaded
@@ -131,11 +133,9 @@ def _reduced(
     (at,), rigid = found(full, [hinge]), mass_properties(full)
     log.info("%s: %d dofs, %.4g kg of %s", args.file, full.n_dofs, rigid.mass, args.material)
     swing = planned(rigid, at.origin, args.gravity, args.t_end, axis=at.axis)
-    body = reduce(
-        full, method=CraigBampton(args.modes), interfaces={hinge: "rbe2"}, reference=hinge,
-        damping=ModalDamping(0.01, fixed=(hinge,)), name=args.file.stem,
-    )  # fmt: skip
-    return body, swing
+    how = {"method": CraigBampton(args.modes), "damping": ModalDamping(0.01, fixed=(hinge,))}
+    kinds = {hinge: "rbe2"}
+    return reduce(full, interfaces=kinds, reference=hinge, name=args.file.stem, **how), swing
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,11 +149,11 @@ class Swing:
 
 def planned(
     rigid: "MassProperties",
-    point: Any,
-    gravity: Any = None,
+    point: "Array",
+    gravity: "npt.ArrayLike | None" = None,
     t_end: float | None = None,
     *,
-    axis: Any = None,
+    axis: "Array | None" = None,
 ) -> Swing:
     """The swing of a body from rest, for one period of the rigid pendulum if nobody says how long.
 
@@ -182,7 +182,7 @@ def planned(
     return Swing(tuple(g.tolist()), tuple(n.tolist()), t_end or FAR_SWING * period)
 
 
-def _across(arm: Any, axis: Any) -> Any:
+def _across(arm: "Array", axis: "Array | None") -> "Array":
     """Gravity along the coordinate axis most across the arm, less what pulls along the hinge."""
     import numpy as np
 
@@ -195,7 +195,7 @@ def _across(arm: Any, axis: Any) -> Any:
     return 9.81 * down / np.linalg.norm(down) + 0.0
 
 
-def _square_across(x: Any, n: Any) -> float:
+def _square_across(x: "Array", n: "Array") -> float:
     """Squared distance of a point from the axis through the origin."""
     return float(x @ x - (x @ n) ** 2)
 
@@ -220,14 +220,16 @@ def leave_uncompiled() -> None:
     numba.config.DISABLE_JIT = True
 
 
-def _moved(body: "FlexibleBody", hinge: str, swing: Swing) -> tuple[Any, Any]:
+def _moved(body: "FlexibleBody", hinge: str, swing: Swing) -> "tuple[Mechanism, Solution]":
     from rom.mbs.integrate.simulation import simulate
 
     mechanism = pendulum(body, hinge, axis=swing.axis, gravity=swing.gravity)
     return mechanism, simulate(mechanism, t_end=swing.t_end, dt=swing.t_end / N_STEPS, rho_inf=0.5)
 
 
-def pendulum(body: "FlexibleBody", hinge: str, *, axis: Any, gravity: Any) -> "Mechanism":
+def pendulum(
+    body: "FlexibleBody", hinge: str, *, axis: "npt.ArrayLike", gravity: "npt.ArrayLike"
+) -> "Mechanism":
     """A body that hangs on one of its interfaces where it was drawn."""
     from rom.mbs.mechanism import Mechanism
 
@@ -238,7 +240,7 @@ def pendulum(body: "FlexibleBody", hinge: str, *, axis: Any, gravity: Any) -> "M
     return mechanism
 
 
-def magnification(body: "FlexibleBody", q: Any) -> float:
+def magnification(body: "FlexibleBody", q: "Array") -> float:
     """1, 2 or 5 times a power of ten, at least 1, with which the largest deformation is seen.
 
     Of a body with its surface, over elastic coordinates q (n_t, r).
@@ -253,7 +255,10 @@ def magnification(body: "FlexibleBody", q: Any) -> float:
 
 
 def _write(
-    files: dict[str, Path], body: "FlexibleBody", motion: tuple[Any, Any], magnify: float
+    files: dict[str, Path],
+    body: "FlexibleBody",
+    motion: "tuple[Mechanism, Solution]",
+    magnify: float,
 ) -> None:
     import numpy as np
 
@@ -268,7 +273,7 @@ def _write(
         animate(*motion, path, magnify=magnify, up=up, frames=40)
 
 
-def _text(body: "FlexibleBody", hinge: str, data: dict[str, Any]) -> str:
+def _text(body: "FlexibleBody", hinge: str, data: Data) -> str:
     full = body.provenance["reduction"]["full dofs"]
     held = ", ".join(f"{f:.5g}" for f in data["frequencies"])
     axis, down = (",".join(f"{x:.4g}" for x in data[key]) for key in ("axis", "gravity"))

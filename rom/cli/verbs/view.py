@@ -6,13 +6,16 @@ A body moves in its modes, a component shows its mesh, a mechanism its bodies as
 import argparse
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from rom.cli.answer import Answer
 from rom.cli.described import component, described, mechanism
 from rom.cli.options import add_meshing, count, names, option
 from rom.cli.output import add_force, checked
 from rom.names import check_ending
+
+if TYPE_CHECKING:
+    from rom.view.scenes.window import Scene
 
 SUMMARY = "look at a body, a component or a mechanism"
 EXAMPLES = """\
@@ -52,7 +55,9 @@ def run(args: argparse.Namespace) -> Answer:
     return Answer(data, f"{path}: {what}{why}", lambda: draw(path))
 
 
-def _subject(args: argparse.Namespace) -> tuple[str, Callable[[Path], Any], Callable[[], Any]]:
+def _subject(
+    args: argparse.Namespace,
+) -> tuple[str, Callable[[Path], object], "Callable[[], list[Scene]]"]:
     """What it is, how it is drawn, and how it is shown in a window."""
     from rom.view.scenes.window import Scene, mode_scenes
 
