@@ -6,9 +6,10 @@ Source:
 """
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -24,6 +25,7 @@ BEGIN_PATTERN, END_PATTERN = (
     re.compile(p, re.IGNORECASE) for p in (r"\s*BEGIN(\s+BULK)?\s*(\$|$)", r"ENDDATA")
 )
 POINTS = ("GRID", "GRDSET", "CORD1R", "CORD1C", "CORD1S", "CORD2R", "CORD2C", "CORD2S")
+Number = TypeVar("Number", int, float)
 PER_LINE = 8  # fields of a line, of 8 characters each or 4 of 16, behind the name
 
 
@@ -42,19 +44,17 @@ class Card:
 
     def whole(self, k: int, empty: int | None = None) -> int:
         """Field k as a whole number, with a value for an empty one."""
-        if not self.text(k) and empty is not None:
-            return empty
-        try:
-            return whole(self.text(k))
-        except ValueError as error:
-            raise self.wrong(f"field {k + 2}: {error}") from error
+        return empty if not self.text(k) and empty is not None else self._read(whole, k)
 
     def reals(self, *places: int) -> list[float]:
         """Fields as numbers; empty ones are zero."""
+        return [self._read(real, k) for k in places]
+
+    def _read(self, kind: Callable[[str], Number], k: int) -> Number:
         try:
-            return [real(self.text(k)) for k in places]
+            return kind(self.text(k))
         except ValueError as error:
-            raise self.wrong(error) from error
+            raise self.wrong(f"field {k + 2}: {error}") from error
 
     def wrong(self, why: object) -> FileFormatError:
         """The error of this card."""
@@ -82,10 +82,9 @@ def cards(path: str | Path) -> Iterator[Card]:
                 yield card
             card = Card(head.rstrip("*_ "), fields, place)  # meshio writes CTETRA_
         elif not card.name or (card.mark[1:] and head[1:] and card.mark[1:] != head[1:]):
-            raise FileFormatError(
-                f"this line, marked {head!r}, does not continue the card before it.",
-                where=at(place), hint="Put continuations behind their cards.",
-            )  # fmt: skip
+            why = f"this line, marked {head!r}, does not continue the card before it."
+            hint = "Put continuations behind their cards."
+            raise FileFormatError(why, where=at(place), hint=hint)
         else:
             if len(fields) == PER_LINE:  # a lonely wide line is half a narrow one
                 card.fields += [""] * (-len(card.fields) % PER_LINE)
@@ -103,10 +102,9 @@ def _fields(line: str, place: Place) -> tuple[str, list[str], str]:
         head, *words = (word.strip() for word in line.split(","))
         words += [""] * (n + 1 - len(words))
         if any(words[n + 1 :]) or words[n][:1] not in ("", "+", "*"):
-            raise FileFormatError(
-                f"a line has {1 + len(words)} fields; {n + 1} are read.",
-                where=at(place), hint="Continue on the next line, behind a + and a comma.",
-            )  # fmt: skip
+            why = f"a line has {1 + len(words)} fields; {n + 1} are read."
+            hint = "Continue on the next line, behind a + and a comma."
+            raise FileFormatError(why, where=at(place), hint=hint)
         return head, words[:n], words[n]
     fields = [line[k : k + 64 // n].strip() for k in range(PER_LINE, 72, 64 // n)]
     return line[:PER_LINE].strip(), fields, line[72:80].strip()
@@ -124,8 +122,9 @@ def grids(found: dict[str, list[Card]]) -> tuple[Index, Array, Index]:
         row = card.whole(1, own), card.reals(2, 3, 4), card.whole(5, turned)
         if grid.setdefault(card.whole(0), row) is not row:
             raise card.wrong(f"node {card.whole(0)} is defined twice")
-    axes = {card.whole(k): (card, k) for name in POINTS[2:] for card in found.get(name, ())
-            for k in (0, 4) if not k or (name[4] == "1" and card.text(k))}  # fmt: skip
+    systems = [card for name in POINTS[2:] for card in found.get(name, ())]
+    places = [(card, k) for card in systems for k in (0, 4) if not k or card.text(k)]
+    axes = {card.whole(k): (card, k) for card, k in places if not k or card.name[4] == "1"}
     known: dict[int, System | None] = {0: BASIC_SYSTEM}  # None while it is being resolved
 
     def resolved(number: int, by: Card) -> System:

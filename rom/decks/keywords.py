@@ -1,10 +1,9 @@
 """Blocks of Abaqus and CalculiX decks: a keyword with options, and its rows of data."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -17,6 +16,7 @@ INCLUDE_PATTERN = re.compile(
     r"""\s*\*(?P<keyword>[^*,][^,]*),(.*,)?\s*INPUT\s*=\s*(?P<file>"[^"]*"|[^,\n]+)""",
     re.IGNORECASE,
 )
+Member = int | range | str  # a number, some of them, or the name of another set
 MOST_NESTED, MOST_NODES = 200, 100_000_000  # sets in sets, numbers in a set
 
 
@@ -52,11 +52,11 @@ class Block:
         except ValueError as error:
             raise self.wrong(error, row) from error
 
-    def members(self) -> list[Any]:
+    def members(self) -> list[Member]:
         """Numbers, ranges of numbers and names of sets, as the rows of a set list them."""
         if "GENERATE" in self.options:
-            ends = [[self.whole(r, k, 1 if k == 2 else None) for k in range(3)]
-                    for r in range(len(self.rows))]  # fmt: skip
+            rows = range(len(self.rows))
+            ends = ((self.whole(r, 0), self.whole(r, 1), self.whole(r, 2, 1)) for r in rows)
             return [range(low, high + 1, max(step, 1)) for low, high, step in ends]
         words = (word.strip('"') for row in self.rows for word in row if word)
         return [int(word) if is_whole(word) else word for word in words]
@@ -101,10 +101,10 @@ class Sets:
 
     what: str = "nodes"
     names: dict[str, str] = field(default_factory=dict)
-    members: dict[str, list[Any]] = field(default_factory=dict)
+    members: dict[str, list[Member]] = field(default_factory=dict)
     known: dict[str, Index | None] = field(default_factory=dict)  # None while being resolved
 
-    def add(self, name: str, members: list[Any]) -> None:
+    def add(self, name: str, members: Sequence[Member]) -> None:
         """Put members into a set."""
         self.names.setdefault(name.upper(), name)
         self.members.setdefault(name.upper(), []).extend(members)

@@ -72,8 +72,8 @@ class Unread(dict[str, list[Place]]):
         self.setdefault(name, []).append(place)
 
     def __str__(self) -> str:
-        return ", ".join(f"{name} ({len(places)}, {places[0][0].name} line {places[0][1]})"
-                         for name, places in self.items())  # fmt: skip
+        first = {name: (len(places), *places[0]) for name, places in self.items()}
+        return ", ".join(f"{name} ({n}, {p.name} line {k})" for name, (n, p, k) in first.items())
 
     def refuse(self) -> None:
         """Raise a FileFormatError that names all of them, if there are any."""

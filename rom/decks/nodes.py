@@ -60,8 +60,8 @@ class Nodes:
             if not (other or step) or block.keyword == "MODEL CHANGE":
                 kept.append((inside or not names, block))
                 if names and not inside:
-                    outside |= {block.options[sort].upper()
-                                for sort in {"NSET", "ELSET"} & block.options.keys()}  # fmt: skip
+                    sorts = {"NSET", "ELSET"} & block.options.keys()
+                    outside |= {block.options[sort].upper() for sort in sorts}
             step = block.keyword == "STEP" or (step and block.keyword != "END STEP")
             if block.keyword in ("END PART", "END INSTANCE"):
                 inside = other = False
@@ -100,8 +100,8 @@ def _rename(block: Block, prefix: str, outside: set[str], *, inside: bool) -> No
 
 def _system(deck: Nodes, block: Block) -> None:
     """``*SYSTEM``, of one point, three, or none; a part begins and ends without."""
-    x = np.array([v for r, row in enumerate(block.rows)
-                  for v in block.reals(r, *(k for k, word in enumerate(row) if word))])  # fmt: skip
+    given = [[k for k, word in enumerate(row) if word] for row in block.rows]
+    x = np.array([v for r, columns in enumerate(given) for v in block.reals(r, *columns)])
     if x.size not in (0, 3, 9):
         raise block.wrong(f"it has {x.size} numbers instead of 0, 3 or 9")
     deck.axes = System(x, np.eye(3)) if x.size == 3 else BASIC_SYSTEM
@@ -131,6 +131,10 @@ def _part(deck: Nodes, block: Block) -> None:
         deck.unread.add(f"moved *{block.keyword}", block.place)
 
 
+def _node_set(deck: Nodes, block: Block) -> None:
+    deck.node_sets.add(block.option("NSET"), block.members())
+
+
 NODE_KEYWORDS: Table = {
     "PART": (_part, ("NAME",)),
     "END PART": (_part, ()),
@@ -138,6 +142,5 @@ NODE_KEYWORDS: Table = {
     "END INSTANCE": (_part, ()),
     "SYSTEM": (_system, ()),
     "NODE": (_node, ("NSET", "SYSTEM")),
-    "NSET": (lambda deck, block: deck.node_sets.add(block.option("NSET"), block.members()),
-             ("NSET", *SET_OPTIONS)),
-}  # fmt: skip
+    "NSET": (_node_set, ("NSET", *SET_OPTIONS)),
+}

@@ -9,23 +9,29 @@ from collections.abc import Callable
 from functools import partial
 from itertools import combinations
 from time import process_time
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.sparse import csr_matrix, identity
 
-from rom.doctor.probes import say
+from rom.doctor.probes import Answer, say
 from rom.fields import families, find, names
 from rom.model import FEModel, Interface
 from rom.reduction.bases.method import CraigBampton
 from rom.workflow import reduce
+
+if TYPE_CHECKING:
+    from rom.body.flexible import FlexibleBody
+    from rom.mbs.mechanism import Mechanism
+    from rom.mbs.results.solution import Solution
+    from rom.mbs.results.state import State
 
 MODULE_NAME = "rom.doctor.first_use"  # also where it is run as a program
 ORIGIN, Z_AXIS = (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 STEPS = {"t_end": 2e-4, "dt": 1e-4}
 
 
-def pendulum() -> Any:
+def pendulum() -> "Mechanism":
     """A rigid bob on a hinge, hanging down."""
     from rom.mbs.mechanism import Mechanism
 
@@ -36,7 +42,7 @@ def pendulum() -> Any:
     return mech
 
 
-def _lattice() -> Any:
+def _lattice() -> "FlexibleBody":
     """A reduced bar of springs between points of a grid, 160 mm long along x."""
     grid = np.meshgrid(np.linspace(0.0, 0.16, 5), (-0.01, 0.01), (-0.01, 0.01), indexing="ij")
     x = np.array(grid).reshape(3, -1).T
@@ -51,11 +57,11 @@ def _lattice() -> Any:
         for name, nodes in (("root", np.arange(4)), ("tip", np.arange(len(x))[-4:]))
     }
     model = FEModel(csr_matrix(K), 0.01 * identity(x.size, format="csr"), x, ends)
-    return reduce(model, method=CraigBampton(4), interfaces=dict.fromkeys(ends, "rbe2"),
-                  reference="root", certify=False)  # fmt: skip
+    method, kinds = CraigBampton(4), dict.fromkeys(ends, "rbe2")
+    return reduce(model, method=method, interfaces=kinds, reference="root", certify=False)
 
 
-def _move(mechanism: Any, **how: Any) -> Any:
+def _move(mechanism: "Mechanism", **how: Any) -> "Solution":
     from rom.mbs.integrate.simulation import simulate
 
     return simulate(mechanism, **(STEPS | how))
@@ -76,10 +82,10 @@ def _slider_crank() -> None:
     from rom.mbs.results.audit import audit
 
     mech, radius, speed = Mechanism(gravity=(0.0, -9.81, 0.0)), 0.04, 300.0
-    crank = mech.add_rigid("crank", mass=1.0, inertia=(1e-3,) * 3, at=ORIGIN,
-                           omega=(0.0, 0.0, speed))  # fmt: skip
-    rod = mech.add_flexible("rod", _lattice(), at=(radius, 0, 0), velocity=(0, speed * radius, 0),
-                            omega=(0, 0, -speed * radius / 0.16))  # fmt: skip
+    turning, swinging = (0.0, 0.0, speed), (0.0, 0.0, -speed * radius / 0.16)
+    crank = mech.add_rigid("crank", mass=1.0, inertia=(1e-3,) * 3, at=ORIGIN, omega=turning)
+    begin = {"at": (radius, 0, 0), "velocity": (0, speed * radius, 0), "omega": swinging}
+    rod = mech.add_flexible("rod", _lattice(), **begin)
     end = (0.16 + radius, 0.0, 0.0)
     slider = mech.add_rigid("slider", mass=0.3, inertia=(1e-4,) * 3, at=end)
     mech.revolute("main", mech.ground.marker(ORIGIN), crank.marker(ORIGIN), axis=Z_AXIS)
@@ -120,9 +126,8 @@ def _elements() -> None:
     mech = pendulum()
     mech.law("law", lambda t, parameters, motion, memory, out: None, mech.ground.marker(ORIGIN))
     mech.rotational_spring("turn", "hinge", stiffness=1.0)
-    above = mech.ground.marker((0.0, 0.0, 9.0))
-    mech.capsule_on_capsule("bars", above, mech.part("bob").marker(ORIGIN), Impact(1e3),
-                            radius1=0.1, radius2=0.1)  # fmt: skip
+    ends = mech.ground.marker((0.0, 0.0, 9.0)), mech.part("bob").marker(ORIGIN)
+    mech.capsule_on_capsule("bars", *ends, Impact(1e3), radius1=0.1, radius2=0.1)
     _move(mech).element("turn")
 
 
@@ -135,13 +140,13 @@ def _formulas() -> None:
     twice = formula(((X, 0.0), (NUMBER, -2.0), (MUL, 0.0)))
     mech = pendulum()
     mech.motor("motor", "hinge", twice)
-    line_law(mech, "line", mech.ground.marker((0.1, 0.0, 0.0)), mech.part("bob").marker(ORIGIN),
-             twice)  # fmt: skip
+    ends = mech.ground.marker((0.1, 0.0, 0.0)), mech.part("bob").marker(ORIGIN)
+    line_law(mech, "line", *ends, twice)
     _move(mech)
     twice.rate(0.0)
 
 
-def _equilibrium() -> Any:
+def _equilibrium() -> tuple["Mechanism", "State"]:
     from rom.mbs.analysis.equilibrium import equilibrium
 
     mech = pendulum()
@@ -176,7 +181,7 @@ CASES: dict[str, Callable[[], object]] = {
 DEMO_CASES = ("pendulum", "slider-crank")  # what `make demo` and the first page need
 
 
-def measured(name: str) -> dict[str, Any]:
+def measured(name: str) -> Answer:
     """Do a case; functions compiled and time of the processor [s], with that of imports."""
     began = process_time()
     CASES[name]()

@@ -9,7 +9,7 @@ import re
 import shutil
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from rom.doctor.core import abilities, better, taken_for
-from rom.doctor.probes import Finding, say
+from rom.doctor.probes import Answer, Finding, say
 from rom.fe import GMSH_LIBRARIES, WHEEL_PACKAGES
 from rom.places import PACKAGE
 from rom.process import mpirun
@@ -59,7 +59,7 @@ def light() -> list[Finding]:
     return found
 
 
-def fenicsx(found: dict[str, dict[str, Any]], ending: str) -> list[Finding]:
+def fenicsx(found: dict[str, Answer], ending: str) -> list[Finding]:
     """One finding per library, of the answers of a probe that ended well, "", or otherwise."""
     findings = [_finding(name, found.get(name), ending) for name in PACKAGES]
     findings.insert(1, _launcher(found.get("MPI", {}).get("version", "")))
@@ -68,7 +68,7 @@ def fenicsx(found: dict[str, dict[str, Any]], ending: str) -> list[Finding]:
     return findings
 
 
-def _finding(name: str, answer: dict[str, Any] | None, ending: str) -> Finding:
+def _finding(name: str, answer: Answer | None, ending: str) -> Finding:
     if answer is None:
         return Finding("FEniCSx", name, ending or "no answer", "broken", "reinstall it")
     if answer.get("missing"):
@@ -136,15 +136,15 @@ def _other_ways() -> list[Finding]:
     value = "does not see the packages of the system"
     if not Path(sys.base_prefix).samefile("/usr"):
         value = f"Debian's packages serve /usr/bin/python3, this is {sys.executable}"
-    found = [Finding("FEniCSx", "environment", value, "note",
-                     "/usr/bin/python3 -m venv --system-site-packages .venv")]  # fmt: skip
+    advice = "/usr/bin/python3 -m venv --system-site-packages .venv"
+    found = [Finding("FEniCSx", "environment", value, "note", advice)]
     if sys.version_info < WHEELS_NEED:
         value = f"by pip alone with Python {newer} or later, this is {platform.python_version()}"
         found.append(Finding("FEniCSx", "other way", value, "note", wheels))
     return found
 
 
-def pictures(found: dict[str, dict[str, Any]], ending: str) -> list[Finding]:
+def pictures(found: dict[str, Answer], ending: str) -> list[Finding]:
     """Versions, and whether a sphere could be drawn off-screen."""
     if "pyvista" not in found:
         state = "missing" if "No module named" in ending else "broken"
@@ -165,7 +165,7 @@ def _for_pictures() -> str:
     return INSTALL_COMMAND + (BESIDE_DEBIAN if sees_debian() else "")
 
 
-def _display(picture: dict[str, Any] | None, ending: str) -> Finding:
+def _display(picture: Answer | None, ending: str) -> Finding:
     name = "drawing off-screen"
     if picture is None:
         return Finding("pictures", name, ending or "no answer", "broken", SYSTEM_COMMAND)
@@ -212,7 +212,7 @@ def machine() -> list[Finding]:
     ]
 
 
-def caches(forms: dict[str, Any], *, fix: bool) -> list[Finding]:
+def caches(forms: Answer, *, fix: bool) -> list[Finding]:
     """State of the cache of compiled forms, by what the probe says, and of Numba's.
 
     To fix is to remove damaged files; the probe has removed those of forms.
@@ -225,14 +225,14 @@ def caches(forms: dict[str, Any], *, fix: bool) -> list[Finding]:
     return [*found, _cache("compiled by Numba", "", damaged, fix)]
 
 
-def _form_cache(forms: dict[str, Any], fix: bool) -> Finding:
+def _form_cache(forms: Answer, fix: bool) -> Finding:
     if not forms["writable"]:
         value = f"{forms['path']} cannot be written; forms are compiled in every run"
         return Finding("caches", "compiled forms", value, "note", f"chown it: {forms['path']}")
     return _cache("compiled forms", forms["path"], forms["stale"], fix)
 
 
-def _cache(name: str, where: str, damaged: list[Any], fix: bool) -> Finding:
+def _cache(name: str, where: str, damaged: Sequence[object], fix: bool) -> Finding:
     if not damaged:
         return Finding("caches", name, f"{where} healthy".strip())
     if fix:

@@ -16,6 +16,7 @@ from rom.process import child
 
 TIME_LIMIT = 60.0  # [s]; a first import from a cold disk takes a few
 LOOK_EVERY = 0.05  # [s] between looks at which process has ended
+Answer = dict[str, Any]  # of JSON
 ONE_THREAD = {"OMP_NUM_THREADS": "1"}
 
 
@@ -37,7 +38,7 @@ class Probe:
     process: subprocess.Popen[bytes]  # noqa: TID251  a type
     ending: str = ""  # what happened before a good end
 
-    def answer(self) -> dict[str, dict[str, Any]]:
+    def answer(self) -> dict[str, Answer]:
         """What the process found, by name."""
         done = child.finish(self.process, TIME_LIMIT)
         if done.overtime:
@@ -53,7 +54,7 @@ def start(module: str, *arguments: str) -> Probe:
     return Probe(child.start(child.python(module, *arguments)))
 
 
-def say(name: str, **found: Any) -> None:
+def say(name: str, **found: object) -> None:
     """Write a line of what a process has found."""
     sys.stdout.write(json.dumps({"name": name, **found}) + "\n")
     sys.stdout.flush()

@@ -10,7 +10,6 @@ import sys
 import warnings
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 from rom.errors import RomError, RomWarning
 from rom.fmu.driven import driven, serve
@@ -23,15 +22,15 @@ def main(resources: Path, *description: str) -> int:
         with socket.socket(fileno=os.dup(0)) as connection:
             serve(connection, lambda: driven(resources))
         return 0
-    found: Any
+    found: dict[str, object]
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", RomWarning)
         try:
             found = {"variables": [asdict(variable) for variable in driven(resources).variables]}
         except RomError as error:
             found = {"error": error.message, "hint": error.hint}
-    found["warnings"] = [str(warning.message) for warning in caught
-                         if issubclass(warning.category, RomWarning)]  # fmt: skip
+    told = (warning for warning in caught if issubclass(warning.category, RomWarning))
+    found["warnings"] = [str(warning.message) for warning in told]
     Path(description[0]).write_text(json.dumps(found))
     return 0
 

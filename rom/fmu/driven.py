@@ -12,7 +12,7 @@ import socket
 import struct
 import sys
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,7 @@ import numpy as np
 from rom.arguments import between, number, positive
 from rom.errors import ConfigError, RomError, RomWarning, SolverError
 from rom.fmu.variables import Inputs, Outputs
+from rom.fmu.variables import Kept as KeptInputs
 from rom.io.fmu.description import Variable
 from rom.mbs.elements.family import apply_laws
 from rom.mbs.equations.equations import evaluate
@@ -40,6 +41,7 @@ SETTINGS_FILE, BUILD_FUNCTION = "fmu.json", "mechanism"
 OK, ERROR = 0, 3
 HEAD_LAYOUT = struct.Struct("=iii")
 NO_VALUES = np.zeros(0)
+Kept = tuple[State | None, bool, Array, KeptInputs]  # all that the next steps depend on
 
 
 class Driven:
@@ -84,7 +86,7 @@ class Driven:
             *self.outputs.variables,
         ]
 
-    def set(self, refs: Any, values: Any) -> None:
+    def set(self, refs: Iterable[int], values: Iterable[float]) -> None:
         """Set parameters, before the first step only, and inputs."""
         known = self.variables
         for ref, value in zip(refs, values, strict=True):
@@ -104,7 +106,7 @@ class Driven:
                 between("rho_inf", value, 0, 1)
             self.parameters[ref] = value
 
-    def get(self, refs: Any) -> Array:
+    def get(self, refs: Index) -> Array:
         """Values of variables."""
         first, count = 2 + self.inputs.values.size, len(self.variables)
         if wrong := [int(ref) for ref in refs if not 0 <= ref < count]:
@@ -136,18 +138,20 @@ class Driven:
         dt, begun = h / n, self._jumped(self.state)
         if begun.memory is not None and abs(begun.memory.h - dt) < TIME_RTOL * dt:
             dt = begun.memory.h  # callers subtract times; one step length needs one factorisation
-        how: dict[str, Any] = {"dt": dt, "rho_inf": float(self.parameters[1]), "save_every": n}
-        motion = simulate(self.mechanism, t_end=begun.t + n * dt, state=begun, **how)
+        t_end, rho_inf = begun.t + n * dt, float(self.parameters[1])
+        motion = simulate(
+            self.mechanism, t_end=t_end, dt=dt, state=begun, save_every=n, rho_inf=rho_inf
+        )
         if abs(motion.final.t - begun.t - h) > 2 * TIME_RTOL * h:
             raise SolverError(f"the mechanism ended its run: {motion.status}", solution=motion)
         self.state, self.held, self.stepped = motion.final, self.inputs.values.copy(), True
         self.inputs.follow(self.state.t)
 
-    def keep(self) -> Any:
+    def keep(self) -> Kept:
         """All that the next steps depend on, to come back to."""
         return self.state, self.stepped, self.held.copy(), self.inputs.kept()
 
-    def recall(self, kept: Any) -> None:
+    def recall(self, kept: Kept) -> None:
         """Come back to what was kept."""
         self.state, self.stepped, held, inputs = kept
         self.held = held.copy()
@@ -177,9 +181,9 @@ class Driven:
         self.inputs.values[:] = now
         a, lam = after.a - before.a, after.lam - before.lam
         arrays = state.memory.arrays | {"before": state.memory.arrays["before"] + a}
-        jumped: dict[str, Any] = {"a": state.a + a, "lam": state.lam + lam}
-        jumped |= {"algorithmic": state.algorithmic + a}
-        return replace(state, memory=replace(state.memory, arrays=arrays), **jumped)
+        memory, algorithmic = replace(state.memory, arrays=arrays), state.algorithmic + a
+        moved = replace(state, a=state.a + a, lam=state.lam + lam)
+        return replace(moved, algorithmic=algorithmic, memory=memory)
 
     def _outputs(self) -> Array:
         if self.state is None:
@@ -210,7 +214,7 @@ class Server:
 
     def __init__(self, build: Callable[[], Driven]):
         self.build, self.model = build, build()
-        self.states: dict[int, Any] = {}
+        self.states: dict[int, Kept] = {}
         self.count = 0
         self.reported: set[str] = set()
         self.verbs: dict[int, Callable[[Index, Array], Array | None]] = {

@@ -3,9 +3,9 @@
 import json
 import sys
 from pathlib import Path
-from typing import Any
+from typing import Annotated
 
-from rom.arguments import between, positive, typed
+from rom.arguments import Positive, Share, typed
 from rom.errors import ConfigError, warn
 from rom.fmu.driven import SETTINGS_FILE
 from rom.io.files import check_writable
@@ -26,8 +26,8 @@ def write_fmu(
     *,
     inputs: tuple[str, ...] | list[str] = (),
     outputs: tuple[str, ...] | list[str] = (),
-    dt: float,
-    rho_inf: float = 0.9,
+    dt: Annotated[float, Positive("s")],
+    rho_inf: Share = 0.9,
     files: tuple[str | Path, ...] | list[str | Path] = (),
 ) -> Path:
     """Write a mechanism as an FMU for co-simulation (FMI 2.0), see `rom.fmu`.
@@ -61,10 +61,8 @@ def write_fmu(
         ResourceError: if there is no C compiler, it fails, or the disk is full.
     """
     path, script = check_ending(check_writable(path), "a unit", ".fmu"), Path(script)
-    positive("dt", dt)
-    between("rho_inf", rho_inf, 0, 1)
     resources = {f"{MODEL_FOLDER}/{p.name}": _read(p) for p in (script, *map(Path, files))}
-    settings: dict[str, Any] = {"script": f"{MODEL_FOLDER}/{script.name}"}
+    settings: dict[str, object] = {"script": f"{MODEL_FOLDER}/{script.name}"}
     settings |= {"inputs": list(inputs), "outputs": list(outputs)}
     settings |= {"dt": float(dt), "rho_inf": float(rho_inf)}
     resources[PYTHON_FILE] = sys.executable.encode()

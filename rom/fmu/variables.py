@@ -5,9 +5,10 @@ Outputs are the motion of markers, joint coordinates, and loads of drives.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
 from rom.io.fmu.description import Variable, components, structured
 from rom.mbs.connections.drives import Drive
@@ -16,7 +17,7 @@ from rom.mbs.equations.packing import Packed
 from rom.mbs.kernels.work import Work
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import Marker
-from rom.mbs.parts.signals import drive_signal
+from rom.mbs.parts.signals import Signal, drive_signal
 from rom.model import Array
 from rom.names import check_known, check_once
 from rom.rotation import quaternion
@@ -24,7 +25,9 @@ from rom.rotation import quaternion
 INFINITE_SPAN = (-np.inf, np.inf)
 DIFFERENCE_SPACING = 1e-4  # of the differences for the speed of a drive at the start [s]
 # reads (W, lam, packed) at an instant
-Reading = Callable[[Work, Array, Packed], Any]
+Reading = Callable[[Work, Array, Packed], npt.ArrayLike]
+Times = TypeVar("Times", float, Array)
+Kept = tuple[Array, list[tuple[float, float, float]]]  # what inputs remember
 MARKER_OUTPUTS = (
     ("position", 3, "m", "world"),
     ("velocity", 3, "m/s", "world"),
@@ -35,29 +38,23 @@ MARKER_OUTPUTS = (
 
 @dataclass
 class Held:
-    """A drive by a held acceleration: coordinate and rate stay continuous.
+    """A drive by a held acceleration: coordinate and rate stay continuous."""
 
-    Attributes:
-        acceleration: view (1,) of the input [rad/s^2 or m/s^2].
-        t: time since when it holds [s].
-        x, rate: coordinate and rate then.
-    """
+    acceleration: Array  # view (1,) of the input [rad/s^2 or m/s^2]
+    t: float = 0.0  # since when it holds [s]
+    x: float = 0.0  # coordinate then
+    rate: float = 0.0  # and rate
 
-    acceleration: Array
-    t: float = 0.0
-    x: float = 0.0
-    rate: float = 0.0
-
-    def coordinate(self, t: Any) -> Any:
+    def coordinate(self, t: Times) -> Times:
         """Joint coordinate at a time."""
         s = t - self.t
         return self.x + s * (self.rate + s * self.acceleration[0] / 2)
 
-    def speed(self, t: Any) -> Any:
+    def speed(self, t: Times) -> Times:
         """Its rate."""
         return self.rate + (t - self.t) * self.acceleration[0]
 
-    def second(self, t: Any) -> Any:
+    def second(self, t: Times) -> Times:
         """Its acceleration."""
         return self.acceleration[0] + 0.0 * t
 
@@ -112,18 +109,18 @@ class Inputs:
         for held, _ in self.starts:
             held.follow(t)
 
-    def kept(self) -> list[Any]:
+    def kept(self) -> Kept:
         """What the inputs remember, to come back to."""
-        return [self.values.copy(), *((held.t, held.x, held.rate) for held, _ in self.starts)]
+        return self.values.copy(), [(held.t, held.x, held.rate) for held, _ in self.starts]
 
-    def recall(self, kept: list[Any]) -> None:
+    def recall(self, kept: Kept) -> None:
         """Come back to what was kept."""
-        self.values[:] = kept[0]
-        for (held, _), past in zip(self.starts, kept[1:], strict=True):
+        self.values[:], pasts = kept
+        for (held, _), past in zip(self.starts, pasts, strict=True):
             held.t, held.x, held.rate = past
 
 
-def _at(signal: Any, t: float) -> Array:
+def _at(signal: Signal, t: float) -> Array:
     return signal.sample(np.array([t]), INFINITE_SPAN, DIFFERENCE_SPACING)[0]
 
 

@@ -27,9 +27,9 @@ class Progress:
             from tqdm import tqdm
 
             size = get_terminal_size()  # of a terminal without size tqdm would ask in vain
-            look: dict[str, Any] = {"bar_format": TIME_FORMAT, "leave": False}
-            look |= {"ncols": size.columns - 1, "nrows": size.lines}
-            self._bar = tqdm(total=total, file=sys.stderr, **look)
+            at = {"ncols": size.columns - 1, "nrows": size.lines}
+            how = {"bar_format": TIME_FORMAT, "leave": False, "file": sys.stderr}
+            self._bar = tqdm(total=total, **how, **at)
 
     def reach(self, done: float, label: str) -> None:
         """Show that so much is done, with a few words."""

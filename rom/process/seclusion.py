@@ -19,27 +19,29 @@ PLACES = (  # variables that name a folder or file with settings, code or fonts
 )
 TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
     from importlib.machinery import ModuleSpec
-    from typing import Any
+    from types import ModuleType
 
 
 class ImportedElsewhere:
     """Finds these libraries as Python does, and lets their code run in another folder."""
 
-    def find_spec(self, name: str, path: "Any" = None, target: "Any" = None) -> "ModuleSpec | None":
+    def find_spec(
+        self, name: str, path: "Sequence[str] | None" = None, target: "ModuleType | None" = None
+    ) -> "ModuleSpec | None":
         """Of one of them."""
         if name not in READERS:
             return None
-        finders = (finder.find_spec(name, path, target) for finder in sys.meta_path
-                   if finder is not self and hasattr(finder, "find_spec"))  # fmt: skip
-        spec = next(filter(None, finders), None)
+        others = (f for f in sys.meta_path if f is not self and hasattr(f, "find_spec"))
+        spec = next(filter(None, (f.find_spec(name, path, target) for f in others)), None)
         if spec is not None and spec.loader is not None:
             usual = spec.loader.exec_module
             spec.loader.exec_module = lambda module: elsewhere(usual, module)  # type: ignore[method-assign]
         return spec
 
 
-def elsewhere(work: "Any", *arguments: "Any") -> None:
+def elsewhere(work: "Callable[..., object]", *arguments: object) -> None:
     """Do this in a folder where nobody but the administrator leaves files."""
     here = os.open(os.curdir, os.O_RDONLY)
     try:

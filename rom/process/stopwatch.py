@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from time import perf_counter
-from typing import Any
 
 from rom.process.launcher import ranks
 from rom.process.memory import peak_bytes
@@ -19,18 +18,13 @@ RESIDUAL_NOTE = "largest residual of a mode"  # in the norm of K^-1, of the mode
 
 
 class Stopwatch:
-    """Seconds of stages that follow each other, and of pieces within each.
-
-    Attributes:
-        stages: {stage: {piece: seconds}}; what lies within another piece counts there alone.
-        counts: {stage: {piece: how often}}.
-        peaks: {stage: largest memory of the process so far, at its end [MB]}.
-    """
+    """Seconds of stages that follow each other, and of pieces within each."""
 
     def __init__(self) -> None:
-        self.stages: dict[str, dict[str, float]] = {}
-        self.counts: dict[str, dict[str, int]] = {}
-        self.peaks: dict[str, float] = {}
+        # by stage and piece; what lies within another piece counts there alone
+        self.stages: dict[str, dict[str, float]] = {}  # [s]
+        self.counts: dict[str, dict[str, int]] = {}  # how often
+        self.peaks: dict[str, float] = {}  # largest memory so far, at the end of a stage [MB]
         self.notes: dict[str, dict[str, float]] = {}
         self._stage, self._pieces, self._since = "", [REST_PIECE], perf_counter()
 
@@ -113,7 +107,7 @@ def stopwatch() -> Iterator[Stopwatch]:
 
 
 @contextmanager
-def piece(name: str) -> Iterator[Any]:
+def piece(name: str) -> Iterator[None]:
     """Around a piece of work, wherever it is called from; nothing happens where nobody times."""
     watch = _running.get()
     if watch is None:

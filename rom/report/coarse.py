@@ -1,9 +1,9 @@
 """Surfaces made small enough for a page: fewer points, numbers of 16 bit."""
 
 import base64
-from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from scipy.sparse import coo_matrix
 
 from rom.model import Array, Index, Mask
@@ -25,14 +25,7 @@ def coarsened(points: Array, triangles: Index, n_max: int) -> tuple[Index, Index
     by the squared distances from the planes of the triangles; many edges at once, far from each
     other. So edges of the body stay sharp, and flat faces keep points to bend by. What is far too
     fine is first put together in the cells of a cubic grid, and so is what has no such edge left.
-
-    Args:
-        points: (s, 3) of a surface.
-        triangles: (t, 3) its corners.
-        n_max: most points that are kept, at least 4.
-
-    Returns:
-        (k,) numbers of the points that are kept, and (m, 3) triangles between them.
+    Given back are the numbers (k,) of the points that are kept and the triangles (m, 3) of these.
 
     Source:
         Garland and Heckbert, Surface simplification using quadric error metrics, SIGGRAPH 97
@@ -183,7 +176,7 @@ def _cells(X: Array, size: float) -> Index:
     return np.unique(grid, axis=0, return_inverse=True)[1].ravel()
 
 
-def array(values: Any, kind: str) -> dict[str, str]:
+def array(values: npt.ArrayLike, kind: str) -> dict[str, str]:
     """An array as text: its type, and its numbers in base 64, the lowest byte first."""
     data = np.ascontiguousarray(values, dtype=TYPES[kind]).tobytes()
     return {"type": kind, "data": base64.b64encode(data).decode("ascii")}
@@ -194,7 +187,7 @@ def corners(cells: Index, n_points: int) -> dict[str, str]:
     return array(cells, "uint16" if n_points <= np.iinfo(np.uint16).max else "uint32")
 
 
-def quantised_points(points: Array) -> dict[str, Any]:
+def quantised_points(points: Array) -> dict[str, object]:
     """Points (n, 3) = centre + step * values, the values of 16 bit."""
     low, high = points.min(axis=0), points.max(axis=0)
     centre, reach = 0.5 * (low + high), 0.5 * float((high - low).max())
@@ -203,7 +196,7 @@ def quantised_points(points: Array) -> dict[str, Any]:
     return {"centre": centre.tolist(), "step": step, "values": values}
 
 
-def quantised_column(column: Array) -> dict[str, Any]:
+def quantised_column(column: Array) -> dict[str, object]:
     """A column = scale * values, the values of 16 bit."""
     scale = float(np.abs(column).max(initial=0.0)) / MAX_INT16 or 1.0
     return {"scale": scale, "values": array(np.rint(column / scale), "int16")}

@@ -6,7 +6,6 @@ import html
 import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -36,7 +35,7 @@ def source(text: str) -> str:
     return f"<pre>{html.escape(text)}</pre>"
 
 
-def table(header: Sequence[str], rows: Iterable[Sequence[Any]], caption: str) -> str:
+def table(header: Sequence[str], rows: Iterable[Sequence[object]], caption: str) -> str:
     """A table; numbers are written with five digits.
 
     Raises:
@@ -154,7 +153,7 @@ def _once_each(body: str) -> str:
     return ARRAY_ELEMENT.sub(first, body)
 
 
-def _cell(value: Any) -> str:
+def _cell(value: object) -> str:
     if isinstance(value, int | np.integer) and not isinstance(value, bool):
         return str(value)
     if isinstance(value, float | np.floating):

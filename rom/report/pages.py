@@ -10,19 +10,11 @@ from typing import TYPE_CHECKING, Any
 from rom.config.document import read_document
 from rom.errors import ConfigError, FileFormatError, RomError
 from rom.model import Report, Row
+from rom.process import stopwatch as watch
 from rom.process.child import scratch
-from rom.process.stopwatch import (
-    FACTORISATION_PIECE,
-    FLOPS_NOTE,
-    MISS_NOTE,
-    RESIDUAL_NOTE,
-    REST_PIECE,
-    SEARCH_PIECE,
-    SOLUTION_PIECE,
-)
 from rom.report import html
 from rom.report.run import RECORD_FILE, SCENE_FILE, Run, look_of, run, versions
-from rom.report.scene import SHAPE_BYTES, modes_scene, motion_scene, start_scene
+from rom.report.scene import SHAPE_BYTES, Scene, modes_scene, motion_scene, start_scene
 from rom.report.scene_file import read_scene
 from rom.report.viewer import MOTION_WORDS, START_WORDS, figure, modes_words
 
@@ -31,11 +23,9 @@ if TYPE_CHECKING:
     from rom.config.mechanism import MechanismFile
 
 Sections = dict[str, Sequence[str]]
+Told = dict[str, Any]  # of JSON, or of the provenance of a body
 N_FREQUENCIES = 6
-SHOWN_KEYS = (
-    "path", "sha256", "parameters", "faces", "scale", "material", "degree", "solver",
-    "K", "M", "units",
-)  # fmt: skip
+SHOWN_KEYS = "path sha256 parameters faces scale material degree solver K M units".split()
 BODY_COLUMNS = ("body", "mass [kg]", "elastic coordinates", "markers")
 NO_STILL = "The run made no picture: picture = true of its [output] asks for one."
 ENERGIES = ("kinetic", "strain", "potential", "total")
@@ -116,7 +106,7 @@ def _sentence(body: "FlexibleBody") -> str:
     )
 
 
-def _method_words(reduction: dict[str, Any]) -> str:
+def _method_words(reduction: Told) -> str:
     """The method as it was called, without what was not given, and how many modes that came to."""
     label = re.sub(r"\b\w+=None(, )?", "", reduction["method"]).replace(", )", ")")
     modes = len(reduction.get("frequencies of the modes kept [Hz]", ()))
@@ -130,7 +120,7 @@ def _mass_table(body: "FlexibleBody") -> str:
 
     c = body.first_moment / body.mass
     central = body.inertia - body.mass * (c @ c * np.eye(3) - np.outer(c, c))
-    rows: list[tuple[Any, ...]] = [("mass [kg]", body.mass, "", "")]
+    rows: list[tuple[object, ...]] = [("mass [kg]", body.mass, "", "")]
     rows += [("mass centre [m]", *map(float, c))]
     rows += [(f"inertia, {axis} [kg m^2]", *map(float, central[k])) for k, axis in enumerate("xyz")]
     return html.table(("", "x", "y", "z"), rows, "Inertia about the mass centre, body axes.")
@@ -145,12 +135,12 @@ def _frequency_blocks(body: "FlexibleBody") -> list[str]:
         caption = "Elastic frequencies of the reduced body, free. The file compares with no mesh."
         return [html.table(("mode", "reduced [Hz]"), rows, caption)]
     header = ("support", "mode", "full [Hz]", "reduced [Hz]", "error", "MAC")
-    rows_ = [
-        (support, k + 1, float(full), float(reduced), f"{reduced / full - 1:.1e}",
-         float(found["mac"][k]) if k < len(found.get("mac", ())) else "")
-        for support, found in comparison.items()
-        for k, (full, reduced) in enumerate(zip(found["full"], found["reduced"], strict=True))
-    ]  # fmt: skip
+    table: list[Sequence[object]] = []
+    for support, found in comparison.items():
+        pairs, mac = zip(found["full"], found["reduced"], strict=True), found.get("mac", ())
+        for k, (f, g) in enumerate(pairs):
+            likeness = float(mac[k]) if k < len(mac) else ""
+            table.append((support, k + 1, float(f), float(g), f"{g / f - 1:.1e}", likeness))
     caption = "Natural frequencies of the full model and of the body, rigid motions left out."
 
     def draw(path: Path) -> None:
@@ -158,7 +148,7 @@ def _frequency_blocks(body: "FlexibleBody") -> list[str]:
 
         frequencies(comparison, path, title=f"Reduced against full {body.name}")
 
-    return [html.table(header, rows_, caption), *drawn(draw, "Errors of the frequencies.")]
+    return [html.table(header, table, caption), *drawn(draw, "Errors of the frequencies.")]
 
 
 def _interface_table(body: "FlexibleBody") -> str:
@@ -175,7 +165,7 @@ def _mode_figure(body: "FlexibleBody", size: int = SHAPE_BYTES) -> list[str]:
     return turning(lambda: modes_scene(body, size=size), still, modes_words(body.name))
 
 
-def turning(make: Callable[[], dict[str, Any]], still: list[str], caption: str) -> list[str]:
+def turning(make: Callable[[], Scene], still: list[str], caption: str) -> list[str]:
     """A figure that turns; or the still picture alone, where there is no scene."""
     try:
         return [figure(make(), still, caption)]
@@ -198,13 +188,13 @@ def _provenance(body: "FlexibleBody") -> list[str]:
 
 def _stages(stages: dict[str, dict[str, float]]) -> list[str]:
     """Where the time of the reduction went."""
-    pieces = (FACTORISATION_PIECE, SOLUTION_PIECE, SEARCH_PIECE, REST_PIECE)
-    notes = (FLOPS_NOTE, MISS_NOTE, RESIDUAL_NOTE)
-    rows = [
-        (stage, f"{found['seconds']:.2f}", *(_piece(found, name) for name in pieces),
-         f"{found['MB']:.0f}", *(f"{found[name]:.1e}" if name in found else "" for name in notes))
-        for stage, found in stages.items()
-    ]  # fmt: skip
+    pieces = [watch.FACTORISATION_PIECE, watch.SOLUTION_PIECE, watch.SEARCH_PIECE, watch.REST_PIECE]
+    notes = (watch.FLOPS_NOTE, watch.MISS_NOTE, watch.RESIDUAL_NOTE)
+    rows = []
+    for stage, found in stages.items():
+        spent = f"{found['seconds']:.2f}", *(_piece(found, name) for name in pieces)
+        noted = (f"{found[name]:.1e}" if name in found else "" for name in notes)
+        rows.append((stage, *spent, f"{found['MB']:.0f}", *noted))
     header = ("stage", "seconds", *pieces, "memory [MB]", *notes)
     ranks = max((found.get("ranks", 1) for found in stages.values()), default=1)
     caption = (
@@ -222,7 +212,7 @@ def _piece(stage: dict[str, float], name: str) -> str:
     return f"{stage[name]:.2f}" + (f" ({number:g})" if number else "")
 
 
-def _plain(value: Any) -> str:
+def _plain(value: object) -> str:
     """A value for a reader: 1,2 for lists, a: 1, b: 2 for tables."""
     if isinstance(value, dict):
         words = {True: "{} ({})", False: "{}: {}"}
@@ -263,15 +253,13 @@ def of_mechanism(
         sections["Motion"] = _motion(moved, look)
     flexible = {n: p.flexible for n, p in mechanism.parts.items() if p.flexible is not None}
     for name, body in flexible.items():
-        sections[f"Body {name}"] = [
-            html.paragraph(_sentence(body)), *_mode_figure(body, SHAPE_BYTES // len(flexible)),
-            *_frequency_blocks(body), _interface_table(body),
-        ]  # fmt: skip
+        shown = [html.paragraph(_sentence(body)), *_mode_figure(body, SHAPE_BYTES // len(flexible))]
+        sections[f"Body {name}"] = [*shown, *_frequency_blocks(body), _interface_table(body)]
     written = file.document.path.read_text(encoding="utf-8")
     return title, sections | {"How it was made": [*made, html.source(written)]}
 
 
-def _motion(moved: Run, look: dict[str, Any]) -> list[str]:
+def _motion(moved: Run, look: Told) -> list[str]:
     """The motion that was computed for the report, and whether it is to be believed."""
     solution, how = moved.solution, look | {"magnify": moved.file.values["output"]["magnify"]}
 
@@ -327,36 +315,34 @@ def of_run(folder: Path) -> tuple[str, Sections]:
         still = [pictures.pop(name)] if name else [html.paragraph(NO_STILL)]
         moving = figure(read_scene(folder / SCENE_FILE), still, MOTION_WORDS)
         pictures = {SCENE_FILE: moving} | pictures
-    return f"Motion of {record['name']}", {
+    joints = html.table(("joint", "kind"), list(record["joints"].items()), "Joints.")
+    sections: Sections = {
         "What it is": [html.paragraph(words + record["status"]), *pictures.values()],
-        "Bodies and joints": [
-            html.table(BODY_COLUMNS, bodies, "Bodies."),
-            html.table(("joint", "kind"), list(record["joints"].items()), "Joints."),
-        ],
-        **({"Events": [html.table(("event", "times [s]"), events, "When events happened.")]}
-           if events else {}),
+        "Bodies and joints": [html.table(BODY_COLUMNS, bodies, "Bodies."), joints],
+    }
+    if events:
+        times = html.table(("event", "times [s]"), events, "When events happened.")
+        sections["Events"] = [times]
+    source = [html.source(record["source"])] if record["source"] else []
+    return f"Motion of {record['name']}", sections | {
         "Checks": [html.checks(audit, "Is the computed motion believable?")],
         "Energy": _energy(folder, record),
-        "How it was made": [
-            *how(record["command"], record["versions"]),
-            *([html.source(record["source"])] if record["source"] else []),
-        ],
-    }  # fmt: skip
+        "How it was made": [*how(record["command"], record["versions"]), *source],
+    }
 
 
-def _record(folder: Path) -> dict[str, Any]:
+def _record(folder: Path) -> Told:
     path = folder / RECORD_FILE
     try:
-        record: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        record: Told = json.loads(path.read_text(encoding="utf-8"))
         if record["schema"] != "rom-run" or record["version"][0] != 1:
             raise FileFormatError(f"version {record['version']} is not known.", where=str(path))
         wanted = ("name", "files", "bodies", "joints", "audit", "status", "steps", "t_end")
         missing = [k for k in (*wanted, "command", "versions", "source") if k not in record]
     except FileNotFoundError:
-        raise FileFormatError(
-            f"there is no {RECORD_FILE}: this is not the folder of a run.", where=str(folder),
-            hint="rom simulate FILE.toml -o FOLDER makes one.",
-        ) from None  # fmt: skip
+        why = f"there is no {RECORD_FILE}: this is not the folder of a run."
+        hint = "rom simulate FILE.toml -o FOLDER makes one."
+        raise FileFormatError(why, where=str(folder), hint=hint) from None
     except (ValueError, KeyError, TypeError, IndexError) as error:
         raise FileFormatError(f"is no record of a run: {error}.", where=str(path)) from None
     if missing:
@@ -364,7 +350,7 @@ def _record(folder: Path) -> dict[str, Any]:
     return record
 
 
-def _energy(folder: Path, record: dict[str, Any]) -> list[str]:
+def _energy(folder: Path, record: Told) -> list[str]:
     """Energies over time from the table of the motion."""
     path = folder / "motion.csv"
     if not path.is_file():
@@ -376,16 +362,20 @@ def _energy(folder: Path, record: dict[str, Any]) -> list[str]:
         head = next(csv.reader(file))
         numbers = np.loadtxt(file, delimiter=",", ndmin=2)
     curves = {name: numbers[:, head.index(f"{name} [J]")] for name in ENERGIES}
-    rows = [(f"{name} [J]", float(y[0]), float(y.min()), float(y.max()), float(y[-1]))
-            for name, y in curves.items()]  # fmt: skip
+    kinds = {f"{name} [J]": (y[0], y.min(), y.max(), y[-1]) for name, y in curves.items()}
+    rows = [(name, *map(float, found)) for name, found in kinds.items()]
 
     from rom.view.figures.curves import history
 
     words = f"Energies of {record['name']}: motion, deformation, height, and their sum."
-    panels, look = [("energy [J]", curves)], dict[str, Any](title="Energy", caption=words)
     header = ("energy", "start", "lowest", "highest", "end")
+
+    def draw(path: Path) -> None:
+        panels = [("energy [J]", curves)]
+        history(numbers[:, 0], panels, path, title="Energy", caption=words)
+
     return [
-        *drawn(lambda path: history(numbers[:, 0], panels, path, **look), "Energies over time."),
+        *drawn(draw, "Energies over time."),
         html.table(header, rows, "Energies."),
     ]
 

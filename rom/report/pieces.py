@@ -57,15 +57,13 @@ def certify_pieces(
         True
     """
     reference = _refuse(pieces, models, nonlinear)
-    place = next(m.interfaces[reference].origin for m in models.values()
-                 if reference in m.interfaces)  # fmt: skip
+    holder = next(model for model in models.values() if reference in model.interfaces)
+    place = holder.interfaces[reference].origin
     solid = GluedSolid.of(models, pieces.joints)
     components = nonlinear.components()
     bent = list(dict.fromkeys(load.interface for load in components if load.component > 2))
-    full = HeldSolid(
-        solid, solid.M, [solid.motion(Load(reference, k)) for k in range(6)],
-        sections=[solid.section(name) for name in bent],
-    )  # fmt: skip
+    held, sections = [solid.motion(Load(reference, k)) for k in range(6)], map(solid.section, bent)
+    full = HeldSolid(solid, solid.M, held, sections=list(sections))
     units = np.array([_load(solid, bent, load) for load in components]).T
     rows = list[Row]()
     for name, case in load_cases(nonlinear).items():
@@ -161,8 +159,7 @@ def _refuse(pieces: Pieces, models: Mapping[str, FEModel], nonlinear: Geometric)
             "follows.",
             hint="Make them with rom.fe.pieces.",
         )
-    free = {name: key for key, body in pieces.bodies.items() for name in body.markers
-            if name not in pieces.joints}  # fmt: skip
+    free = {name for body in pieces.bodies.values() for name in body.markers} - {*pieces.joints}
     if unknown := [name for name in nonlinear.loads if name not in free]:
         raise ConfigError(f"the range names {named(unknown)}; the pieces have {offered(free)}.")
     turning = [load.name for load in nonlinear.components() if not load.interface]
@@ -172,5 +169,5 @@ def _refuse(pieces: Pieces, models: Mapping[str, FEModel], nonlinear: Geometric)
             f"holds {nonlinear.fixed!r}.",
             hint="Give a range of loads on interfaces that lead to like deflections.",
         )
-    (reference,) = {body.reference for body in pieces.bodies.values()} & set(free)
+    (reference,) = {body.reference for body in pieces.bodies.values()} & free
     return reference

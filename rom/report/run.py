@@ -23,19 +23,12 @@ RECORD_FILE, SCENE_FILE = "run.json", "scene.json"
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """How a run came about: what `rom report` tells of it later.
+    """How a run came about: what `rom report` tells of it later."""
 
-    Attributes:
-        name: of the mechanism.
-        command: what was typed.
-        version: of rom.
-        source: the file that describes it; empty without one.
-    """
-
-    name: str
-    command: str
-    version: str
-    source: str = ""
+    name: str  # of the mechanism
+    command: str  # what was typed
+    version: str  # of rom
+    source: str = ""  # the file that describes it; empty without one
 
     def write(self, paths: list[Path], solution: "Solution", audit: "Report") -> None:
         """Write it as the last of the files of a run."""
@@ -73,21 +66,13 @@ class Record:
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """A motion and what is to be kept of it.
-
-    Attributes:
-        file: the mechanism file.
-        solution: the motion.
-        audit: whether it is to be believed.
-        command: what was typed.
-        version: of rom.
-    """
+    """A motion and what is to be kept of it."""
 
     file: MechanismFile
     solution: "Solution"
-    audit: "Report"
-    command: str = ""
-    version: str = ""
+    audit: "Report"  # whether it is to be believed
+    command: str = ""  # what was typed
+    version: str = ""  # of rom
 
     def paths(self, folder: Path) -> list[Path]:
         """The files to be written, the table of the motion first."""
@@ -109,10 +94,8 @@ class Run:
 
         paths[0].parent.mkdir(exist_ok=True)
         write_history(self.solution, paths[0])
-        record = Record(
-            self.file.name, self.command, self.version,
-            self.file.document.path.read_text(encoding="utf-8"),
-        )  # fmt: skip
+        source = self.file.document.path.read_text(encoding="utf-8")
+        record = Record(self.file.name, self.command, self.version, source)
         record.write(paths, self.solution, self.audit)
 
     def _draw(self, paths: list[Path]) -> None:

@@ -30,6 +30,7 @@ from rom.view.scenes.rigid import bars, check_bodies, ends_of
 if TYPE_CHECKING:
     from rom.body.flexible import FlexibleBody
     from rom.mbs.mechanism import Mechanism
+    from rom.mbs.parts.bodies import Part
     from rom.mbs.results.solution import Solution
 
 SCHEMA_NAME, SCHEMA_VERSION = "rom-scene", [1, 0]
@@ -42,34 +43,23 @@ N_COORDINATES = 40  # elastic coordinates that are shown one by one
 SMALLEST_SHARE = 1e-4  # of a displacement or stress: coordinates that add less are left out
 FRAMES_AT_ONCE = 50  # while limits of colours are looked for
 ELASTIC_COLOURS = ("#2f7f9f", "#d1495b", "#edae49", "#66a182")
+Scene = dict[str, Any]  # for JSON
 NO_TURN = np.array([[1.0, 0.0, 0.0, 0.0]])
 
 
 @dataclass(frozen=True, slots=True)
 class Thing:
-    """A body in a scene, at f instants.
-
-    Attributes:
-        name: its name.
-        colour: where it has no field, "#rrggbb".
-        points: (s, 3) undeformed, body frame [m].
-        triangles: (t, 3) corners.
-        position: (f, 3) origin of its frame [m].
-        orientation: (f, 4) quaternion of its frame.
-        shapes: (3 s, r) displacement per unit of each elastic coordinate; r = 0 for a rigid body.
-        stress: (6 s, r) stress on the points per unit of each [Pa], or None.
-        q: (f, r) elastic coordinates.
-    """
+    """A body in a scene, at f instants, with r elastic coordinates, of a rigid body none."""
 
     name: str
-    colour: str
-    points: Array
-    triangles: Index
-    position: Array
-    orientation: Array
-    shapes: Array = field(default_factory=lambda: np.zeros((0, 0)))
-    stress: Array | None = None
-    q: Array = field(default_factory=lambda: np.zeros((1, 0)))
+    colour: str  # where it has no field, "#rrggbb"
+    points: Array  # (s, 3) undeformed, body frame [m]
+    triangles: Index  # (t, 3) corners
+    position: Array  # (f, 3) origin of its frame [m]
+    orientation: Array  # (f, 4) quaternion of its frame
+    shapes: Array = field(default_factory=lambda: np.zeros((0, 0)))  # (3 s, r) displacements
+    stress: Array | None = None  # (6 s, r) on the points per unit of each coordinate [Pa]
+    q: Array = field(default_factory=lambda: np.zeros((1, 0)))  # (f, r) elastic coordinates
 
     def corners(self) -> Array:
         """(8 f, 3) of the box around the undeformed points, in the world."""
@@ -79,7 +69,7 @@ class Thing:
         return placed(box[None], (self.position, turned)).reshape(-1, 3)
 
 
-def modes_scene(body: "FlexibleBody", *, size: int = SHAPE_BYTES) -> dict[str, Any]:
+def modes_scene(body: "FlexibleBody", *, size: int = SHAPE_BYTES) -> Scene:
     """The modes of a body in each support of its comparison, and its elastic coordinates.
 
     A surface whose shapes take more bytes than ``size`` is made coarser.
@@ -117,7 +107,7 @@ def motion_scene(
     magnify: float = 1.0,
     view: npt.ArrayLike | None = None,
     up: npt.ArrayLike | None = None,
-) -> dict[str, Any]:
+) -> Scene:
     """A motion; arguments as of `rom.view.animate`, but for ``up``: None is against gravity.
 
     Raises:
@@ -127,14 +117,11 @@ def motion_scene(
     given = _meshes(shapes or {}, mechanism)
     positive("magnify", magnify)
     steps = _steps(solution)
-    things = [
-        _of_part(
-            part, colour, given.get(name) or _bars(mechanism, name),
-            (solution.position(name)[steps], solution.orientation(name)[steps]),
-            solution.elastic(name)[steps] if part.r else None,
-        )
-        for (name, part), colour in zip(mechanism.parts.items(), _colours(mechanism), strict=True)
-    ]  # fmt: skip
+    things = []
+    for (name, part), colour in zip(mechanism.parts.items(), _colours(mechanism), strict=True):
+        pose = solution.position(name)[steps], solution.orientation(name)[steps]
+        q = solution.elastic(name)[steps] if part.r else None
+        things.append(_of_part(part, colour, given.get(name) or _bars(mechanism, name), pose, q))
     limits, t = [_limits(thing) for thing in things], solution.t[steps]
     keys = "displacement", "stress"
     largest = {key: max((one[key] for one in limits), default=0.0) for key in keys}
@@ -149,13 +136,12 @@ def start_scene(
     title: str = "Mechanism at its start",
     view: npt.ArrayLike | None = None,
     up: npt.ArrayLike | None = None,
-) -> dict[str, Any]:
+) -> Scene:
     """A mechanism as its bodies are placed; arguments as of `rom.view.mechanism`."""
     things = [
-        _of_part(part, COLOURS[k % len(COLOURS)], _bars(mechanism, part.name),
-                 (part.at[None], part.p[None]), None)
-        for k, part in enumerate(mechanism.parts.values())
-    ]  # fmt: skip
+        _of_part(part, colour, _bars(mechanism, name), (part.at[None], part.p[None]), None)
+        for (name, part), colour in zip(mechanism.parts.items(), cycle(COLOURS), strict=False)
+    ]
     look = {"view": view, "up": up, "gravity": mechanism.gravity}
     return _scene(title, things, SHAPE_BYTES, look)
 
@@ -167,15 +153,15 @@ def _meshes(shapes: dict[str, Mesh], mechanism: "Mechanism") -> dict[str, Mesh]:
     for name, (points, triangles) in shapes.items():
         X, corner = np.asarray(points, dtype=float), np.asarray(triangles)
         fit = X.ndim == corner.ndim == 2 and X.shape[1] == corner.shape[1] == 3 and corner.size
-        if not fit or not np.isfinite(X).all() or corner.dtype.kind not in "iu":
-            raise ConfigError(f"the shape of {name!r} must be (n, 3) points and (t, 3) corners.")
-        if corner.min() < 0 or corner.max() >= len(X):
-            raise ConfigError(f"the shape of {name!r} must have corners from 0 to {len(X) - 1}.")
+        fit = fit and np.isfinite(X).all() and corner.dtype.kind in "iu"
+        if not fit or corner.min() < 0 or corner.max() >= len(X):
+            what = f"(n, 3) points and (t, 3) corners from 0 to {len(X) - 1}"
+            raise ConfigError(f"the shape of {name!r} must be {what}.")
         found[name] = X, corner.astype(np.int64)
     return found
 
 
-def _surface(body: Any) -> Surface | None:
+def _surface(body: object) -> Surface | None:
     """The surface of a body, if it is flexible and has one to draw."""
     surface: Surface | None = getattr(body, "surface", None)
     return surface if surface is not None and len(surface.triangles) else None
@@ -189,7 +175,7 @@ def _stress(body: "FlexibleBody") -> Array | None:
     return recovery.operator if recovery.points.shape == surface.points.shape else None
 
 
-def _modes(body: "FlexibleBody") -> Iterator[dict[str, Any]]:
+def _modes(body: "FlexibleBody") -> Iterator[Scene]:
     """The modes whose frequencies a report lists, support by support."""
     compared = body.provenance.get("comparison", {})
     supports = {"free": ()} | {f"{name} held": (name,) for name in body.markers}
@@ -235,7 +221,7 @@ def _bars(mechanism: "Mechanism", name: str) -> Mesh:
 
 
 def _of_part(
-    part: Any, colour: str, shape: Mesh, pose: tuple[Array, Array], q: Array | None
+    part: "Part", colour: str, shape: Mesh, pose: tuple[Array, Array], q: Array | None
 ) -> Thing:
     """A body of a mechanism, by its surface, or else a shape."""
     surface = _surface(part.flexible)
@@ -267,9 +253,9 @@ def _limits(thing: Thing) -> dict[str, float]:
     return {"displacement": displacement, "stress": max(high, default=0.0)}
 
 
-def _scene(title: str, things: Sequence[Thing], size: int, look: dict[str, Any]) -> dict[str, Any]:
+def _scene(title: str, things: Sequence[Thing], size: int, look: dict[str, Any]) -> Scene:
     seen = np.concatenate([thing.corners() for thing in things])
-    view, centre = _view(seen, look.get("view"), look.get("up"), look.get("gravity"))
+    view, centre = _view(seen, look)
     bending = max(sum(thing.shapes.size > 0 for thing in things), 1)
     return {
         "schema": SCHEMA_NAME,
@@ -283,12 +269,13 @@ def _scene(title: str, things: Sequence[Thing], size: int, look: dict[str, Any])
     }
 
 
-def _view(seen: Array, view: Any, up: Any, gravity: Any) -> tuple[dict[str, Any], Array]:
+def _view(seen: Array, look: dict[str, Any]) -> tuple[Scene, Array]:
     """The eye, and the middle of what it sees; upright is an axis, unless something says more."""
-    view = None if view is None else finite("view", view, (3,))
-    up = None if up is None else finite("up", up, (3,))
-    if up is None and gravity is not None and np.any(gravity):
-        up = -np.asarray(gravity, dtype=float)
+    given = {key: look.get(key) for key in ("view", "up")}
+    view, up = (None if x is None else finite(key, x, (3,)) for key, x in given.items())
+    gravity = np.asarray(look.get("gravity", (0, 0, 0)), dtype=float)
+    if up is None and gravity.any():
+        up = -gravity
         toward = aimed(seen, 1000, view=view).toward
         if np.linalg.norm(np.cross(toward, up)) < 0.05 * np.linalg.norm(up):  # seen from above
             up = None
@@ -296,14 +283,12 @@ def _view(seen: Array, view: Any, up: Any, gravity: Any) -> tuple[dict[str, Any]
     k = np.argmax(np.abs(camera.up))
     upright = np.eye(3)[k] * np.sign(camera.up[k]) if up is None else up / np.linalg.norm(up)
     radius = float(np.linalg.norm(seen - camera.focus, axis=1).max()) or 1.0
-    found = {
-        "toward": camera.toward.tolist(), "up": upright.tolist(), "radius": radius,
-        "tall": camera.height, "wide": camera.height * camera.size[0] / camera.size[1],
-    }  # fmt: skip
-    return found, camera.focus
+    wide = camera.height * camera.size[0] / camera.size[1]
+    found = {"toward": camera.toward.tolist(), "up": upright.tolist(), "radius": radius}
+    return found | {"tall": camera.height, "wide": wide}, camera.focus
 
 
-def _encoded(thing: Thing, centre: Array, size: int) -> dict[str, Any]:
+def _encoded(thing: Thing, centre: Array, size: int) -> Scene:
     """A body as numbers for the page, its surface as coarse as its share of the bytes asks."""
     r = thing.shapes.shape[1]
     per_point = 2 * 3 * r * (1 if thing.stress is None else 3)
@@ -311,7 +296,7 @@ def _encoded(thing: Thing, centre: Array, size: int) -> dict[str, Any]:
     kept, triangles = coarsened(thing.points, thing.triangles, n_max)
     X = thing.points[kept]
 
-    def columns(A: Array | None, width: int) -> list[dict[str, Any]]:
+    def columns(A: Array | None, width: int) -> list[dict[str, object]]:
         if A is None or not A.size:
             return []
         rows = (width * kept[:, None] + np.arange(width)).ravel()

@@ -4,95 +4,95 @@ import base64
 import binascii
 import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from rom.errors import FileFormatError
 from rom.io.files import check_readable, write_whole
+from rom.model import Array
 from rom.report.coarse import TYPES
-from rom.report.scene import SCHEMA_NAME, SCHEMA_VERSION
+from rom.report.scene import SCHEMA_NAME, SCHEMA_VERSION, Scene
 
 MAX_BYTES = 50_000_000  # of a file that is still read
-KEYS = {
-    "title": str, "view": dict, "size": float, "magnify": float, "start": float, "limits": dict,
-    "bodies": list, "modes": list,
-}  # fmt: skip
+KEYS: dict[str, type] = dict.fromkeys(("size", "magnify", "start"), float)
+KEYS |= {"view": dict, "limits": dict, "title": str, "bodies": list, "modes": list}
 VIEW_KEYS = {"toward": 3, "up": 3, "radius": 0, "tall": 0, "wide": 0}  # and how many numbers
 
 
-def write_scene(scene: dict[str, Any], path: Path) -> None:
+def write_scene(scene: Scene, path: Path) -> None:
     """Write the scene of a motion."""
     text = json.dumps(scene, separators=(",", ":"))
     write_whole(path, lambda file: file.write(text.encode()))
 
 
-def read_scene(path: Path) -> dict[str, Any]:
+def read_scene(path: Path) -> Scene:
     """The scene of a motion, looked at before a browser gets it."""
     text = check_readable(path, MAX_BYTES).read_bytes()
     try:
-        scene = json.loads(text)
+        scene: Scene = json.loads(text)
         if scene["schema"] != SCHEMA_NAME or scene["version"][0] != SCHEMA_VERSION[0]:
             raise FileFormatError(f"version {scene['version']} is not known.", where=str(path))
         _check(scene)
     except (ValueError, KeyError, TypeError, IndexError, AttributeError, RecursionError) as error:
-        raise FileFormatError(
-            f"is no scene of a run: {error!s:.200}.", where=str(path),
-            hint="rom simulate writes it anew.",
-        ) from None  # fmt: skip
-    known: dict[str, Any] = scene
-    return known
+        why, hint = f"is no scene of a run: {error!s:.200}.", "rom simulate writes it anew."
+        raise FileFormatError(why, where=str(path), hint=hint) from None
+    return scene
 
 
-def _check(scene: dict[str, Any]) -> None:
+def _require(holds: object, what: str) -> None:
+    """Refuse a scene of which something does not hold."""
+    if not holds:
+        raise ValueError(what)
+
+
+def _finite(values: npt.ArrayLike) -> None:
+    _require(np.isfinite(np.asarray(values, dtype=float)).all(), "a number is not finite")
+
+
+def _check(scene: Scene) -> None:
     for key, kind in KEYS.items():
-        if not isinstance(scene[key], kind | int if kind is float else kind):
-            raise ValueError(f"{key} is {type(scene[key]).__name__}")
-    if scene["modes"] or not scene["bodies"]:
-        raise ValueError("there are no bodies that move")
+        right = isinstance(scene[key], kind | int if kind is float else kind)
+        _require(right, f"{key} is {type(scene[key]).__name__}")
+    _require(scene["bodies"] and not scene["modes"], "there are no bodies that move")
     numbers = [scene[key] for key in ("size", "magnify", "start")]
     numbers += [scene["limits"][key] for key in ("displacement", "stress")]
     for key, n in VIEW_KEYS.items():
         values = scene["view"][key] if n else [scene["view"][key]]
-        if n and len(values) != n:
-            raise ValueError(f"{key} has {len(values)} numbers")
+        _require(len(values) == (n or 1), f"{key} has {len(values)} numbers")
         numbers += values
-    if not np.isfinite(np.array(numbers, dtype=float)).all():
-        raise ValueError("a number is not finite")
+    _finite(numbers)
     f = len(_numbers(scene["times"]))
-    if f < 2:
-        raise ValueError("the motion has fewer than two instants")
+    _require(f >= 2, "the motion has fewer than two instants")
     for body in scene["bodies"]:
         _check_body(body, f)
 
 
-def _check_body(body: dict[str, Any], f: int) -> None:
+def _check_body(body: Scene, f: int) -> None:
     """Whether the arrays of a body fit each other, and the number of instants."""
-    if not isinstance(body["name"], str) or not isinstance(body["colour"], str):
-        raise ValueError("a body has no name or colour")
-    s, r = len(_numbers(body["points"]["values"])) // 3, len(body["shapes"])
+    name, points = body["name"], body["points"]
+    named = isinstance(name, str) and isinstance(body["colour"], str)
+    _require(named, "a body has no name or colour")
+    s, r = len(_numbers(points["values"])) // 3, len(body["shapes"])
     wanted = {"position": 3 * f, "orientation": 4 * f, "q": r * f}
-    found = {key: len(_numbers(body[key])) for key in wanted}
     columns = [(3 * s, one) for one in body["shapes"]] + [(6 * s, one) for one in body["stresses"]]
     fit = all(len(_numbers(one["values"])) == n for n, one in columns)
-    if found != wanted or not fit or len(body["stresses"]) not in (0, r):
-        raise ValueError(f"arrays of {body['name']!r} do not fit each other")
-    scales = [*body["points"]["centre"], body["points"]["step"], *(o["scale"] for _, o in columns)]
-    if len(body["points"]["centre"]) != 3 or not np.isfinite(np.array(scales, dtype=float)).all():
-        raise ValueError(f"a number of {body['name']!r} is not finite")
-    for key in ("triangles", "edges"):
+    fit = fit and all(len(_numbers(body[key])) == n for key, n in wanted.items())
+    fit = fit and len(body["stresses"]) in (0, r) and len(points["centre"]) == 3
+    _require(fit, f"arrays of {name!r} do not fit each other")
+    _finite([*points["centre"], points["step"], *(one["scale"] for _, one in columns)])
+    for key, n in {"triangles": 3, "edges": 2}.items():
         cells = _numbers(body[key])
-        if cells.size % (3 if key == "triangles" else 2) or cells.max(initial=0) >= max(s, 1):
-            raise ValueError(f"{key} of {body['name']!r} name points that are not there")
+        there = cells.size % n == 0 and cells.max(initial=0) < max(s, 1)
+        _require(there, f"{key} of {name!r} name points that are not there")
 
 
-def _numbers(array: dict[str, str]) -> Any:
+def _numbers(array: dict[str, str]) -> Array:
     """An array of a scene, finite."""
     try:
         data = base64.b64decode(array["data"], validate=True)
     except binascii.Error as error:
         raise ValueError(f"an array is cut: {error}") from None
     values = np.frombuffer(data, dtype=TYPES[array["type"]])
-    if not np.isfinite(values).all():
-        raise ValueError("a number is not finite")
+    _finite(values)
     return values

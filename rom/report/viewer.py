@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from rom.arguments import AnyBody, AnySolution, typed
 from rom.report import html
-from rom.report.scene import modes_scene, motion_scene
+from rom.report.scene import Scene, modes_scene, motion_scene
 from rom.view.canvas.solids import Mesh
 
 NEEDED_WORDS = "the browser needs JavaScript and WebGL 2, which are switched off or missing here."
@@ -92,7 +92,7 @@ START_WORDS = (
 )
 
 
-def figure(scene: dict[str, Any], still: Sequence[str], caption: str) -> str:
+def figure(scene: Scene, still: Sequence[str], caption: str) -> str:
     """A scene as a block of a report; in print, and where none can be drawn, the still blocks."""
     arrays: dict[str, str] = {}
     text = json.dumps(_referred(scene, arrays), separators=(",", ":"))

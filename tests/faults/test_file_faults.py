@@ -152,16 +152,15 @@ def test_a_cut_is_noticed_wherever_it_is(file, request):
 @pytest.mark.parametrize("file", TEXTS, indirect=True)
 def test_what_is_no_file_is_named(file, monkeypatch):
     path, data, read = file
-    path.unlink()
-    assert "no such file" in str(outcome(read, path))
-    path.symlink_to(path.name)  # a circle
-    assert "no such file" in str(outcome(read, path))
-    path.unlink()
-    path.symlink_to("/dev/zero")
-    assert "pipe or device" in str(outcome(read, path))
-    path.unlink()
-    os.mkfifo(path)  # reading it would wait for ever
-    assert "pipe or device" in str(outcome(read, path))
+    for make, words in (
+        (lambda: None, "no such file"),
+        (lambda: path.symlink_to(path.name), "no such file"),  # a circle
+        (lambda: path.symlink_to("/dev/zero"), "pipe or device"),
+        (lambda: os.mkfifo(path), "pipe or device"),  # reading it would wait for ever
+    ):
+        path.unlink(missing_ok=True)
+        make()
+        assert words in str(outcome(read, path))
     path.unlink()
     path.mkdir()
     assert "folder" in str(outcome(read, path))
@@ -172,12 +171,6 @@ def test_what_is_no_file_is_named(file, monkeypatch):
     refused = {str(path), str(path.with_suffix(".sti"))}
     monkeypatch.setattr(os, "access", lambda name, mode: str(name) not in refused)
     assert "may not be read" in str(outcome(read, path))  # even by root
-
-
-def test_names_that_no_file_can_have(tmp_path):
-    assert "no such file" in str(outcome(rom.load, tmp_path / ("x" * 300 + ".npz")))
-    with pytest.raises(ConfigError, match=r"load: path = .*nul.*\.npz'\) must be a path"):
-        rom.load(tmp_path / "nul\0.npz")
 
 
 HUGE = "9" * 20  # no eight bytes hold it

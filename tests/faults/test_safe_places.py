@@ -7,6 +7,7 @@ import os
 import stat
 import tempfile
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -52,13 +53,9 @@ def test_what_lacks_room_inside_a_scratch_folder_says_so(error):
 def test_a_child_that_failed_in_a_full_folder_is_told_the_same(monkeypatch):
     """Whatever error its end became here; with room it stays what it was."""
     for room, kind in ((2**40, ConfigError), (0, ResourceError)):
-        monkeypatch.setattr(child.shutil, "disk_usage", lambda _, n=room: os_usage(n))
+        monkeypatch.setattr(child.shutil, "disk_usage", lambda _, n=room: SimpleNamespace(free=n))
         with pytest.raises(kind), child.scratch("full"):
             raise ConfigError("the process that draws ended with code 1.")
-
-
-def os_usage(free):
-    return type("Usage", (), {"free": free})
 
 
 def test_where_no_folder_takes_a_file_there_is_none(monkeypatch):

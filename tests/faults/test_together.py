@@ -25,7 +25,6 @@ from rom.io.files import write_whole
 from rom.io.ours import LOCK_NAME, claimed
 from rom.process.mpirun import found, mpirun
 from rom.process.patience import Turns
-from rom.report.html import paragraph, write_report
 
 pytestmark = pytest.mark.once
 
@@ -60,20 +59,6 @@ def test_a_body_file_of_two_writers_is_always_one_of_both(body, tmp_path):
     for _ in together(work, "one", "two"):
         seen.add(rom.load(path).name)  # compares all checksums
     assert seen <= {"one", "two"} and os.listdir(tmp_path) == ["b.npz"]
-
-
-def test_a_report_of_two_writers_is_always_one_of_both(tmp_path):
-    path = tmp_path / "r.html"
-
-    def work(name):
-        for _ in range(WRITES):
-            write_report({name: [paragraph(name * 50_000)]}, path, name)
-
-    work("a")
-    texts = {name: write_report({name: [paragraph(name * 50_000)]}, tmp_path / f"{name}.html", name)
-             .read_text() for name in "ab"}  # fmt: skip
-    for _ in together(work, "a", "b"):
-        assert path.read_text() in texts.values()
 
 
 def test_a_writer_that_is_killed_leaves_the_file_of_the_other(tmp_path):

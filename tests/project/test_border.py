@@ -51,60 +51,20 @@ WRONG = {
     "texts": ["no", "such"],
     "a matrix": np.ones((40, 40)),
 }
-BEYOND = {  # what annotations do not rule out, of a kind of numbers or names
-    "negative": ("-1",),
-    "counted": ("-1", "0"),
-    "share": ("-1", "0", "1.5"),
-    "point": ("1.5", "five numbers", "a matrix"),
-    "word": ("text",),
-    "frame": ("1.5", "text"),
-    "record": ("None", "1.5", "text"),
-    "number": ("text", "nan", "five numbers", "complex"),
-}
-KINDS = {  # callable -> kinds of its arguments; the values above are refused
-    "simulate": "dt=negative t_end=negative tolerance=negative rtol=negative order=negative "
-    "save_every=negative method=word",
-    "reduce": "reference=frame",
-    "modes": "n=counted f_max=negative fixed=word",
-    "Mechanism": "gravity=point",
-    "Mechanism.add_rigid": "mass=negative inertia=point at=point velocity=point omega=point",
-    "Mechanism.add_flexible": "at=point",
-    "Mechanism.revolute": "axis=point",
-    "Mechanism.prismatic": "axis=point",
-    "Mechanism.planar": "normal=point",
-    "Mechanism.rotational_spring": "joint=word",
-    "Mechanism.force": "vector=point vector=number frame=word",
-    "Mechanism.drive": "joint=word",
-    "equilibrium": "steps=negative spin=point",
-    "linearize": "frame=record",
-    "campbell": "axis=point",
-    "check": "record=record",
-    "write_history": "every=counted",
-    "write_animation": "frames=negative up=point",
-    "export": "to=word",
-    "craig_bampton": "n_modes=negative K=record",
-    "second_order_balanced_truncation": "r=negative",
-    "reduce_parametric": "tol=negative",
-    "FlexibleBody.frequencies": "n=negative fixed=word",
-    "FlexibleBody.with_reference": "reference=frame",
-    "FlexibleBody.in_units": "units=word",
-    "Solution.to_pandas": "every=counted",
-    "CraigBampton": "n_modes=negative f_max=counted tol=share",
-    "EnhancedCraigBampton": "n_modes=negative",
-    "MomentMatching": "order=counted",
-    "BalancedTruncation": "n_modes=negative pool=negative damping_ratio=share",
-    "AssumedModes": "n_modes=counted",
-    "Characteristic": "n=counted",
-    "Snapshots": "n=counted energy=share",
-    "Assembly.reduced": "n_interface=counted level=word",
-    "Geometric": "n_modes=negative n_shapes=counted n_steps=counted tol=share",
-    "Rayleigh": "alpha=negative beta=negative",
-    "Rubin": "n_modes=negative",
-    "Herting": "n_modes=negative",
-    "FreeFree": "n_modes=negative",
-    "Polynomial": "order=negative",
-    "Material": "E=number E=counted nu=number rho=number rho=counted",
-    "Density": "low=number low=negative",
+BEYOND = {  # wrong values that annotations do not rule out: arguments by which they are refused
+    ("-1",): "simulate.t_end modes.f_max equilibrium.steps write_animation.frames Density.low "
+    "craig_bampton.n_modes second_order_balanced_truncation.r reduce_parametric.tol "
+    "FlexibleBody.frequencies.n BalancedTruncation.pool Polynomial.order",
+    ("-1", "0"): "modes.n write_history.every Solution.to_pandas.every Characteristic.n "
+    "Snapshots.n Assembly.reduced.n_interface Material.E Material.rho",
+    ("-1", "0", "1.5"): "Snapshots.energy",
+    ("1.5", "five numbers", "a matrix"): "Mechanism.gravity Mechanism.force.vector "
+    "equilibrium.spin campbell.axis write_animation.up",
+    ("text",): "modes.fixed Mechanism.rotational_spring.joint Mechanism.drive.joint export.to "
+    "FlexibleBody.frequencies.fixed FlexibleBody.in_units.units Assembly.reduced.level",
+    ("1.5", "text"): "reduce.reference FlexibleBody.with_reference.reference",
+    ("None", "1.5", "text"): "linearize.frame check.record craig_bampton.K",
+    ("text", "nan", "five numbers", "complex"): "Mechanism.force.vector",
 }
 REFUSED_AS_THEY_ARE = set(  # legal calls that lack more than arguments: a file, a mesh, a film
     "BladedWheel.amplification BladedWheel.response FlexibleBody.critical_loads "
@@ -142,8 +102,11 @@ def limited(seconds):
 
 def beyond(label):
     """{(argument, wrong value)} that a callable may not take although its annotations would."""
-    kinds = (pair.split("=") for pair in KINDS.get(label, "").split())
-    return {(argument, wrong) for argument, kind in kinds for wrong in BEYOND[kind]}
+    found = set()
+    for kinds, names in BEYOND.items():
+        arguments = (name.rpartition(".") for name in names.split())
+        found |= set(product([argument for own, _, argument in arguments if own == label], kinds))
+    return found
 
 
 def ruled_out(function):

@@ -62,24 +62,20 @@ def models():
     return model
 
 
-@pytest.mark.fenicsx
-@pytest.mark.parametrize("name", [n for n, text in EXAMPLES.items() if "rom.fe." in text])
-def test_example_with_a_mesh_runs(name, models, beam, tmp_path, monkeypatch):
-    import rom.fe.elasticity
-
-    monkeypatch.setattr(rom.fe, "model", models, raising=False)
-    run_example(name, beam, tmp_path, monkeypatch)
+MESHED = [name for name, text in EXAMPLES.items() if "rom.fe." in text]
 
 
-@pytest.mark.parametrize("name", [n for n, text in EXAMPLES.items() if "rom.fe." not in text])
-def test_example_runs(name, beam, tmp_path, monkeypatch):
-    run_example(name, beam, tmp_path, monkeypatch)
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=[pytest.mark.fenicsx] * (n in MESHED)) for n in EXAMPLES]
+)
+def test_example_runs(name, models, beam, tmp_path, monkeypatch):
+    if name in MESHED:
+        import rom.fe.elasticity
 
-
-def run_example(name, beam, folder, monkeypatch):
-    (folder / "meshes").symlink_to(ROOT / "meshes")
-    (folder / "beam.rom.npz").symlink_to(beam)
-    monkeypatch.chdir(folder)
+        monkeypatch.setattr(rom.fe, "model", models, raising=False)
+    (tmp_path / "meshes").symlink_to(ROOT / "meshes")
+    (tmp_path / "beam.rom.npz").symlink_to(beam)
+    monkeypatch.chdir(tmp_path)
     names = {"rom": rom, "np": np, "csr_matrix": csr_matrix}
     test = doctest.DocTestParser().get_doctest(EXAMPLES[name], names, name, None, 0)
     assert 0 < len(test.examples) and any(example.want for example in test.examples)

@@ -43,13 +43,9 @@ NO_COMPONENTS = "import sys; sys.modules['rom.components'] = None\n"  # as if th
 
 
 def run(code, *paths, cwd=None):
-    return program("-c", dedent(code), paths=paths, cwd=cwd)
-
-
-def program(*words, paths=(), cwd=None):
     """What Python has done, modules of these folders first."""
     path = ":".join(map(str, [*paths, environment()["PYTHONPATH"]]))
-    done = python(*words, cwd=cwd, env=environment(PYTHONPATH=path), timeout=600)
+    done = python("-c", dedent(code), cwd=cwd, env=environment(PYTHONPATH=path), timeout=600)
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr
     return done
 

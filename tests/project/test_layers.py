@@ -97,6 +97,8 @@ def wrong(part, name):
     if package in DRAWING and part not in ("view", "report", "doctor"):
         return f"{name}; only rom.view may"
     target = rest.split(".")[0]
+    if target == "components" != part and (part, name) != ("fields", TYPES):
+        return "rom.components, which could leave as a package of its own"
     if package == "rom" and part not in ANYTHING and target != part:
         if not target:
             return "the package root"
@@ -121,11 +123,6 @@ def test_imports_follow_the_layers():
     assert not bad, "\n".join(bad)
 
 
-def level_of(parts):
-    """Dotted name of a folder below rom/, "" for rom/ itself."""
-    return ".".join(parts)
-
-
 def upward(path, name, order):
     """What a file may not reach: a file or folder that is higher on the level where both meet."""
     own = path.relative_to(ROOT / "rom").with_suffix("").parts
@@ -133,11 +130,12 @@ def upward(path, name, order):
     if name.split(".")[0] != "rom" or own[-1] == "__init__" or name.startswith(TYPES):
         return None
     same = next((k for k, (a, b) in enumerate(zip(own, target, strict=False)) if a != b), None)
-    if same is None or level_of(own[:same]) not in order:
+    level = None if same is None else ".".join(own[:same])
+    if level not in order:
         return None
-    places = order[level_of(own[:same])]
+    places = order[level]
     if target[same] in places and places.index(target[same]) > places.index(own[same]):
-        return f"{level_of(own[:same]) or 'rom'}: {own[same]} lies below {target[same]}"
+        return f"{level or 'rom'}: {own[same]} lies below {target[same]}"
     return None
 
 
@@ -150,25 +148,17 @@ def test_no_file_imports_from_a_higher_room():
 def test_every_room_has_its_place_in_the_order():
     """A folder with folders in it says in which order they and its files lie."""
     for folder in {ROOT / "rom", *(path.parent for path in MODULES)}:
-        level = level_of(folder.relative_to(ROOT / "rom").parts)
+        level = ".".join(folder.relative_to(ROOT / "rom").parts)
         inside = {p.stem for p in folder.glob("*.py")} - {"__init__"}
         folders = {p.parent.name for p in folder.glob("*/__init__.py")}
         if level in ORDER or (folders and level != "components"):
             assert inside | folders == set(ORDER[level]), level or "rom"
 
 
-def test_the_core_imports_no_component():
-    """They could leave as a package of their own."""
-    outside = [path for path in MODULES if part_of(path) != "components"]
-    found = {path.stem: module for path in outside for _, module, name in imports(path)
-             if whole(module, name).startswith("rom.components")}  # fmt: skip
-    assert found == {"fields": TYPES}
-
-
 def test_no_files_go_round_in_circles():
     """Also inside functions and where only types are meant; fronts too."""
     parts = {path: path.relative_to(ROOT).with_suffix("").parts for path in MODULES}
-    names = {level_of(p[:-1] if p[-1] == "__init__" else p): path for path, p in parts.items()}
+    names = {".".join(p[:-1] if p[-1] == "__init__" else p): path for path, p in parts.items()}
     reach = {
         name: {
             one if one in names else one.rpartition(".")[0]

@@ -83,6 +83,9 @@ def test_logarithmic_axes_of_less_than_two_decades_have_ticks_that_do_not_overla
     axis = figure.axes[0].xaxis
     assert [t.get_text() for t in axis.get_ticklabels()] == ["0.002", "0.005", "0.01", "0.02"]
     assert not any(t.get_text() for t in axis.get_ticklabels(minor=True))
+    above = figure.axes[0].yaxis  # of many decades: powers of ten, as ever
+    assert {axis.get_scale(), above.get_scale()} == {"log"}
+    assert all(np.log10(tick) % 1 == 0 for tick in above.get_ticklocs())
 
 
 def test_level_curves_are_named_on_them_and_away_from_points():

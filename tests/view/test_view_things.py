@@ -138,7 +138,7 @@ test_wrong_things_and_films_of_nothing_are_refused_by_name = refused(
     (film(0.0, odd=view.Thing(np.zeros((4, 3)), [[0, 1, 2, 3]])), "'odd'.*from 0 to 3"),
     (
         film(0.0, odd=view.Thing(*BOX, values=[1.0, 2.0])),
-        r"'odd' has \(1, 2\) values, needed are \(1, 8\)",
+        r"'odd': has \(1, 2\) values, needed are \(1, 8\)",
     ),
     (film(0.0, odd=view.Thing(*BOX, edges=[[0, 8]])), "'odd'.*edges must be pairs from 0 to 7"),
     (

@@ -7,10 +7,17 @@ import json
 import sys
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
+if TYPE_CHECKING:
+    from rom.model import Array, Index, Integers
+
+Image = npt.NDArray[np.uint8]
+Plotter = Any  # of pyvista
+Keys = dict[str, Any]  # of a scene, or of what pyvista draws
 COUNT_FILE = "count"  # as long as there are pictures drawn
 EDGE_OFFSET = 2e-3  # of the picture's height, towards the eye; parallel projection does not show it
 CREASE_ANGLE = 35.0  # from which an edge stays sharp in shading [degree]
@@ -22,7 +29,7 @@ def main(folder: Path) -> None:
 
     scene, arrays = read(folder)
     (width, height), times = scene["size"], scene["oversampling"]
-    plotter: Any = pyvista.Plotter(off_screen=True, window_size=[times * width, times * height])
+    plotter: Plotter = pyvista.Plotter(off_screen=True, window_size=[times * width, times * height])
     plotter.set_background("white")
     aim(plotter, scene, arrays)
     moving = [k for k in range(len(scene["actors"])) if len(arrays[f"points {k}"]) > 1]
@@ -41,13 +48,13 @@ def main(folder: Path) -> None:
     plotter.close()
 
 
-def read(folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
+def read(folder: Path) -> tuple[Keys, Keys]:
     """A scene and its arrays, as `rom.view.canvas.offscreen.write_scene` leaves them."""
     with np.load(folder / "arrays.npz", allow_pickle=False) as file:
         return json.loads((folder / "scene.json").read_text()), dict(file)
 
 
-def averaged(fine: Any, times: int) -> Any:
+def averaged(fine: Image, times: int) -> "Integers":
     """Means of blocks of pixels; a sum over axes of a reshaped array takes ten times as long."""
     total = np.full_like(fine[::times, ::times], times**2 // 2, np.uint16)
     for i, j in product(range(times), repeat=2):
@@ -55,7 +62,7 @@ def averaged(fine: Any, times: int) -> Any:
     return total // times**2
 
 
-def aim(plotter: Any, scene: dict[str, Any], arrays: dict[str, Any]) -> None:
+def aim(plotter: Plotter, scene: Keys, arrays: Keys) -> None:
     """Set the camera; its clipping range holds all frames, VTK's own would be that of the first."""
     focus, toward = arrays["focus"], arrays["toward"]
     actors = range(len(scene["actors"]))
@@ -68,14 +75,14 @@ def aim(plotter: Any, scene: dict[str, Any], arrays: dict[str, Any]) -> None:
     plotter.camera.clipping_range = (reach - depth, reach + depth)
 
 
-def add(plotter: Any, scene: dict[str, Any], arrays: dict[str, Any], k: int, frame: int) -> None:
+def add(plotter: Plotter, scene: Keys, arrays: Keys, k: int, frame: int) -> None:
     """Add an actor, or replace it by the one of the next frame."""
     style, values = scene["actors"][k], arrays.get(f"values {k}")
     points, cells = arrays[f"points {k}"][frame], arrays[f"cells {k}"]
     if cells.shape[1] < 3:  # lines and dots lie in front of the faces they are on
         points = points + EDGE_OFFSET * scene["height"] * arrays["toward"].astype(np.float32)
     grid = _grid(points, cells)
-    look: dict[str, Any] = {"opacity": style["opacity"], "name": f"{k}"}
+    look: Keys = {"opacity": style["opacity"], "name": f"{k}"}
     look |= {"reset_camera": False, "render": False}
     if values is None:
         look["color"] = style["colour"]
@@ -95,11 +102,11 @@ def add(plotter: Any, scene: dict[str, Any], arrays: dict[str, Any], k: int, fra
     plotter.add_mesh(grid, **look)
 
 
-def _grid(points: Any, cells: Any) -> Any:
+def _grid(points: "Array", cells: "Index") -> Any:
     import pyvista
 
     counted = np.column_stack([np.full(len(cells), cells.shape[1]), cells]).ravel()
-    given: dict[str, Any] = {{1: "verts", 2: "lines", 3: "faces"}[cells.shape[1]]: counted}
+    given: Keys = {{1: "verts", 2: "lines", 3: "faces"}[cells.shape[1]]: counted}
     return pyvista.PolyData(points, **given)
 
 

@@ -5,21 +5,21 @@ With what all pictures need: packages, a look, and a place to be written.
 
 import json
 from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from rom.errors import ConfigError, ResourceError
 from rom.io.files import check_writable
-from rom.process.child import Ended, python, run, scratch
+from rom.process.child import python, run, scratch
 from rom.process.progress import followed
 from rom.view.canvas.draw import COUNT_FILE
+from rom.view.canvas.draw import Image as Image
 from rom.view.canvas.scene import TEXT_COLOUR, Actor, Camera
 
-Image = npt.NDArray[np.uint8]
 COLOUR_MAP = "viridis"
 OVERSAMPLING = 2  # smooth edges on every driver
 INSTALL_COMMAND = "pip install 'fenicsx-rom[view]'"
@@ -46,11 +46,8 @@ def render(
         n, count = max(len(actor.points) for actor in actors), folder / COUNT_FILE
         label = f"drawing {n} pictures"
         with followed(n, label, lambda: count.stat().st_size if count.exists() else 0):
-            done = run(python("rom.view.canvas.draw", str(folder)))
-        pictures = folder / "pictures.npy"
-        if done.code or not pictures.exists():
-            raise child_failure(done)
-        return np.load(pictures, allow_pickle=False)
+            show("rom.view.canvas.draw", folder)
+        return np.load(folder / "pictures.npy", allow_pickle=False)
 
 
 def require(package: str) -> None:
@@ -60,7 +57,7 @@ def require(package: str) -> None:
         raise ResourceError(what, hint=f"{INSTALL_COMMAND}.")
 
 
-def styled() -> Any:
+def styled() -> AbstractContextManager[None]:
     """Context in which axes and words get the look of the house."""
     require("matplotlib")
     from matplotlib import rc_context
@@ -85,7 +82,7 @@ def write_scene(
     oversampling: int = OVERSAMPLING,
 ) -> None:
     """Leave a scene where a child process finds it."""
-    arrays: dict[str, npt.NDArray[Any]]
+    arrays: dict[str, npt.ArrayLike]
     arrays = {"focus": camera.focus, "toward": camera.toward, "up": camera.up}
     for k, actor in enumerate(actors):
         arrays |= {f"points {k}": actor.points.astype(np.float32), f"cells {k}": actor.cells}
@@ -98,10 +95,12 @@ def write_scene(
     (folder / "scene.json").write_text(json.dumps(scene | {"colours": COLOUR_MAP}))
 
 
-def child_failure(done: Ended) -> ConfigError:
-    """What a child process that did not end well has label."""
-    how = f"signal {-done.code}" if done.code < 0 else f"code {done.code}"
-    return ConfigError(
-        f"the process that draws ended with {how}: {done.last}.",
-        hint="`rom doctor` tests drawing without a screen and says what to install.",
-    )
+def show(module: str, folder: Path) -> None:
+    """Let a module that draws do so with what it finds in a folder, to its good end."""
+    done = run(python(module, str(folder)))
+    if done.code:
+        how = f"signal {-done.code}" if done.code < 0 else f"code {done.code}"
+        raise ConfigError(
+            f"the process that draws ended with {how}: {done.last}.",
+            hint="`rom doctor` tests drawing without a screen and says what to install.",
+        )

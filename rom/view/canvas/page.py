@@ -14,10 +14,14 @@ from rom.view.canvas.offscreen import styled as styled
 from rom.view.canvas.scene import TEXT_COLOUR
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.image import AxesImage
+    from matplotlib.text import Text
 
     from rom.view.canvas.picture import Picture
 
+Style = dict[str, Any]  # how matplotlib draws something, by its keywords
 DPI = 150
 TITLE_SIZE, BODY_SIZE, SMALL_SIZE = 12.5, 9.5, 8.5  # points
 LINE_HEIGHT = 26  # of small text [pixel]
@@ -43,13 +47,13 @@ def wanted(path: str | Path | None) -> Path | None:
     return None if path is None else checked(path, ".png")
 
 
-def area(figure: "Figure", left: float, top: float, width: float, height: float) -> Any:
+def area(figure: "Figure", left: float, top: float, width: float, height: float) -> "Axes":
     """Axes in a rectangle given in pixels from the top left corner."""
     w, h = figure.get_size_inches() * DPI
     return figure.add_axes((left / w, 1 - (top + height) / h, width / w, height / h))
 
 
-def place(figure: "Figure", image: Image, left: float, top: float) -> Any:
+def place(figure: "Figure", image: Image, left: float, top: float) -> "AxesImage":
     """Put a picture on the sheet, pixel for pixel."""
     height, width = image.shape[:2]
     axes = area(figure, left, top, width, height)
@@ -57,10 +61,10 @@ def place(figure: "Figure", image: Image, left: float, top: float) -> Any:
     return axes.imshow(image, aspect="auto", interpolation="nearest")
 
 
-def words(figure: "Figure", text: str, left: float, top: float, **options: Any) -> Any:
+def words(figure: "Figure", text: str, left: float, top: float, **options: Any) -> "Text":
     """Write text whose upper left corner is at a pixel."""
     w, h = figure.get_size_inches() * DPI
-    look: dict[str, Any] = {"size": BODY_SIZE, "va": "top", "color": TEXT_COLOUR} | options
+    look: Style = {"size": BODY_SIZE, "va": "top", "color": TEXT_COLOUR} | options
     return figure.text(left / w, 1 - top / h, text, **look)
 
 
@@ -109,7 +113,7 @@ def legend_shape(names: Sequence[str], width: float) -> tuple[int, int]:
     return rows, -(-len(names) // rows)
 
 
-def legend_above(axes: Any, width: float, height: int = 0) -> None:
+def legend_above(axes: "Axes", width: float, height: int = 0) -> None:
     """Names of the curves between axes that are so many pixels wide and their title.
 
     The title is so high above the axes at least [pixel].
@@ -117,10 +121,10 @@ def legend_above(axes: Any, width: float, height: int = 0) -> None:
     handles, names = axes.get_legend_handles_labels()
     rows, columns = legend_shape(names, width)
     if rows:
-        axes.legend(handles, names, fontsize=SMALL_SIZE, frameon=False, ncol=columns,
-                    loc="lower left", bbox_to_anchor=(0.0, 1.0), borderpad=0.2, borderaxespad=0.1,
-                    handlelength=2.0, handletextpad=0.6, columnspacing=1.3, labelspacing=0.35,
-                    )  # fmt: skip
+        look: Style = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "frameon": False}
+        look |= {"borderpad": 0.2, "borderaxespad": 0.1, "handlelength": 2.0, "handletextpad": 0.6}
+        look |= {"columnspacing": 1.3, "labelspacing": 0.35, "fontsize": SMALL_SIZE}
+        axes.legend(handles, names, ncol=columns, **look)
     if title := axes.get_title(loc="left"):
         pad = 8 + max(height, rows * ROW_HEIGHT) * 72 / DPI
         axes.set_title(title, loc="left", size=BODY_SIZE, pad=pad)
@@ -148,7 +152,7 @@ def pixels(figure: "Figure") -> Image:
     return np.asarray(figure.canvas.buffer_rgba())[..., :3].copy()  # type: ignore[attr-defined]
 
 
-def taken(ax: Any, n: int, name: str) -> tuple["Figure", list[Any]]:
+def taken(ax: object, n: int, name: str) -> tuple["Figure", list["Axes"]]:
     """The axes of a caller of a function, one for each of n diagrams, and their figure."""
     require("matplotlib")
     from matplotlib.axes import Axes

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.backend_bases import RendererBase
 from matplotlib.figure import Figure
 from matplotlib.ticker import Formatter, MaxNLocator
 
@@ -31,7 +32,7 @@ class Picture(Figure):
         self.path = written(self, checked(path, ".png"))
         return self.path
 
-    def draw(self, renderer: Any) -> None:
+    def draw(self, renderer: RendererBase) -> None:
         """Ticks that are made while it is drawn have the look of the house, too."""
         with styled():
             super().draw(renderer)
@@ -78,7 +79,7 @@ class ScaledTicks(Formatter):
     def __init__(self, factor: float):
         self.factor, self.digits, self.written = factor, 6, 0
 
-    def set_locs(self, locs: Any) -> None:
+    def set_locs(self, locs: list[float]) -> None:
         """Choose the digits from the distance of the ticks."""
         super().set_locs(locs)
         steps = np.abs(np.diff(self.factor * np.unique(locs)))

@@ -2,11 +2,14 @@
 
 import re
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rom.model import Array
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 ROUND_OFF = 1e-9  # of the largest value of a panel; what varies by less is drawn as constant
 PREFIXES = {9: "G", 6: "M", 3: "k", 0: "", -3: "m", -6: "µ", -9: "n", -12: "p"}
@@ -70,7 +73,7 @@ def without_round_off(curves: Sequence[Array]) -> list[Array]:
     return flat
 
 
-def readable(axes: Any, *, alike: bool = False) -> None:
+def readable(axes: "Axes", *, alike: bool = False) -> None:
     """Ticks and labels of linear axes in prefixed units, where a label ends with "[unit]".
 
     What is drawn stays in the unit of the label, so that more can be added in the same. Axes that

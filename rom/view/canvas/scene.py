@@ -17,44 +17,26 @@ HEIGHTS = (0.2, 0.85)  # bounds of the height of a picture, of its width
 
 @dataclass(frozen=True, slots=True)
 class Actor:
-    """One thing in a picture, still or moving.
+    """One thing in a picture, still or moving."""
 
-    Attributes:
-        points: (f, n, 3) positions in f frames [m]; f = 1 for a thing that stays.
-        cells: (m, 3) triangles, (m, 2) lines or (m, 1) dots.
-        values: (f, n) what the colour map shows, or None for a plain colour.
-        colour: plain colour.
-        width: width of lines or size of dots, in pixels of the finished picture.
-        opacity: 0 to 1.
-        lit: whether light and shade fall on it; without, triangles have their colour exactly.
-    """
-
-    points: Array
-    cells: Index
-    values: Array | None = None
+    points: Array  # (f, n, 3) positions in f frames [m]; f = 1 for a thing that stays
+    cells: Index  # (m, 3) triangles, (m, 2) lines or (m, 1) dots
+    values: Array | None = None  # (f, n) what the colour map shows; None for a plain colour
     colour: str = "#9aa5b1"
-    width: float = 1.0
-    opacity: float = 1.0
-    lit: bool = True
+    width: float = 1.0  # of lines, or size of dots, in pixels of the finished picture
+    opacity: float = 1.0  # 0 to 1
+    lit: bool = True  # light and shade fall on it; without, triangles have their colour exactly
 
 
 @dataclass(frozen=True, slots=True)
 class Camera:
-    """Parallel projection.
+    """Parallel projection."""
 
-    Attributes:
-        focus: (3,) point in the middle of the picture [m].
-        toward: (3,) unit vector from there to the eye.
-        up: (3,) unit vector that is upright in the picture.
-        height: height of the picture [m].
-        size: width and height [pixel].
-    """
-
-    focus: Array
-    toward: Array
-    up: Array
-    height: float
-    size: tuple[int, int]
+    focus: Array  # (3,) point in the middle of the picture [m]
+    toward: Array  # (3,) unit vector from there to the eye
+    up: Array  # (3,) unit vector that is upright in the picture
+    height: float  # of the picture [m]
+    size: tuple[int, int]  # width and height [pixel]
 
     @property
     def axes(self) -> Array:

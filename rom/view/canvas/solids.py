@@ -1,7 +1,7 @@
 """Surfaces of simple solids, to give rigid bodies a shape in pictures."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -11,6 +11,7 @@ from rom.errors import ConfigError
 from rom.model import Array, Index
 
 Mesh = tuple[Array, Index]
+Angle = TypeVar("Angle", float, Array)
 BORE_SIDES = 48  # of a hole at least
 COIL_POINTS = 24  # of a spring, to a turn
 FILLET_RATIO = 0.25  # of the gap of a gear, by which a tooth is wider at its root
@@ -28,8 +29,8 @@ def box(size: npt.ArrayLike, centre: npt.ArrayLike = (0.0, 0.0, 0.0)) -> Mesh:
         (8, 3) points and (12, 3) triangles, seen from outside counter-clockwise.
     """
     corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) / 2
-    quads = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4],
-                      [1, 5, 7, 3]])  # fmt: skip
+    sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6)]
+    quads = np.array([*sides, (0, 2, 6, 4), (1, 5, 7, 3)])
     triangles = np.vstack([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
     return corners * np.asarray(size, dtype=float) + np.asarray(centre, dtype=float), triangles
 
@@ -141,9 +142,8 @@ def tube(line: npt.ArrayLike, diameter: float, *, sides: int = 16) -> Mesh:
         ConfigError: if the points are no curve.
     """
     X = _curve(line)[0]
-    loops = [centre + _circle(x, y, diameter / 2, sides)
-             for centre, x, y in zip(X, *_sections(X), strict=True)]  # fmt: skip
-    return _closed(loops, X[0], X[-1])
+    rims = [_circle(x, y, diameter / 2, sides) for x, y in zip(*_sections(X), strict=True)]
+    return _closed([*(X[:, None] + rims)], X[0], X[-1])
 
 
 def _closed(loops: Sequence[Array], start: Array, end: Array) -> Mesh:
@@ -264,8 +264,8 @@ def extruded(outline: npt.ArrayLike, width: float, *, bore: float = 0.0) -> Mesh
     points = np.vstack([np.column_stack([x, np.full(len(x), s * width / 2)]) for x, s in loops])
     n, m = len(P), len(inside)
     first = np.cumsum([0, m, n, n])
-    rows = [at + (np.arange(n) if k in (1, 2) or bore else np.zeros(n, dtype=int))
-            for k, at in enumerate(first)]  # fmt: skip
+    outside, within = np.arange(n), np.arange(n) % m
+    rows = [at + part for at, part in zip(first, (within, outside, outside, within), strict=True)]
     bands = [_band(rows[k], rows[(k + 1) % 4]) for k in range(4 if bore else 3)]
     triangles = np.vstack(bands)
     area = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)  # a fan has half of them
@@ -327,7 +327,7 @@ def gear_outline(teeth: int, module: float, pressure_angle: float, points: int =
     return np.tile(radius, teeth)[:, None] * np.column_stack([np.cos(every), np.sin(every)])
 
 
-def involute(angle: Any) -> Any:
+def involute(angle: Angle) -> Angle:
     """Involute function: angle of a point on the curve where the pressure angle is that."""
     return np.tan(angle) - angle
 

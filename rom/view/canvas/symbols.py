@@ -27,8 +27,8 @@ def sleeve(size: float) -> Mesh:
     """Prismatic joint: a square sleeve along the axis."""
     half, wall, long = 0.9 * size, 0.3 * size, 3.0 * size
     plates = [box((2 * half, wall, long), (0, side * half, 0)) for side in (-1, 1)]
-    plates += [box((wall, 2 * half - wall, long), (side * (half - wall / 2), 0, 0))
-               for side in (-1, 1)]  # fmt: skip
+    inner = (wall, 2 * half - wall, long)
+    plates += [box(inner, (side * (half - wall / 2), 0, 0)) for side in (-1, 1)]
     return joined(plates)
 
 
@@ -57,8 +57,8 @@ def spiral(size: float) -> Lines:
 
 def pedestal(size: float, width: float) -> tuple[Mesh, tuple[Mesh, Lines]]:
     """Support of a joint at the origin: a wedge, its edges along x, and a hatched plate below."""
-    wedge = extruded([(-1.5 * size, -1.2 * size), (1.5 * size, -1.2 * size), (0.35 * size, size),
-                      (-0.35 * size, size)], width)  # fmt: skip
+    outline = size * np.array([(-1.5, -1.2), (1.5, -1.2), (0.35, 1.0), (-0.35, 1.0)])
+    wedge = extruded(outline, width)
     points = np.roll(wedge[0], 1, axis=1) - (0, 0, size)  # the outline from x, y to y, z
     plate, hatching = ground_plate(1.6 * width, 4.4 * size, 0.5 * size)
     below = np.array([0.0, 0.0, -2.2 * size])
@@ -91,10 +91,10 @@ def spring(size: float) -> Lines:
     """Spring along z whose length is one: z is stretched, x and y are not."""
     s = np.linspace(0.0, 1.0, COIL_TURNS * COIL_POINTS + 1)
     angle = 2 * np.pi * COIL_TURNS * s
-    wound = np.column_stack([size * np.sin(angle), size * (1 - np.cos(angle)) - size,
-                             LEAD_RATIO + (1 - 2 * LEAD_RATIO) * s])  # fmt: skip
-    return polyline(np.vstack([(0, 0, 0), (0, 0, LEAD_RATIO), wound, (0, 0, 1 - LEAD_RATIO),
-                               (0, 0, 1)]))  # fmt: skip
+    z = LEAD_RATIO + (1 - 2 * LEAD_RATIO) * s
+    wound = np.column_stack([size * np.sin(angle), size * (1 - np.cos(angle)) - size, z])
+    ends = np.array([(0, 0, x) for x in (0, LEAD_RATIO, 1 - LEAD_RATIO, 1)])
+    return polyline(np.vstack([ends[:2], wound, ends[2:]]))
 
 
 def dashpot(size: float) -> Lines:

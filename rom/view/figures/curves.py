@@ -1,6 +1,6 @@
 """Curves over time, and how far reduced frequencies are from full ones."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,15 +15,21 @@ from rom.view.canvas.scales import readable, without_round_off
 from rom.view.figures.things import Scene, draw_scene
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
+    from matplotlib.text import Annotation
 
+    from rom.mbs.analysis.campbell import Campbell
+
+Draw = Callable[["Axes", Any, dict[str, int]], None]
 PAGE_WIDTH, PANEL_HEIGHT, BESIDE_WIDTH, SCENE_GAP = 1400, 330, 440, 45  # pixel
 LINES = ("#2f7f9f", "#d1495b", "#edae49", "#66a182", "#8d6a9f", "#5c636e")
 DASHES = ("-", "--", "-.", ":")
 # one more than colours, so that series beyond these look different, too
 MARKERS = ("o", "s", "^", "D", "v", "x", "P")
 GREY = "#5c636e"
-LEVEL_STYLE = {"color": GREY, "ls": "-.", "lw": 0.9, "zorder": 1.5}
+LEVEL_STYLE: page.Style = {"color": GREY, "ls": "-.", "lw": 0.9, "zorder": 1.5}
 RAYS_LABEL = "multiples of the speed"
 MAX_TICKS = 10  # sizes that have room for a tick each
 TICK_DISTANCE = 0.03  # least distance of words of ticks, of a logarithmic axis
@@ -34,14 +40,14 @@ MIN_ERROR = 1e-12  # errors below are drawn there: round-off has no meaning
 @typed
 def history(  # noqa: PLR0913  keywords of one picture
     t: npt.ArrayLike,
-    panels: Sequence[tuple[str, dict[str, Any]]],
+    panels: Sequence[tuple[str, Mapping[str, object]]],
     path: str | Path | None = None,
     *,
     title: str = "",
     caption: str = "",
     over: str | None = None,
     beside: Scene | Sequence[Scene] | None = None,
-    ax: Any = None,
+    ax: object = None,
 ) -> "Figure":
     """Draw quantities over time, or over something else, one panel below the other.
 
@@ -89,18 +95,20 @@ def numbered(panels: Sequence[Sequence[str]]) -> list[list[int]]:
     return numbers
 
 
-def _histories(axes: Any, t: Array, curves: dict[str, Any], numbers: Sequence[int]) -> None:
+def _histories(
+    axes: "Axes", t: Array, curves: Mapping[str, object], numbers: Sequence[int]
+) -> None:
     lines, looks = [], []
     for (name, values), number in zip(curves.items(), numbers, strict=True):
         look, where = line_look(number), t
         if isinstance(values, tuple):
             where, values = values
             look |= {"ls": "none", "marker": "o", "ms": 7, "clip_on": False}
-        elif np.ndim(values) == 0:
-            values = np.full_like(t, values)
+        elif (given := np.asarray(values)).ndim == 0:
+            values = np.full_like(t, given)
             look |= LEVEL_STYLE
-        elif np.asarray(values).dtype.kind == "U":
-            values = _rows(axes, values)
+        elif given.dtype.kind == "U":
+            values = _rows(axes, given)
         x, y = (np.asarray(v, dtype=float) for v in (where, values))
         one_each(f"values of {name!r}", y.shape, "times", x.shape)
         lines.append((x, y))
@@ -110,21 +118,21 @@ def _histories(axes: Any, t: Array, curves: dict[str, Any], numbers: Sequence[in
         axes.plot(x, y, **look)
 
 
-def line_look(k: int) -> dict[str, Any]:
+def line_look(k: int) -> page.Style:
     """Colour and dashes of curve number k, no two of the first 24 alike; dashes lie on top."""
     again, colour = divmod(k, len(LINES))
     dash = (k + again) % 2 + 2 * (again // 2 % 2)
     return {"color": LINES[colour], "ls": DASHES[dash], "lw": 1.4, "zorder": 2.0 + 0.1 * dash}
 
 
-def _rows(axes: Any, words: Any) -> Array:
+def _rows(axes: "Axes", words: Iterable[str]) -> Array:
     """(n,) numbers of words in the order in which they come, named at the axis."""
     names = list(dict.fromkeys(words))
     axes.set_yticks(range(len(names)), names)
     return np.array([names.index(word) for word in words], dtype=float)
 
 
-def _complete(areas: Sequence[Any], xlabel: str, ax: Any) -> None:
+def _complete(areas: Sequence["Axes"], xlabel: str, ax: object) -> None:
     """Names of axes; on a page one horizontal axis for all, and legends above, equal ones once.
 
     Axes of a caller keep their own, with what is named.
@@ -152,7 +160,7 @@ def frequencies(
     *,
     title: str = "",
     beside: Scene | Sequence[Scene] | None = None,
-    ax: Any = None,
+    ax: object = None,
 ) -> "Figure":
     """Draw the relative errors of reduced frequencies in several supports.
 
@@ -197,14 +205,14 @@ def frequencies(
 
 @typed
 def convergence(
-    panels: Sequence[tuple[str, dict[str, tuple[Any, Any]]]],
+    panels: Sequence[tuple[str, Mapping[str, tuple[object, object]]]],
     path: str | Path | None = None,
     *,
     xlabel: str,
     title: str = "",
     caption: str = "",
     beside: Scene | Sequence[Scene] | None = None,
-    ax: Any = None,
+    ax: object = None,
 ) -> "Figure":
     """Draw errors that fall with the size of a model, on logarithmic axes.
 
@@ -252,7 +260,7 @@ def campbell(  # noqa: PLR0913  keywords of one picture
     title: str = "",
     caption: str = "",
     beside: Scene | Sequence[Scene] | None = None,
-    ax: Any = None,
+    ax: object = None,
 ) -> "Figure":
     """Draw natural frequencies over the speed of rotation, with multiples of the speed.
 
@@ -308,7 +316,7 @@ def campbell(  # noqa: PLR0913  keywords of one picture
         return page.save(figure, path)
 
 
-def _multiples(axes: Any, diagram: Any, turns: Any, orders: Sequence[float]) -> None:
+def _multiples(axes: "Axes", diagram: "Campbell", turns: Array, orders: Sequence[float]) -> None:
     """Rays of the orders, and rings where modes meet them."""
     top = 1.06 * diagram.frequencies.max()
     axes.set_ylim(0.0, top)
@@ -318,14 +326,14 @@ def _multiples(axes: Any, diagram: Any, turns: Any, orders: Sequence[float]) -> 
         axes.plot(at, order * at / 60, "o", ms=11, mfc="none", mec="#1d2733", mew=1.3)
 
 
-def _name_rays(axes: Any, turns: Array, orders: Sequence[float]) -> None:
+def _name_rays(axes: "Axes", turns: Array, orders: Sequence[float]) -> None:
     """Names below the rays, as far out as there is room where no line runs through them."""
     paths = [line.get_path().transformed(line.get_transform()) for line in axes.lines]
     for order in orders:
-        text = axes.annotate(f"{order:g}x", (0.0, 0.0), (3, -3), textcoords="offset points",
-                             va="top", color=GREY, size=page.SMALL_SIZE)  # fmt: skip
+        look: page.Style = {"va": "top", "color": GREY, "size": page.SMALL_SIZE}
+        text = axes.annotate(f"{order:g}x", (0, 0), (3, -3), textcoords="offset points", **look)
 
-        def crossed(x: float, text: Any = text, slope: float = order / 60) -> float:
+        def crossed(x: float, text: "Annotation" = text, slope: float = order / 60) -> float:
             text.xy = x, slope * x
             box = text.get_window_extent()
             if not axes.bbox.containsx(box.x1) or not axes.bbox.containsy(box.y0):
@@ -337,7 +345,7 @@ def _name_rays(axes: Any, turns: Array, orders: Sequence[float]) -> None:
             text.set_bbox({"fc": "white", "ec": "none", "pad": 0.5})
 
 
-def _apart(ticks: Any, span: float) -> list[str]:
+def _apart(ticks: Iterable[float], span: float) -> list[str]:
     """Words of ticks on a logarithmic axis of that span; none where they would overlap."""
     words, last = [], 0.0
     for tick in ticks:
@@ -347,7 +355,7 @@ def _apart(ticks: Any, span: float) -> list[str]:
     return words
 
 
-def _same_sizes(areas: Sequence[Any], sizes: list[Any]) -> None:
+def _same_sizes(areas: Sequence["Axes"], sizes: list[object]) -> None:
     """One horizontal axis for all panels, with ticks at the sizes themselves if they are few."""
     ticks = np.unique(np.concatenate([np.asarray(x, dtype=float) for x in sizes]))
     low, high = ticks[0] / 1.15, ticks[-1] * 1.15
@@ -359,7 +367,7 @@ def _same_sizes(areas: Sequence[Any], sizes: list[Any]) -> None:
         axes.set_xlim(low, high)
 
 
-def near_ticks(axis: Any) -> None:
+def near_ticks(axis: "Axis") -> None:
     """Ticks at 1, 2 and 5 where values on a logarithmic axis span too little for powers of ten."""
     from matplotlib.ticker import NullFormatter
 
@@ -384,13 +392,13 @@ def _once(legends: Sequence[Sequence[str]]) -> list[list[str]]:
 
 
 def _panels(
-    ax: Any,
+    ax: object,
     legends: Sequence[Sequence[str]],
     name: str,
     title: str,
     caption: str,
     beside: Scene | Sequence[Scene] | None,
-) -> tuple[Any, list[Any]]:
+) -> tuple["Figure", list["Axes"]]:
     """Figure and axes: those of the caller, or one below the other on a page with their legends."""
     scenes, n = [beside] if isinstance(beside, Scene) else list(beside or ()), len(legends)
     if ax is not None:
@@ -413,12 +421,14 @@ def _panels(
     return figure, areas
 
 
-def finish(axes: Any, *, legend: bool, alike: bool = False, size: float = page.BODY_SIZE) -> None:
+def finish(
+    axes: "Axes", *, legend: bool, alike: bool = False, size: float = page.BODY_SIZE
+) -> None:
     """Grid, spines, units, size of the names of axes, and legend of the house."""
     _uncover(axes)
     readable(axes, alike=alike)
     for axis in (axes.xaxis, axes.yaxis):
-        axis.label.set_size(size)
+        axis.label.set_fontsize(size)
     axes.tick_params(labelsize=page.SMALL_SIZE)
     if not axes.images:
         axes.grid(color="#dfe3e8", lw=0.6)
@@ -436,7 +446,7 @@ def legend_names(drawing: Any) -> list[str]:
 
 
 def fill(
-    figure: Any, areas: Sequence[Any], drawings: Sequence[Any], draw: Any, *, legend: bool
+    figure: "Figure", areas: Sequence["Axes"], drawings: Sequence[Any], draw: Draw, *, legend: bool
 ) -> None:
     """Draw diagrams and scenes of a page into its areas, those compared in one scale.
 
@@ -459,25 +469,24 @@ def fill(
         finish(axes, legend=legend, alike=x.equal, size=page.SMALL_SIZE)
 
 
-def _uncover(axes: Any) -> None:
+def _uncover(axes: "Axes") -> None:
     """A curve with a name is wider if it lies under another of its dashes, so that it shows."""
     pixels = axes.transData.transform
-    named = [line for line in axes.lines if not line.get_label().startswith("_")]
+    named = [line for line in axes.lines if not str(line.get_label()).startswith("_")]
     seen = [(line, line.get_linestyle(), pixels(line.get_xydata())) for line in named]
     seen = [one for one in seen if one[1] != "None"]
     for k, (line, dashes, x) in enumerate(seen):
-        above = sum(dashes == other and x.shape == y.shape
-                    and np.allclose(x, y, 0.0, COVER_DISTANCE, equal_nan=True)
-                    for _, other, y in seen[k + 1 :])  # fmt: skip
+        alike = [y for _, other, y in seen[k + 1 :] if dashes == other and x.shape == y.shape]
+        above = sum(np.allclose(x, y, 0.0, COVER_DISTANCE, equal_nan=True) for y in alike)
         line.set_linewidth(line.get_linewidth() + COVER_WIDTH * above)
 
 
-def one_scale(areas: Sequence[Any]) -> None:
+def one_scale(areas: Sequence["Axes"]) -> None:
     """The same limits for diagrams whose axes have the same names: they are compared.
 
     Ranges of x that have nothing in common stay: each would leave the others empty.
     """
-    groups: dict[tuple[str, ...], list[Any]] = {}
+    groups: dict[tuple[str, ...], list[Axes]] = {}
     for axes in areas:
         names = axes.get_xlabel(), axes.get_ylabel()
         if all(names):
@@ -490,7 +499,7 @@ def one_scale(areas: Sequence[Any]) -> None:
             axes.set_ylim(np.min(y), np.max(y))
 
 
-def _same_scale(axes: Any) -> None:
+def _same_scale(axes: "Axes") -> None:
     """Widen the shorter axis until a metre is as long on both."""
     shape = axes.get_window_extent().size
     limits = np.array([axes.get_xlim(), axes.get_ylim()])

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,6 +16,8 @@ from rom.view.figures.curves import LINES, MARKERS, fill, legend_names, line_loo
 from rom.view.figures.things import Scene
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.cm import ScalarMappable
     from matplotlib.figure import Figure
 
 PAGE_WIDTH = 1400  # [pixel]
@@ -76,7 +78,7 @@ def plane(
     caption: str = "",
     columns: int = 2,
     height: int = 480,
-    ax: Any = None,
+    ax: object = None,
 ) -> "Figure":
     """Draw things in a plane, side by side.
 
@@ -119,17 +121,17 @@ def plane(
         return page.save(figure, path)
 
 
-def _draw(axes: Any, drawing: Drawing, numbers: dict[str, int]) -> None:
+def _draw(axes: "Axes", drawing: Drawing, numbers: dict[str, int]) -> None:
     axes.set_title(drawing.title, size=page.BODY_SIZE, loc="left")
     axes.set_xlabel(drawing.x)
     axes.set_ylabel(drawing.y)
     over = drawing.shade is not None
     if drawing.shade is not None:
-        image = axes.imshow(
-            drawing.shade.T, origin="lower", extent=drawing.extent, cmap=COLOUR_MAP,
-            aspect="equal" if drawing.equal else "auto",
-            interpolation="bilinear" if min(drawing.shade.shape) > MANY_CELLS else "nearest",
-        )  # fmt: skip
+        how: page.Style = {"origin": "lower", "extent": drawing.extent, "cmap": COLOUR_MAP}
+        smooth = min(drawing.shade.shape) > MANY_CELLS
+        how |= {"interpolation": "bilinear" if smooth else "nearest"}
+        how |= {"aspect": "equal" if drawing.equal else "auto"}
+        image = axes.imshow(drawing.shade.T, **how)
         _colour_bar(axes, image, drawing)
     _fill(axes, drawing)
     for k, (label, curves) in enumerate(drawing.curves.items()):
@@ -152,14 +154,14 @@ def _draw(axes: Any, drawing: Drawing, numbers: dict[str, int]) -> None:
         axes.legend(fontsize=page.SMALL_SIZE, frameon=False, ncol=3, **place)
 
 
-def _colour_bar(axes: Any, coloured: Any, drawing: Drawing) -> None:
+def _colour_bar(axes: "Axes", coloured: "ScalarMappable", drawing: Drawing) -> None:
     coloured.set_clim(drawing.limits)
     bar = axes.figure.colorbar(coloured, ax=axes, fraction=0.05, pad=0.03)
     bar.set_label(drawing.label, size=page.SMALL_SIZE)
     bar.ax.tick_params(labelsize=page.SMALL_SIZE)
 
 
-def _draw_levels(axes: Any, drawing: Drawing) -> None:
+def _draw_levels(axes: "Axes", drawing: Drawing) -> None:
     """Level curves, each value written once on them, far from the other values and the points."""
     if not drawing.levels or drawing.extent is None:
         return
@@ -175,18 +177,19 @@ def _draw_levels(axes: Any, drawing: Drawing) -> None:
         apart = [np.linalg.norm(places[:, None] - others, axis=2).min(axis=1) for others in taken]
         best = places[np.argmax(np.min([*apart, np.ones(len(places))], axis=0))]
         taken.append(best[None])
-        axes.text(*(low + best * (high - low)), f"{value:g}", size=page.SMALL_SIZE, ha="center",
-                  va="center", color="white", zorder=5,
-                  bbox={"fc": "#22262b", "ec": "none", "alpha": 0.65, "pad": 1.2})  # fmt: skip
+        box = {"fc": "#22262b", "ec": "none", "alpha": 0.65, "pad": 1.2}
+        look: page.Style = {"ha": "center", "va": "center", "color": "white", "zorder": 5}
+        x, y = low + best * (high - low)
+        axes.text(x, y, f"{value:g}", size=page.SMALL_SIZE, bbox=box, **look)
 
 
-def _fill(axes: Any, drawing: Drawing) -> None:
+def _fill(axes: "Axes", drawing: Drawing) -> None:
     """Draw polygons, and their colour bar when they have values."""
     if not len(drawing.polygons):
         return
     from matplotlib.collections import PolyCollection
 
-    look: dict[str, Any] = {"edgecolor": EDGE_COLOUR, "linewidth": 0.8}
+    look: page.Style = {"edgecolor": EDGE_COLOUR, "linewidth": 0.8}
     if drawing.values is None:
         look["facecolor"] = STONE_COLOUR
     else:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rom.arguments import one_each, typed
+from rom.model import Array
 from rom.view.canvas import page
 from rom.view.canvas.scales import without_round_off
 from rom.view.canvas.scene import TEXT_COLOUR
@@ -23,13 +24,14 @@ from rom.view.figures.curves import (
 from rom.view.figures.things import Scene, below_height, seen
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 # pixel, of a diagram and around it
 PANEL_HEIGHT, LEFT_MARGIN, RIGHT_MARGIN, TOP_MARGIN, BOTTOM_MARGIN = 370, 95, 30, 55, 75
 SCENE_MORE = 90  # by which rows with scenes are higher [pixel]
 LEAST_WIDTH = 420  # of scenes beside diagrams [pixel]
-GUIDE_STYLE = {"color": "#8a9199", "lw": 0.9}  # a curve without a name
+GUIDE_STYLE: page.Style = {"color": "#8a9199", "lw": 0.9}  # a curve without a name
 Line = tuple[Any, Any]  # (n,) numbers each; NaN leaves a gap
 
 
@@ -76,7 +78,7 @@ def panels(
     *,
     title: str = "",
     caption: str = "",
-    ax: Any = None,
+    ax: object = None,
 ) -> "Figure":
     """Draw rows of diagrams; those whose axes have the same names have one scale.
 
@@ -163,7 +165,7 @@ def _legend_height(row: Sequence[Panel | Scene]) -> int:
     return page.ROW_HEIGHT * max(rows, default=0)
 
 
-def _draw(axes: Any, panel: Panel, numbers: Mapping[str, int]) -> None:
+def _draw(axes: "Axes", panel: Panel, numbers: Mapping[str, int]) -> None:
     """A diagram with the looks of its named curves."""
     curves, points = _lines(panel)
     for name, line in curves.items():
@@ -172,14 +174,14 @@ def _draw(axes: Any, panel: Panel, numbers: Mapping[str, int]) -> None:
     for name, line in points.items():
         named = [other for other in points if not other.startswith("_")]
         mark = MARKERS[named.index(name)] if name in named else "o"
-        look = {"mec": "#22262b", "mfc": "none", "ms": 4.0, "mew": 0.8}
-        axes.plot(*line, mark, label=name, **look)
+        ring: page.Style = {"mec": "#22262b", "mfc": "none", "ms": 4.0, "mew": 0.8}
+        axes.plot(*line, mark, label=name, **ring)
     if panel.bars:
-        _draw_bars(axes, panel.bars, panel.ends)
+        _draw_bars(axes, panel)
     for words, place in panel.notes.items():
-        axes.annotate(words, place, (6, 0), textcoords="offset points", va="center",
-                      size=page.SMALL_SIZE, color=TEXT_COLOUR,
-                      bbox={"fc": "white", "ec": "none", "alpha": 0.8, "pad": 0.8})  # fmt: skip
+        look: page.Style = {"size": page.SMALL_SIZE, "color": TEXT_COLOUR, "va": "center"}
+        look["bbox"] = {"fc": "white", "ec": "none", "alpha": 0.8, "pad": 0.8}
+        axes.annotate(words, place, (6, 0), textcoords="offset points", **look)
     axes.set_title(panel.title, size=page.BODY_SIZE, loc="left")
     axes.set_xlabel(panel.xlabel)
     axes.set_ylabel(panel.ylabel)
@@ -202,11 +204,12 @@ def _lines(panel: Panel) -> tuple[dict[str, Line], dict[str, Line]]:
     return curves, dict(zip(panel.points, lines[n:], strict=True))
 
 
-def _draw_bars(axes: Any, bars: Mapping[str, tuple[float, float]], ends: Any) -> None:
+def _draw_bars(axes: "Axes", panel: Panel) -> None:
+    bars = panel.bars
     low, high = np.array(list(bars.values()), dtype=float).T
-    parts: list[Any] = [(low, high - low, None)]
-    if ends is not None:
-        parts = [(0.0, low, ends[0]), (0.0, high, ends[1])]
+    parts: list[tuple[Array, Array, str | None]] = [(low, high - low, None)]
+    if panel.ends is not None:
+        parts = [(0 * low, x, end) for x, end in zip((low, high), panel.ends, strict=True)]
     for k, (left, width, name) in enumerate(parts):
         axes.barh(np.arange(len(bars)), width, left=left, height=0.6, color=LINES[k], label=name)
     axes.axvline(0.0, color="#22262b", lw=0.8)

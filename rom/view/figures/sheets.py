@@ -1,9 +1,9 @@
 """Plane bodies of triangles: figures and films of how they deform."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,6 +18,8 @@ from rom.view.canvas.scene import boundary
 from rom.view.figures.curves import LINES, MARKERS, finish
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.collections import Collection
     from matplotlib.figure import Figure
 
 PAGE_WIDTH, PANEL_HEIGHT = 1500, 430  # pixel
@@ -54,7 +56,7 @@ class Shape:
 
 @typed
 def deformed(  # noqa: PLR0913  keywords of one picture
-    curves: dict[str, tuple[Any, Any]],
+    curves: Mapping[str, tuple[object, object]],
     shapes: Sequence[Shape],
     path: str | Path | None = None,
     *,
@@ -64,7 +66,7 @@ def deformed(  # noqa: PLR0913  keywords of one picture
     title: str = "",
     heading: str = "",
     caption: str = "",
-    ax: Any = None,
+    ax: object = None,
 ) -> "Figure":
     """Draw curves that tend to a limit beside the bodies they belong to.
 
@@ -118,7 +120,10 @@ def deformed(  # noqa: PLR0913  keywords of one picture
 
 
 def _tending(
-    axes: Any, curves: dict[str, tuple[Any, Any]], limit: tuple[str, float], labels: Sequence[str]
+    axes: "Axes",
+    curves: Mapping[str, tuple[object, object]],
+    limit: tuple[str, float],
+    labels: Sequence[str],
 ) -> None:
     """Curves and the limit they tend to."""
     for k, (name, (x, y)) in enumerate(curves.items()):
@@ -180,12 +185,12 @@ def flow(
 
 
 def _shape(
-    axes: Any, shape: Shape, *, highest: float | None = None, frame: Array | None = None
-) -> Any:
+    axes: "Axes", shape: Shape, *, highest: float | None = None, frame: Array | None = None
+) -> "Collection":
     """Draw a body, and give back what has its colours."""
     x, y = shape.points.T
-    look: dict[str, Any] = {"facecolors": shape.values, "cmap": COLOUR_MAP, "vmin": 0.0,
-                            "edgecolors": "face", "lw": 0.7}  # fmt: skip
+    look: page.Style = {"facecolors": shape.values, "cmap": COLOUR_MAP, "vmin": 0.0}
+    look |= {"edgecolors": "face", "lw": 0.7}
     if shape.values is None:
         from matplotlib.colors import ListedColormap
 

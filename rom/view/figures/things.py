@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -13,10 +13,14 @@ from rom.errors import ConfigError
 from rom.model import Array, Index
 from rom.view.canvas import page
 from rom.view.canvas.films import Film, finished, wanted
-from rom.view.canvas.offscreen import Image, render
+from rom.view.canvas.offscreen import OVERSAMPLING, Image, render
 from rom.view.canvas.scales import clock_texts, round_length, written
 from rom.view.canvas.scene import HEIGHTS, TEXT_COLOUR, Actor, Camera, aimed, sharp_edges
 from rom.view.canvas.solids import Mesh, extruded, joined
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 # of things without one
 COLOURS = ("#9aa5b1", "#2f7f9f", "#d1495b", "#edae49", "#66a182", "#8d6a9f", "#c3c9d0", "#5c636e")
@@ -170,7 +174,7 @@ def film(
     return finished(pages, seconds / frames, path)
 
 
-def draw_scene(figure: Any, axes: Any, scene: Scene, among: Sequence[Scene] = ()) -> None:
+def draw_scene(figure: "Figure", axes: "Axes", scene: Scene, among: Sequence[Scene] = ()) -> None:
     """Draw the first picture of a scene, among others, into axes; what stands below it, too."""
     wide, tall = figure.get_size_inches() * page.DPI
     place = axes.get_position()
@@ -201,9 +205,9 @@ class View:
         """Whether colours show values."""
         return any(actor.values is not None for actor in self.actors)
 
-    def drawn(self, **how: Any) -> Image:
+    def drawn(self, oversampling: int = OVERSAMPLING) -> Image:
         """(f, height, width, 3) its pictures; see `render`."""
-        return render(self.actors, self.camera, limits=self.limits, **how)
+        return render(self.actors, self.camera, limits=self.limits, oversampling=oversampling)
 
 
 def seen(
@@ -220,9 +224,9 @@ def seen(
     """
     alike = [one for one in among if one is not scene and _side(one) == _side(scene)]
     actors, others = (
-        [replace(a, points=a.points[frames], values=None if a.values is None else a.values[frames])
-         for one in some for a in actors_of(one)] for some in ((scene,), alike)
-    )  # fmt: skip
+        [some(actor, frames) for one in scenes for actor in actors_of(one)]
+        for scenes in ((scene,), alike)
+    )
     whole = [*actors, *others]
     camera = aimed(_seen(whole), width, view=scene.view, up=scene.up, heights=heights)
     limits = scene.limits or _limits(whole)
@@ -234,7 +238,7 @@ def seen(
     return View(scene, actors, camera, limits)
 
 
-def _side(scene: Scene) -> tuple[Any, ...]:
+def _side(scene: Scene) -> tuple[object, ...]:
     """What is seen from where; scenes in which it is the same are compared."""
     return [*scene.things], scene.label, *(np.asarray(x).tolist() for x in (scene.view, scene.up))
 
@@ -258,26 +262,31 @@ def thing_actors(name: str, thing: Thing | Mesh, colour: str) -> list[Actor]:
     thing = thing if isinstance(thing, Thing) else Thing(*thing)
     points, cells = np.asarray(thing.points, dtype=float), np.asarray(thing.cells)
     points = points[None] if points.ndim == 2 else points
-    if points.ndim != 3 or points.shape[2] != 3:
-        raise ConfigError(f"{name!r}: points must be (n, 3) or (f, n, 3), got {points.shape}.")
+    spatial = points.ndim == 3 and points.shape[2] == 3
+    _require(spatial, name, f"points must be (n, 3) or (f, n, 3), got {points.shape}")
     n = points.shape[1]
-    if cells.ndim != 2 or not 1 <= cells.shape[1] <= 3 or not _between(cells, n):
-        raise ConfigError(f"{name!r}: cells must be (m, 1), (m, 2) or (m, 3) from 0 to {n - 1}"
-                          f", got {cells.dtype} {cells.shape}.")  # fmt: skip
+    fit = cells.ndim == 2 and 1 <= cells.shape[1] <= 3 and _between(cells, n)
+    what = f"cells must be (m, 1), (m, 2) or (m, 3) from 0 to {n - 1}"
+    _require(fit, name, f"{what}, got {cells.dtype} {cells.shape}")
     values = None if thing.values is None else np.atleast_2d(np.asarray(thing.values, dtype=float))
     if values is not None:
-        if values.shape not in ((1, n), points.shape[:2]):
-            raise ConfigError(f"{name!r} has {values.shape} values, needed are {points.shape[:2]}.")
+        each = values.shape in ((1, n), points.shape[:2])
+        _require(each, name, f"has {values.shape} values, needed are {points.shape[:2]}")
         values = np.broadcast_to(values, points.shape[:2])
     body = Actor(points, cells, values, colour, thing.width, thing.opacity)
     return [body, *_edges(name, thing, points, cells)]
 
 
+def some(actor: Actor, frames: slice) -> Actor:
+    """An actor in some of its pictures."""
+    values = None if actor.values is None else actor.values[frames]
+    return replace(actor, points=actor.points[frames], values=values)
+
+
 def as_thing(actor: Actor, frames: slice = slice(None)) -> Thing:
     """An actor as a thing without edges, or some of its pictures."""
-    values = None if actor.values is None else actor.values[frames]
-    return Thing(actor.points[frames], actor.cells, actor.colour, values, actor.opacity,
-                 actor.width, NO_LINES)  # fmt: skip
+    a = some(actor, frames)
+    return Thing(a.points, a.cells, a.colour, a.values, a.opacity, a.width, NO_LINES)
 
 
 def _edges(name: str, thing: Thing, points: Array, cells: Index) -> list[Actor]:
@@ -286,12 +295,18 @@ def _edges(name: str, thing: Thing, points: Array, cells: Index) -> list[Actor]:
     if thing.edges is None:
         return [Actor(points, sharp_edges(points[0], cells), colour=EDGE_COLOUR)]
     pairs = np.asarray(thing.edges).reshape(-1, 2)
-    if not _between(pairs, points.shape[1]):
-        raise ConfigError(f"{name!r}: edges must be pairs from 0 to {points.shape[1] - 1}.")
+    n = points.shape[1]
+    _require(_between(pairs, n), name, f"edges must be pairs from 0 to {n - 1}")
     return [Actor(points, pairs, colour="#6b7480", width=0.6)]
 
 
-def _between(numbers: Any, n: int) -> bool:
+def _require(holds: bool, name: str, what: str) -> None:
+    """Refuse a thing by its name."""
+    if not holds:
+        raise ConfigError(f"{name!r}: {what}.")
+
+
+def _between(numbers: Index, n: int) -> bool:
     whole = np.issubdtype(numbers.dtype, np.integer) or not numbers.size
     return bool(whole and (numbers >= 0).all() and (numbers < n).all())
 
@@ -323,7 +338,7 @@ def _seen(actors: Sequence[Actor], frames: slice = slice(None)) -> Array:
     return np.concatenate(points)
 
 
-def below_view(figure: Any, view: View, strip: tuple[float, float, float]) -> None:
+def below_view(figure: "Figure", view: View, strip: tuple[float, float, float]) -> None:
     """Axes, colours and a length, and names below; the strip is its left, right and top."""
     (left, right, top), scene = strip, view.scene
     corner(figure, view.camera, left, right, top)
@@ -338,7 +353,7 @@ def below_view(figure: Any, view: View, strip: tuple[float, float, float]) -> No
         page.words(figure, name, at + 26, level, size=page.SMALL_SIZE)
 
 
-def corner(figure: Any, camera: Camera, left: float, right: float, top: float) -> None:
+def corner(figure: "Figure", camera: Camera, left: float, right: float, top: float) -> None:
     """Axes of the world at the left end of a strip, a round length at its right end [pixel]."""
     triad(page.area(figure, left, top, TRIAD_SIZE, TRIAD_SIZE), camera)
     length, wide = scale(camera)
@@ -348,8 +363,8 @@ def corner(figure: Any, camera: Camera, left: float, right: float, top: float) -
     bar.plot([0, 0, 0, 1, 1, 1], [0, 1, 0.5, 0.5, 1, 0], color=TEXT_COLOUR, lw=1.4, clip_on=False)
     bar.set_xlim(0, 1)
     bar.set_ylim(0, 1)
-    page.words(figure, written(length, "m"), right - BAR_SIZE / 2, top + 24, size=page.SMALL_SIZE,
-               ha="center")  # fmt: skip
+    words, middle = written(length, "m"), right - BAR_SIZE / 2
+    page.words(figure, words, middle, top + 24, size=page.SMALL_SIZE, ha="center")
 
 
 def scale(camera: Camera) -> tuple[float, float]:
@@ -358,7 +373,7 @@ def scale(camera: Camera) -> tuple[float, float]:
     return length, length * camera.metre
 
 
-def triad(axes: Any, camera: Camera) -> None:
+def triad(axes: "Axes", camera: Camera) -> None:
     """The axes of the world as the camera sees them, the nearest one last."""
     axes.set_axis_off()
     axes.set_xlim(-1.45, 1.45)
@@ -368,8 +383,8 @@ def triad(axes: Any, camera: Camera) -> None:
         x, y = seen[k, :2]
         colour, long = AXIS_COLOURS[k], float(np.hypot(x, y))
         if long > HIDDEN_LENGTH:
-            arrow = {"arrowstyle": "-|>", "color": colour, "lw": 1.6, "shrinkA": 0, "shrinkB": 0,
-                     "mutation_scale": 8}  # fmt: skip
+            arrow = {"arrowstyle": "-|>", "color": colour, "lw": 1.6, "mutation_scale": 8}
+            arrow |= {"shrinkA": 0, "shrinkB": 0}
             axes.annotate("", (x, y), (0, 0), arrowprops=arrow)
             x, y = x * (1 + 0.26 / long), y * (1 + 0.26 / long)
         else:  # it points at the reader, or away from him
@@ -378,7 +393,7 @@ def triad(axes: Any, camera: Camera) -> None:
         axes.text(x, y, "xyz"[k], color=colour, size=page.SMALL_SIZE, ha="center", va="center")
 
 
-def scene_page(view: View, caption: str) -> Any:
+def scene_page(view: View, caption: str) -> "Figure":
     """A page with the heading of a scene, its picture and what stands below it."""
     width, height = view.camera.size
     foot = PAGE_TOP + height + below_height(view.scene, width)
@@ -388,7 +403,7 @@ def scene_page(view: View, caption: str) -> Any:
     return figure
 
 
-def series_page(view: View, names: Sequence[str], caption: str) -> Any:
+def series_page(view: View, names: Sequence[str], caption: str) -> "Figure":
     """A page of the pictures of a scene, two beside each other, each with its name."""
     images, title = view.drawn(), view.scene.title
     columns = min(2, len(images))

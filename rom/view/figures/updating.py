@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +16,7 @@ from rom.view.figures.curves import LINES, finish
 from rom.view.figures.things import Scene, Thing, draw_scene
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 PAGE_WIDTH, TOP_HEIGHT, BOTTOM_HEIGHT = 1500, 430, 430  # pixel
@@ -27,7 +28,7 @@ BODY_COLOUR, BODY_OPACITY = "#c3c9d0", 0.55
 @typed
 def updating(  # noqa: PLR0913  keywords of one picture
     f: npt.ArrayLike,
-    curves: dict[str, Any],
+    curves: Mapping[str, object],
     changes: dict[str, tuple[float, float, float]],
     path: str | Path | None = None,
     *,
@@ -35,7 +36,7 @@ def updating(  # noqa: PLR0913  keywords of one picture
     label: str,
     title: str = "",
     caption: str = "",
-    ax: Any = None,
+    ax: object = None,
 ) -> "Figure":
     """Draw one response of test and model above the changes that explain it.
 
@@ -82,8 +83,10 @@ def updating(  # noqa: PLR0913  keywords of one picture
         return page.save(figure, path)
 
 
-def _responses(axes: Any, f: Array, curves: dict[str, tuple[Any, Any]], label: str) -> None:
-    looks: tuple[dict[str, Any], ...] = (
+def _responses(
+    axes: "Axes", f: Array, curves: Mapping[str, tuple[object, object]], label: str
+) -> None:
+    looks: tuple[page.Style, ...] = (
         {"ls": "", "marker": ".", "ms": 5, "color": DOT_COLOUR},
         {"ls": "--", "lw": 1.3, "color": LINES[2]},
         {"lw": 1.6, "color": LINES[0]},
@@ -96,14 +99,14 @@ def _responses(axes: Any, f: Array, curves: dict[str, tuple[Any, Any]], label: s
     finish(axes, legend=True)
 
 
-def _changes(bars: Any, errors: Any, changes: dict[str, tuple[float, float, float]]) -> None:
+def _changes(bars: "Axes", errors: "Axes", changes: dict[str, tuple[float, float, float]]) -> None:
     """True and found changes, and on a scale of its own how far they are apart."""
     true, found, spread = (100 * np.array(part) for part in zip(*changes.values(), strict=True))
     place = np.arange(len(changes))[::-1]
     bars.barh(place, true, height=0.72, color="#d5dae1", label="true")
     bars.plot(found, place, "o", ms=5, color=LINES[0], label="found")
-    errors.errorbar(found - true, place, xerr=2 * spread, fmt="o", ms=5, color=LINES[0], capsize=4,
-                    label="\u00b1 two standard deviations")  # fmt: skip
+    look: page.Style = {"ms": 5, "color": LINES[0], "label": "\u00b1 two standard deviations"}
+    errors.errorbar(found - true, place, xerr=2 * spread, fmt="o", capsize=4, **look)
     for axes, label in ((bars, "change [%]"), (errors, "found - true [%]")):
         axes.axvline(0.0, color=LINE_COLOUR, lw=0.8)
         axes.set_yticks(place, list(changes) if axes is bars else [""] * len(changes))
@@ -115,8 +118,8 @@ def _changes(bars: Any, errors: Any, changes: dict[str, tuple[float, float, floa
 
 def _frame(points: Array, beams: Index, sensors: Array, exciters: Array) -> Scene:
     things = {"_beams": Thing(points, beams, LINE_COLOUR, width=4.0)}
-    for name, where, colour, size in (("sensors", sensors, LINES[0], 11.0),
-                                      ("exciters", exciters, LINES[1], 15.0)):  # fmt: skip
+    rows = ("sensors", sensors, LINES[0], 11.0), ("exciters", exciters, LINES[1], 15.0)
+    for name, where, colour, size in rows:
         places = np.asarray(where, dtype=float)
         things[name] = Thing(places, np.arange(len(places))[:, None], colour, width=size)
     return Scene("Where it is tested", things, view=(1.0, 0.9, 0.8), up=(0, 0, 1))
@@ -169,13 +172,13 @@ def channels(
     return Scene(title, things, view=view, up=up)
 
 
-def _channel(x: Array, d: Array, size: float) -> list[Any]:
+def _channel(x: Array, d: Array, size: float) -> list[Mesh]:
     end = x + ARROW_SIZE * size * d / np.linalg.norm(d)
     ball = ellipsoid((BALL_SIZE * size,) * 3, x, sides=12)
     return [ball, tube([x, end], 0.7 * BALL_SIZE * size, sides=8)]
 
 
-def _gap(x: Array, points: Array, size: float) -> Any:
+def _gap(x: Array, points: Array, size: float) -> Mesh | None:
     """A line to the nearest point of the surface, unless it is hidden in the ball."""
     near = points[np.linalg.norm(points - x, axis=1).argmin()]
     if np.linalg.norm(near - x) <= BALL_SIZE * size:

@@ -1,7 +1,6 @@
 """Motions as three-dimensional films that other programs play and turn around."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -11,7 +10,7 @@ from rom.arguments import AnySolution, typed, unit_vector
 from rom.errors import ConfigError
 from rom.io.fields.gltf import MovingMesh, write_glb
 from rom.io.fields.vtkhdf import write_vtkhdf
-from rom.model import Array
+from rom.model import Array, Index
 from rom.view.canvas.offscreen import checked
 from rom.view.canvas.solids import Mesh
 from rom.view.scenes.film import shades_of, upright
@@ -66,11 +65,13 @@ def write_animation(
         times *= seconds / times[-1]
     title = "motion" if magnify == 1.0 else f"motion, deformation drawn {magnify:g} times larger"
     upward = upright(solution.mechanism, None if up is None else unit_vector("up", up))
-    upward = np.eye(3)[2] if upward is None else upward
+    upward = np.eye(3)[2] if upward is None else np.asarray(upward, dtype=float)
     return write_glb(bodies, times, path, up=upward, title=title)
 
 
-def _bodies(solution: Any, steps: Any, shapes: dict[str, Mesh], magnify: float) -> list[MovingMesh]:
+def _bodies(
+    solution: AnySolution, steps: Index, shapes: dict[str, Mesh], magnify: float
+) -> list[MovingMesh]:
     bodies, elastic, shades = [], 0, shades_of(solution.mechanism)
     for name in solution.mechanism.parts:
         form = form_of(solution.mechanism, name, shapes)

@@ -1,7 +1,7 @@
 """Joints, springs and contacts of a mechanism, as the symbols of machine drawings."""
 
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,26 +14,25 @@ from rom.rotation import matrix
 from rom.view.canvas import symbols
 from rom.view.canvas.scene import Actor
 from rom.view.canvas.solids import Mesh, across, cylinder, ellipsoid, joined
-from rom.view.scenes.ground import (
-    JOINT_COLOUR,
-    Scenery,
-    guide,
-    lines,
-    plane,
-    solid,
-    support,
-    symbol_size,
-    wall,
-)
+from rom.view.scenes import ground
+from rom.view.scenes.ground import JOINT_COLOUR, Scenery, lines, solid
 from rom.view.scenes.places import Places, placed
+
+if TYPE_CHECKING:
+    from rom.mbs.elements.bushings import Bushing
+    from rom.mbs.elements.joint_laws import Turn
+    from rom.mbs.elements.springs import Spring
+    from rom.mbs.mechanism import Mechanism
+    from rom.mbs.parts.joints import Joint
 
 SPRING_COLOUR, DAMPER_COLOUR, ROD_COLOUR = "#b5541c", "#4a5560", "#5c636e"
 LINE_WIDTH = 2.0  # of springs, rods and wheels [pixel]
-BUSHES: dict[str, Callable[[float], Mesh]] = {  # kind of joint: what is drawn at its second marker
-    "revolute": symbols.hinge, "cylindrical": symbols.round_sleeve, "screw": symbols.round_sleeve,
-    "prismatic": symbols.sleeve, "spherical": symbols.ball, "universal": symbols.cross,
-    "fixed": symbols.weld, "point on line": symbols.ball, "point on plane": symbols.ball,
-}  # fmt: skip
+Place = tuple[float, ...]  # three numbers
+# kind of joint: what is drawn at its second marker
+BUSHES: dict[str, Callable[[float], Mesh]] = {"prismatic": symbols.sleeve, "fixed": symbols.weld}
+BUSHES |= {"revolute": symbols.hinge, "universal": symbols.cross}
+BUSHES |= dict.fromkeys(("cylindrical", "screw"), symbols.round_sleeve)
+BUSHES |= dict.fromkeys(("spherical", "point on line", "point on plane"), symbols.ball)
 BEARING_RATIO, MAX_BEARING_RATIO = 1.5, 5.0  # size of a bearing over its shaft; over other joints
 FOOT_RATIO = 0.02  # of a body, the part that counts as its end at a wall
 ROUND_RATIO = 0.2  # of its radius, by which the end of a shaft is beside its axis at most
@@ -50,7 +49,7 @@ def connections(
     Bodies are drawn by points (n, 3) in their frames [m]; surfaces of some may hide symbols.
     """
     shapes = {name: X for name, X in drawn.items() if name in surfaces}
-    scenery = Scenery(places, shapes, symbol_size(places, drawn), up / np.linalg.norm(up))
+    scenery = Scenery(places, shapes, ground.symbol_size(places, drawn), up / np.linalg.norm(up))
     mechanism = places.mechanism
     actors: list[Actor] = []
     for joint in mechanism.joints.values():
@@ -63,7 +62,7 @@ def connections(
     return actors + list(_contacts(scenery))
 
 
-def axis_of(joint: Any, mechanism: Any) -> Array | None:
+def axis_of(joint: "Joint", mechanism: "Mechanism") -> Array | None:
     """(3,) axis of a joint, or normal of its plane, in the world at the start; None without one."""
     one, two = (matrix(mechanism.part(m.body).p) for m in joint.markers[:2])
     if joint.kind == "universal":
@@ -75,7 +74,7 @@ def axis_of(joint: Any, mechanism: Any) -> Array | None:
     return next((two @ row.b for row in joint.rows if row.kind == NORMAL), None)
 
 
-def _joint(scenery: Scenery, joint: Any) -> Iterator[Actor]:
+def _joint(scenery: Scenery, joint: "Joint") -> Iterator[Actor]:
     mechanism, (first, second) = scenery.places.mechanism, joint.markers[:2]
     axis = axis_of(joint, mechanism)
     if joint.kind == "distance":
@@ -84,14 +83,15 @@ def _joint(scenery: Scenery, joint: Any) -> Iterator[Actor]:
     if joint.kind in BUSHES:
         yield from _bush(scenery, joint, axis)
     if joint.kind in SLIDING_KINDS and axis is not None:
-        yield from guide(scenery, first, second, matrix(mechanism.part(first.body).p).T @ axis)
+        along = matrix(mechanism.part(first.body).p).T @ axis
+        yield from ground.guide(scenery, first, second, along)
     elif joint.kind in PLANE_KINDS and axis is not None:
         yield from _on_plane(scenery, joint, axis)
     elif joint.kind in BUSHES and GROUND in (first.body, second.body):
         yield from _grounded(scenery, joint, axis)
 
 
-def _bush(scenery: Scenery, joint: Any, axis: Array | None) -> Iterator[Actor]:
+def _bush(scenery: Scenery, joint: "Joint", axis: Array | None) -> Iterator[Actor]:
     places, second = scenery.places, joint.markers[1]
     B = matrix(places.mechanism.part(second.body).p)
     local = np.eye(3) if axis is None else np.column_stack(across(np.zeros(3), B.T @ axis))
@@ -104,7 +104,7 @@ def _bush(scenery: Scenery, joint: Any, axis: Array | None) -> Iterator[Actor]:
     yield from solid(BUSHES[joint.kind](size), pose, JOINT_COLOUR)
 
 
-def _bearing(scenery: Scenery, joint: Any, axis: Array | None) -> tuple[Array, float]:
+def _bearing(scenery: Scenery, joint: "Joint", axis: Array | None) -> tuple[Array, float]:
     """(3,) from a hinge on the ground to the nearer end of its shaft, and the size of its bush."""
     mover = next((m for m in joint.markers if m.body in scenery.solid), None)
     grounded = GROUND in {m.body for m in joint.markers}
@@ -126,20 +126,20 @@ def _bearing(scenery: Scenery, joint: Any, axis: Array | None) -> tuple[Array, f
     return (shift + beyond) * axis, size
 
 
-def _grounded(scenery: Scenery, joint: Any, axis: Array | None) -> Iterator[Actor]:
+def _grounded(scenery: Scenery, joint: "Joint", axis: Array | None) -> Iterator[Actor]:
     """Under a joint that holds a body to the ground."""
     first, second = joint.markers
     here, mover = (first, second) if first.body == GROUND else (second, first)
     point = scenery.places.point(here)[0]
     if joint.kind == "fixed":
         normal = _towards(scenery, mover)
-        yield from wall(scenery, point, normal, _foot(scenery, mover, normal))
+        yield from ground.wall(scenery, point, normal, _foot(scenery, mover, normal))
         return
     shift, size = _bearing(scenery, joint, axis)
     centre = scenery.places.pose(mover.body)[0][0] - point
     hanging = bool(centre @ scenery.up < -HANGING_COSINE * np.linalg.norm(centre))
     about = None if joint.kind == "spherical" else axis
-    yield from support(scenery, point + shift, about, above=hanging, size=size)
+    yield from ground.support(scenery, point + shift, about, above=hanging, size=size)
 
 
 def _foot(scenery: Scenery, marker: Marker, normal: Array) -> float:
@@ -164,7 +164,7 @@ def _towards(scenery: Scenery, marker: Marker) -> Array:
     return along if np.abs(centre[k]) > 1e-9 * scenery.size else scenery.up
 
 
-def _on_plane(scenery: Scenery, joint: Any, normal: Array) -> Iterator[Actor]:
+def _on_plane(scenery: Scenery, joint: "Joint", normal: Array) -> Iterator[Actor]:
     places, (first, second) = scenery.places, joint.markers
     radius = joint.rows[0].radius
     if joint.kind == "rolling" and joint.rows[0].b.any():
@@ -172,7 +172,7 @@ def _on_plane(scenery: Scenery, joint: Any, normal: Array) -> Iterator[Actor]:
     elif joint.kind == "rolling" and second.body not in scenery.solid:
         yield from _ball(places, second, radius)
     A = matrix(places.mechanism.part(first.body).p)
-    yield from plane(scenery, first, A.T @ normal, [(second, radius)])
+    yield from ground.plane(scenery, first, A.T @ normal, [(second, radius)])
 
 
 def _both(places: Places, first: Marker, second: Marker) -> tuple[Array, Array]:
@@ -186,7 +186,7 @@ def _ball(places: Places, marker: Marker, radius: float) -> list[Actor]:
     return solid(shape, places.frame(marker), JOINT_COLOUR, 0.5)
 
 
-def spiral(scenery: Scenery, _: str, turn: Any) -> Iterator[Actor]:
+def spiral(scenery: Scenery, _: str, turn: "Turn") -> Iterator[Actor]:
     """A spring about a joint."""
     joint = scenery.places.mechanism.joints[turn.joint]
     axis = axis_of(joint, scenery.places.mechanism)
@@ -200,7 +200,7 @@ def spiral(scenery: Scenery, _: str, turn: Any) -> Iterator[Actor]:
     yield lines(symbols.spiral(size), pose, SPRING_COLOUR, LINE_WIDTH)
 
 
-def spring(scenery: Scenery, _: str, spring: Any) -> Iterator[Actor]:
+def spring(scenery: Scenery, _: str, spring: "Spring") -> Iterator[Actor]:
     """Coil and dashpot between two markers, stretched as they move."""
     ends = _both(scenery.places, spring.i, spring.j)
     if np.linalg.norm(ends[1] - ends[0], axis=1).max() < scenery.size:
@@ -214,7 +214,7 @@ def spring(scenery: Scenery, _: str, spring: Any) -> Iterator[Actor]:
         if marker.body == GROUND:
             gap = ends[1 - k][0] - ends[k][0]
             normal = gap / np.linalg.norm(gap) if gap.any() else scenery.up
-            yield from wall(scenery, ends[k][0], normal)
+            yield from ground.wall(scenery, ends[k][0], normal)
 
 
 def stretched(shape: symbols.Lines, ends: tuple[Array, Array], colour: str) -> Actor:
@@ -229,20 +229,20 @@ def stretched(shape: symbols.Lines, ends: tuple[Array, Array], colour: str) -> A
     return Actor(placed(shape[0][None], (a, axes)), shape[1], colour=colour, width=LINE_WIDTH)
 
 
-def bushing(scenery: Scenery, _: str, element: Any) -> Iterator[Actor]:
+def bushing(scenery: Scenery, _: str, element: "Spring | Bushing") -> Iterator[Actor]:
     """What holds two markers together."""
     places = scenery.places
     yield from solid(symbols.weld(scenery.size), places.frame(element.j), SPRING_COLOUR)
     for marker in (element.i, element.j):
         if marker.body == GROUND:
-            yield from support(scenery, places.point(marker)[0], None)
+            yield from ground.support(scenery, places.point(marker)[0], None)
 
 
 def _contacts(scenery: Scenery) -> Iterator[Actor]:
     """Planes, bores and cylinders that bodies touch, each one once, and rims of discs."""
-    planes: dict[Any, list[tuple[Marker, float]]] = {}
-    rounds: set[Any] = set()
-    capsules: set[Any] = set()
+    planes: dict[tuple[Marker, Place], list[tuple[Marker, float]]] = {}
+    rounds: set[tuple[Marker, Place, float]] = set()
+    capsules: set[tuple[Marker, Place, float, float]] = set()
     for contact in scenery.places.mechanism.contacts.values():
         key = contact.i, tuple(np.asarray(contact.e).tolist())
         if contact.kind in (PLANE, DISC):
@@ -252,22 +252,22 @@ def _contacts(scenery: Scenery) -> Iterator[Actor]:
         elif contact.kind in (CYLINDER, BORE):
             rounds.add((*key, contact.radius[1]))
         elif contact.kind == CAPSULE:
-            ends = zip((contact.j, contact.i), (contact.s, contact.e), strict=True)
-            for (marker, axis), *size in zip(ends, contact.radius, contact.half, strict=True):
-                capsules.add((marker, tuple(np.asarray(axis).tolist()), *size))
+            ends = (contact.j, contact.i), (contact.s, contact.e), contact.radius, contact.half
+            for marker, axis, radius, half in zip(*ends, strict=True):
+                capsules.add((marker, tuple(np.asarray(axis).tolist()), radius, half))
             continue
         if contact.radius[0] and contact.kind != DISC and contact.j.body not in scenery.solid:
             yield from _ball(scenery.places, contact.j, contact.radius[0])
     for (marker, normal), touching in planes.items():
-        yield from plane(scenery, marker, np.array(normal), touching)
-    for marker, axis, radius in rounds:
-        yield circle(scenery.places, marker, np.array(axis), radius)
+        yield from ground.plane(scenery, marker, np.array(normal), touching)
+    for marker, along, radius in rounds:
+        yield circle(scenery.places, marker, np.array(along), radius)
     for one in capsules:
         yield from _capsule(scenery.places, *one)
 
 
 def _capsule(
-    places: Places, marker: Marker, axis: Any, radius: float, half: float
+    places: Places, marker: Marker, axis: Place, radius: float, half: float
 ) -> Iterator[Actor]:
     end = half * np.array(axis)
     balls = [ellipsoid((radius,) * 3, x) for x in (-end, end)[: 2 if half else 1]]

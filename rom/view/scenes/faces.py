@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -17,12 +17,12 @@ from rom.view.canvas.offscreen import Image, render
 from rom.view.canvas.scene import TEXT_COLOUR, Actor, Camera, aimed, boundary
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 PAGE_WIDTH = 1500  # [pixel]
 HEADER_HEIGHT, GAP = 80, 30  # [pixel]
-COLOURS = ("#e9b4a6", "#a9c8e0", "#f2d694", "#b5d6b2", "#cdb7dc", "#9fd3cf", "#e3c4a0", "#d9dba0",
-           "#e6b3cc", "#b9c3e6")  # fmt: skip
+COLOURS = "#e9b4a6 #a9c8e0 #f2d694 #b5d6b2 #cdb7dc #9fd3cf #e3c4a0 #d9dba0 #e6b3cc #b9c3e6".split()
 REST_COLOUR, EDGE_COLOUR = "#d5dae0", "#3d444d"  # faces without a label; where two faces meet
 LABEL_SIZE = 8.0  # points
 LETTER_SIZE = (10, 20)  # width and height of a letter of a label [pixel]
@@ -152,7 +152,7 @@ def _words(x: Array, triangles: Mapping[str, Index], placed: list[Labels]) -> st
     return words + (f" Not seen, or too small: {', '.join(hidden)}." if hidden else "")
 
 
-def _sheet(images: Image, placed: list[Labels], words: str, title: str) -> Any:
+def _sheet(images: Image, placed: list[Labels], words: str, title: str) -> "Figure":
     _, height, width, _ = images.shape
     figure = page.titled(PAGE_WIDTH, HEADER_HEIGHT + 2 * (height + GAP), title, words)
     for k, side in enumerate(placed):
@@ -164,11 +164,10 @@ def _sheet(images: Image, placed: list[Labels], words: str, title: str) -> Any:
     return figure
 
 
-def _write(axes: Any, spot: Spot, at: tuple[float, float]) -> None:
+def _write(axes: "Axes", spot: Spot, at: tuple[float, float]) -> None:
     """The label, with a line to its face where it had to be moved."""
     if at != spot.at:
         axes.plot(*zip(spot.at, at, strict=True), color=TEXT_COLOUR, linewidth=0.7)
         axes.plot(*spot.at, marker="o", markersize=2.5, color=TEXT_COLOUR)
-    box = {"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": TEXT_COLOUR,
-           "linewidth": 0.5}  # fmt: skip
+    box = {"boxstyle": "round,pad=0.15", "fc": "white", "ec": TEXT_COLOUR, "lw": 0.5}
     axes.text(*at, spot.label, size=LABEL_SIZE, ha="center", va="center", bbox=box)

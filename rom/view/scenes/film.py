@@ -2,13 +2,13 @@
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from rom.arguments import AnyMechanism, AnySolution, typed
-from rom.model import Array
+from rom.model import Array, Index
 from rom.view.canvas import page
 from rom.view.canvas.films import Film, wanted
 from rom.view.canvas.scales import clock_texts, prefixed
@@ -36,6 +36,10 @@ from rom.view.scenes.rigid import BOX_OPACITY, check_bodies, form_of
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from rom.mbs.mechanism import Mechanism
+    from rom.mbs.results.solution import Solution
+
+Direction = npt.ArrayLike | None
 N_INSTANTS = 4  # that are chosen where none are asked for
 METAL_COLOURS = ("#9aa5b1", "#c3c9d0", "#7d8791")  # rigid bodies
 EDGE_COLOUR, TRACE_COLOUR = "#3a414b", "#d1495b"
@@ -168,35 +172,29 @@ class Look:
     magnify: float = 1.0
     symbols: bool = True
     traces: tuple[str, ...] = ()
-    up: Any = None
+    up: Direction = None
 
 
 @dataclass(frozen=True, slots=True)
 class Stage:
-    """What is seen, and what its colours mean.
+    """What is seen, and what its colours mean."""
 
-    Attributes:
-        actors: bodies, their edges and the symbols between them.
-        limits: (2,) deformation at the ends of the colours, in ``unit``.
-        unit: unit of the colours.
-        name: names of the flexible bodies.
-        grey: what has no colours.
-    """
+    actors: list[Actor]  # bodies, their edges and the symbols between them
+    limits: tuple[float, float]  # deformation at the ends of the colours, in the unit
+    unit: str  # of the colours
+    name: str  # names of the flexible bodies
+    grey: str = "rigid bodies"  # what has no colours
 
-    actors: list[Actor]
-    limits: tuple[float, float]
-    unit: str
-    name: str
-    grey: str = "rigid bodies"
-
-    def scene(self, title: str, view: Any, up: Any, frames: slice = slice(None)) -> Scene:
+    def scene(
+        self, title: str, view: Direction, up: Direction, frames: slice = slice(None)
+    ) -> Scene:
         """Some of its pictures, in the colours of all of them."""
         things = {f"_{k}": as_thing(actor, frames) for k, actor in enumerate(self.actors)}
         label = f"deformation of {self.name} [{self.unit}]"
         return Scene(title, things, label, view, up, self.limits)
 
 
-def _stage(mechanism: Any, solution: Any, steps: Any, look: Look) -> Stage:
+def _stage(mechanism: "Mechanism", solution: "Solution", steps: Index, look: Look) -> Stage:
     check_bodies(mechanism, "shapes", look.shapes)
     check_bodies(mechanism, "traces", look.traces)
     places = moving(mechanism, solution, steps, look.magnify)
@@ -242,13 +240,13 @@ def symbols_of(places: Places, look: Look) -> list[Actor]:
     return connections(places, drawn, surfaces, up)
 
 
-def upright(mechanism: Any, up: Any = None) -> Any:
+def upright(mechanism: "Mechanism", up: Direction = None) -> Direction:
     """(3,) what is asked for, or against gravity; None without."""
     gravity = np.asarray(mechanism.gravity, dtype=float)
     return -gravity if up is None and gravity.any() else up
 
 
-def shades_of(mechanism: Any) -> dict[str, int]:
+def shades_of(mechanism: "Mechanism") -> dict[str, int]:
     """Number of the grey of each body; all frames of a non-linear body have one."""
     whole = {part.name: name for name, all_ in mechanism.nonlinear.items() for part in all_.parts}
     owner = {name: whole.get(name, name) for name in mechanism.parts}
@@ -273,7 +271,7 @@ def _scaled(bodies: dict[str, list[Actor]]) -> Stage:
 def together(actors: list[Actor]) -> list[Actor]:
     """The same picture with one actor for all things of one plain colour: far fewer to draw."""
     kept = [actor for actor in actors if actor.values is not None]
-    plain: dict[Any, list[Actor]] = {}
+    plain: dict[tuple[object, ...], list[Actor]] = {}
     for actor in actors:
         if actor.values is None:
             look = actor.colour, actor.width, actor.opacity
@@ -333,12 +331,12 @@ def start(
         return page.save(scene_page(whole, words), path)
 
 
-def start_actors(mechanism: Any) -> list[Actor]:
+def start_actors(mechanism: "Mechanism") -> list[Actor]:
     """Bodies as they are placed, their sharp edges, and the symbols between them."""
     return actors_of(Scene("", _things(mechanism, symbols=True, up=None)))
 
 
-def _things(mechanism: Any, *, symbols: bool, up: Any) -> dict[str, Thing | Mesh]:
+def _things(mechanism: "Mechanism", *, symbols: bool, up: Direction) -> dict[str, Thing | Mesh]:
     places = at_start(mechanism)
     things: dict[str, Thing | Mesh] = {}
     for k, part in enumerate(mechanism.parts.values()):

@@ -22,19 +22,12 @@ MAX_TOUCHING = 200  # markers by which the size of a plane is found
 
 @dataclass(frozen=True, slots=True)
 class Scenery:
-    """What symbols are drawn with.
+    """What symbols are drawn with."""
 
-    Attributes:
-        places: where everything is.
-        solid: {body: (n, 3)} points of bodies whose surface is drawn, in their frames [m].
-        size: of a joint, about its radius [m].
-        up: (3,) upright unit vector.
-    """
-
-    places: Places
-    solid: dict[str, Array]
-    size: float
-    up: Array
+    places: Places  # where everything is
+    solid: dict[str, Array]  # {body: (n, 3)} points of surfaces that are drawn, in their frames [m]
+    size: float  # of a joint, about its radius [m]
+    up: Array  # (3,) upright unit vector
 
     def beyond(self, marker: Marker, direction: Array) -> float:
         """How far the surface of a body goes from a marker in a direction (3,) of its frame [m]."""
@@ -47,8 +40,10 @@ class Scenery:
         """(k, 3) places of other markers in all instants, from one in the frame of its body [m]."""
         r, A = self.places.point(marker), self.places.pose(marker.body)[1]
         apart = [self.places.point(other) - r for other in others[:MAX_TOUCHING]]
-        return np.vstack([np.einsum("fba,fb->fa", np.broadcast_to(A, (len(d), 3, 3)), d)
-                          for d in apart])  # fmt: skip
+        turned = (np.broadcast_to(A, (len(d), 3, 3)) for d in apart)
+        return np.vstack(
+            [np.einsum("fba,fb->fa", B, d) for B, d in zip(turned, apart, strict=True)]
+        )
 
 
 def symbol_size(places: Places, drawn: dict[str, Array]) -> float:

@@ -46,8 +46,8 @@ def mesh(
     path = page.wanted(path)
     camera = seen(Scene(title, meshed(model), view=view, up=up), PAGE_WIDTH).camera
     hidden = [name for name in model.interfaces if not in_sight(model, name, camera)]
-    things = {name + " (turned away)" * (name in hidden): thing
-              for name, thing in meshed(model).items()}  # fmt: skip
+    told = {name: f"{name} (turned away)" for name in hidden}
+    things = {told.get(name, name): thing for name, thing in meshed(model).items()}
     whole = seen(Scene(title, things, view=view, up=up), PAGE_WIDTH)
     size = np.ptp(model.points, axis=0) * 1e3
     words = (

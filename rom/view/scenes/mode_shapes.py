@@ -54,8 +54,8 @@ def mode_shapes(
     body = body.in_units("SI")
     omega, V = body.modes(fixed=fixed)
     elastic = np.flatnonzero(omega > 0)[:n]
-    shapes = {f"mode {i}: {omega[k] / (2 * np.pi):.5g} Hz": displacement(body, V[:, k])
-              for i, k in enumerate(elastic, start=1)}  # fmt: skip
+    names = [f"mode {i}: {omega[k] / (2 * np.pi):.5g} Hz" for i, k in enumerate(elastic, start=1)]
+    shapes = {name: displacement(body, V[:, k]) for name, k in zip(names, elastic, strict=True)}
     support = f"{' and '.join(fixed)} held" if fixed else "free, its six rigid motions left out"
     words = (
         f"Lowest elastic modes of the reduced body {body.name} ({body.n_modes} elastic "
@@ -66,7 +66,7 @@ def mode_shapes(
     return page.save(figure, path)
 
 
-def displacement(body: Any, motion: Array) -> Array:
+def displacement(body: AnyBody, motion: Array) -> Array:
     """(s, 3) displacement of the surface for a motion (6 + r,): rigid coordinates first."""
     X = body.surface.points
     rigid = motion[:3] + np.cross(motion[3:6], X)
@@ -75,7 +75,7 @@ def displacement(body: Any, motion: Array) -> Array:
 
 def modes_page(
     surface: Any, shapes: Mapping[str, Array], title: str, words: str, *, what: str, **look: Any
-) -> Any:
+) -> "Figure":
     """A page of modes, {name: (s, 3) displacements of a surface}, all seen from the same place.
 
     To the caption the meaning of displacements and grey lines is added; ``what`` is that whose size
@@ -175,8 +175,8 @@ def wheel(
     u = [np.asarray(one, dtype=float).ravel() for one in shape]
     sizes = [3 * len(models[j].points) for j in chosen]
     if [one.size for one in u] != sizes:
-        raise ConfigError(f"the shape has {[one.size for one in u]} numbers per sector, "
-                          f"needed are {sizes}.")  # fmt: skip
+        given = [one.size for one in u]
+        raise ConfigError(f"the shape has {given} numbers per sector, needed are {sizes}.")
     moved = around.displaced(u)
     values = scale * np.linalg.norm(moved, axis=1)
     return Thing(around.points + magnify * moved, around.triangles, values=values)
@@ -184,19 +184,12 @@ def wheel(
 
 @dataclass(frozen=True, slots=True)
 class Around:
-    """The outer surface of sectors in their places.
+    """The outer surface of sectors in their places."""
 
-    Attributes:
-        nodes: of each sector that lie on it.
-        first: (n,) which of all these nodes the points are.
-        points: (n, 3) [m].
-        triangles: (t, 3) between them.
-    """
-
-    nodes: list[Index]
-    first: Index
-    points: Array
-    triangles: Index
+    nodes: list[Index]  # of each sector that lie on it
+    first: Index  # (n,) which of all these nodes the points are
+    points: Array  # (n, 3) [m]
+    triangles: Index  # (t, 3) between them
 
     def displaced(self, u: Sequence[Array]) -> Array:
         """(n, 3) displacements of the points, from (3 k,) those of each sector."""

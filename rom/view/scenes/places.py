@@ -1,13 +1,17 @@
 """Where bodies and markers are in the instants that are drawn."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rom.mbs.parts.bodies import GROUND, Marker
-from rom.model import Array
+from rom.model import Array, Index
 from rom.rotation import matrix
+
+if TYPE_CHECKING:
+    from rom.mbs.mechanism import Mechanism
+    from rom.mbs.results.solution import Solution
 
 Pose = tuple[Array, Array]  # (f, 3) origins and (f, 3, 3) axes, as columns in the world
 MAX_CANDIDATES = 400  # instants that are compared
@@ -17,19 +21,12 @@ NO_TURN, NO_SHIFT = np.eye(3), np.zeros(3)
 
 @dataclass(frozen=True, slots=True)
 class Places:
-    """Bodies of a mechanism in f instants.
+    """Bodies of a mechanism in f instants."""
 
-    Attributes:
-        mechanism: whose bodies.
-        poses: of the frame of each body.
-        elastic: (f, r) elastic coordinates of each body.
-        magnify: deformations are drawn so many times larger than they are.
-    """
-
-    mechanism: Any
-    poses: dict[str, Pose]
-    elastic: dict[str, Array]
-    magnify: float = 1.0
+    mechanism: "Mechanism"
+    poses: dict[str, Pose]  # of the frame of each body
+    elastic: dict[str, Array]  # (f, r) elastic coordinates of each body
+    magnify: float = 1.0  # deformations are drawn so many times larger than they are
 
     def pose(self, body: str) -> Pose:
         """Of the frame of a body, or the ground."""
@@ -44,7 +41,7 @@ class Places:
         r, A = self.pose(marker.body)
         return r + np.einsum("fab,fb->fa", A, np.broadcast_to(X, r.shape))
 
-    def frame(self, marker: Marker, axes: Any = NO_TURN, shift: Any = NO_SHIFT) -> Pose:
+    def frame(self, marker: Marker, axes: Array = NO_TURN, shift: Array = NO_SHIFT) -> Pose:
         """Axes (3, 3), as columns, at a marker, both turning with its body; shifted in its axes."""
         r, A = self.point(marker), self.pose(marker.body)[1]
         return at(r + A @ shift, A @ axes)
@@ -54,14 +51,14 @@ class Places:
         return self.pose(body)[1] @ vector
 
 
-def at_start(mechanism: Any) -> Places:
+def at_start(mechanism: "Mechanism") -> Places:
     """Bodies where they were added."""
     parts = mechanism.parts.items()
     poses = {name: (part.at[None], matrix(part.p)[None]) for name, part in parts}
     return Places(mechanism, poses, {name: part.q[None] for name, part in parts})
 
 
-def moving(mechanism: Any, solution: Any, steps: Any, magnify: float) -> Places:
+def moving(mechanism: "Mechanism", solution: "Solution", steps: Index, magnify: float) -> Places:
     """Bodies at some of the instants of a motion."""
     poses, elastic = {}, {}
     for name in mechanism.parts:
@@ -71,7 +68,7 @@ def moving(mechanism: Any, solution: Any, steps: Any, magnify: float) -> Places:
     return Places(mechanism, poses, elastic, magnify)
 
 
-def evenly(size: int, n: int) -> Any:
+def evenly(size: int, n: int) -> Index:
     """(n,) numbers of so many instants, evenly over all of a motion."""
     return np.linspace(0, size - 1, n).round().astype(int)
 
@@ -88,7 +85,7 @@ def placed(X: Array, pose: Pose) -> Array:
     return r[:, None] + np.einsum("fab,fnb->fna", A, np.broadcast_to(X, (len(r), *X.shape[1:])))
 
 
-def different(solution: Any, n: int) -> Array:
+def different(solution: "Solution", n: int) -> Array:
     """(n,) instants [s] at which a mechanism differs most: each the farthest from those before.
 
     The first one is the start. Fewer where the motion has no more places.

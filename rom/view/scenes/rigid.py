@@ -5,16 +5,20 @@ Those of a rod are boxes.
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from rom.arguments import typed
 from rom.errors import ConfigError
-from rom.model import Array
+from rom.model import Array, Index
 from rom.names import named, offered
 from rom.view.canvas.solids import Mesh, box, cylinder, ellipsoid, joined
+
+if TYPE_CHECKING:
+    from rom.mbs.mechanism import Mechanism
+    from rom.mbs.parts.bodies import Part
 
 TUBE_RATIO = 0.07  # diameter of a tube, of the reach of the body
 BOX_OPACITY, BLOCK_OPACITY = 0.22, 0.5  # of a box around tubes, and of one that is alone
@@ -23,24 +27,16 @@ MAX_BOX_RATIO = 3.0  # of the reach of a body with markers; larger boxes say not
 
 @dataclass(frozen=True, slots=True)
 class Form:
-    """What a body is drawn by, in its frame.
+    """What a body is drawn by, in its frame."""
 
-    Attributes:
-        points: (n, 3) [m].
-        triangles: (m, 3) between them.
-        surface: of a flexible body whose points these are; or None.
-        block: of its mass and inertia, to be seen through, beside tubes; or None.
-        opacity: 0 to 1.
-    """
-
-    points: Array
-    triangles: Any
-    surface: Any = None
-    block: Mesh | None = None
-    opacity: float = 1.0
+    points: Array  # (n, 3) [m]
+    triangles: Index  # (m, 3) between them
+    surface: Any = None  # of a flexible body whose points these are
+    block: Mesh | None = None  # of its mass and inertia, to be seen through, beside tubes
+    opacity: float = 1.0  # 0 to 1
 
 
-def form_of(mechanism: Any, name: str, shapes: Mapping[str, Mesh]) -> Form:
+def form_of(mechanism: "Mechanism", name: str, shapes: Mapping[str, Mesh]) -> Form:
     """The surface of a flexible body; of others a given shape, or else tubes to their markers."""
     part = mechanism.parts[name]
     surface = getattr(part.flexible, "surface", None)
@@ -53,14 +49,14 @@ def form_of(mechanism: Any, name: str, shapes: Mapping[str, Mesh]) -> Form:
     return Form(*bars(part, ends), None, shadow(part, ends), 1.0 if ends else BLOCK_OPACITY)
 
 
-def check_bodies(mechanism: Any, what: str, names: Collection[str]) -> None:
+def check_bodies(mechanism: "Mechanism", what: str, names: Collection[str]) -> None:
     """Refuse names of bodies that a mechanism does not have."""
     if unknown := set(names) - set(mechanism.parts):
         there = offered(mechanism.parts)
         raise ConfigError(f"{what}: no body {named(sorted(unknown))}; there are {there}.")
 
 
-def ends_of(mechanism: Any, name: str) -> list[Array]:
+def ends_of(mechanism: "Mechanism", name: str) -> list[Array]:
     """(k) points (3,) of a rigid body beside its mass centre, named or held by something [m]."""
     part = mechanism.parts[name]
     held = [marker for joint in mechanism.joints.values() for marker in joint.markers]
@@ -70,7 +66,7 @@ def ends_of(mechanism: Any, name: str) -> list[Array]:
     return [np.array(p) for p in sorted(far)]
 
 
-def bars(part: Any, ends: list[Array]) -> Mesh:
+def bars(part: "Part", ends: list[Array]) -> Mesh:
     """Tubes from the mass centre to some points; without any a box of the inertia of the body."""
     if not ends:
         return inertia_box(part)
@@ -80,14 +76,14 @@ def bars(part: Any, ends: list[Array]) -> Mesh:
     return joined([*tubes, *knots])
 
 
-def shadow(part: Any, ends: list[Array]) -> Mesh | None:
+def shadow(part: "Part", ends: list[Array]) -> Mesh | None:
     """What is drawn half-transparent beside the bars: the box of the inertia, unless it is huge."""
     reach = max((float(np.linalg.norm(p)) for p in ends), default=0.0)
     block = inertia_box(part)
     return block if reach and np.ptp(block[0], axis=0).max() <= MAX_BOX_RATIO * reach else None
 
 
-def inertia_box(part: Any) -> Mesh:
+def inertia_box(part: "Part") -> Mesh:
     """The even block with the mass and the inertia of a body, in its frame."""
     size, axes = block_of(np.asarray(part.second, dtype=float), part.mass)
     points, triangles = box(size)

@@ -17,9 +17,10 @@ import numpy as np
 from rom.arguments import AnyBody, AnyMechanism, typed, whole
 from rom.errors import ConfigError
 from rom.model import FEModel
-from rom.process.child import python, run, scratch
-from rom.view.canvas.draw import add, aim, read
-from rom.view.canvas.offscreen import child_failure, require, write_scene
+from rom.process.child import scratch
+from rom.view.canvas import offscreen
+from rom.view.canvas.draw import Plotter, add, aim, read
+from rom.view.canvas.offscreen import require, write_scene
 from rom.view.canvas.scene import Actor, aimed, sharp_edges
 from rom.view.scenes.film import start_actors
 from rom.view.scenes.meshes import mesh_actors, surface_of
@@ -45,7 +46,7 @@ def has_display() -> bool:
     return True
 
 
-def mode_scenes(body: Any, n: int, fixed: tuple[str, ...] = ()) -> list[Scene]:
+def mode_scenes(body: AnyBody, n: int, fixed: tuple[str, ...] = ()) -> list[Scene]:
     """The lowest elastic modes of a body, moving."""
     surface_of(body)
     body = body.in_units("SI")
@@ -91,7 +92,7 @@ def plotter(thing: AnyBody | FEModel | AnyMechanism, *, n: int = 1) -> Any:
     import pyvista
 
     actors = _actors(thing, n)
-    made: Any = pyvista.Plotter(window_size=[WINDOW_WIDTH, 3 * WINDOW_WIDTH // 4])
+    made: Plotter = pyvista.Plotter(window_size=[WINDOW_WIDTH, 3 * WINDOW_WIDTH // 4])
     made.set_background("white")
     with scratch("view") as folder:
         _left(folder, actors)
@@ -103,7 +104,7 @@ def plotter(thing: AnyBody | FEModel | AnyMechanism, *, n: int = 1) -> Any:
     return made
 
 
-def _actors(thing: Any, n: int) -> list[Actor]:
+def _actors(thing: AnyBody | FEModel | AnyMechanism, n: int) -> list[Actor]:
     if isinstance(thing, FEModel):
         return mesh_actors(thing)
     if hasattr(thing, "parts"):
@@ -120,9 +121,7 @@ def show(scenes: Sequence[Scene]) -> None:
     require("pyvista")
     with scratch("view") as folder:
         leave(scenes, folder)
-        done = run(python("rom.view.scenes.window", str(folder)))
-        if done.code:
-            raise child_failure(done)
+        offscreen.show("rom.view.scenes.window", folder)
 
 
 def leave(scenes: Sequence[Scene], folder: Path) -> None:
@@ -147,7 +146,7 @@ class Window:
 
         self.folder, self.at, self.frame = folder, 0, 0
         self.titles = json.loads((folder / "titles.json").read_text())
-        self.plotter: Any = pyvista.Plotter(
+        self.plotter: Plotter = pyvista.Plotter(
             off_screen=off_screen, window_size=[WINDOW_WIDTH, 3 * WINDOW_WIDTH // 4]
         )
         self.plotter.background_color = pyvista.Color("white")
@@ -165,7 +164,7 @@ class Window:
         if not step:
             aim(self.plotter, self.scene, self.arrays)
 
-    def tick(self, *_: Any) -> None:
+    def tick(self, *_: object) -> None:
         """Show the next frame of what moves."""
         self.frame += 1
         for k in range(len(self.scene["actors"])):

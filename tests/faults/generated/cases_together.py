@@ -10,7 +10,7 @@ import numpy as np
 import rom
 from cases.command import python, ran
 from generated.case import Silent, Works, case, require
-from generated.stock import KINDS, body, model, pendulum
+from generated.stock import KINDS, STEEL, body, model, pendulum
 from rom.cli.main import main
 from rom.errors import ConfigError, FileFormatError, ResourceError, RomError
 
@@ -18,6 +18,7 @@ MISSING = {  # a library, a command that needs it, and a word of the refusal
     "h5py": "simulate pendulum.toml --history h5 -o out",
     "pyvista": "view good.npz -o a.png",
     "matplotlib": "view good.npz -o a.png",
+    "dolfinx": f"modes box.geo {STEEL}",
 }
 LIGHT = {
     "check": ["check", "good.npz"],
