@@ -12,6 +12,7 @@ from rom.body.projection import Elastic
 from rom.body.reference import rigid_mass
 from rom.checks.draft import COMPARISON_STAGE, Draft
 from rom.eigen.condensed import Condensed, condensed
+from rom.eigen.connection import Connection
 from rom.eigen.verbs import (
     Operators,
     given_rigid_motions,
@@ -23,7 +24,6 @@ from rom.eigen.verbs import (
 from rom.errors import InterfaceError
 from rom.model import Array, Basis, Report, Row
 from rom.process.progress import MANY_DOFS, stages
-from rom.reduction.interfaces.records import Connection
 from rom.rows import BELOW_FULL_RTOL, FREQUENCY_RTOL, N_COMPARED, frequency_rows, row
 
 # Relative to the diagonals it bounds the error of squared frequencies; round-off of a fine mesh on
