@@ -31,11 +31,11 @@ from scipy.linalg import block_diag, eigh, null_space
 from rom.arguments import one_of, typed
 from rom.assembly.coupling import SAME_PLACE, Place, rows_of_parts
 from rom.checks.draft import COMPARISON_STAGE, Draft, run, wanted
+from rom.eigen.connection import Connection
 from rom.errors import InterfaceError
 from rom.model import Array, FEModel, Index, Report, Row
 from rom.names import check_known
 from rom.reduction.bases.free_interface import Rubin, free_modes, residual_flexibility
-from rom.reduction.interfaces.records import Connection
 from rom.rows import FREQUENCY_RTOL, N_COMPARED, frequency_rows, row
 from rom.stages.bodies import connect
 

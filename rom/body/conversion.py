@@ -4,14 +4,13 @@ Shapes are scaled so that the elastic mass matrix keeps its numbers: ``K`` stays
 """
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from rom.body.nonlinear.cauchy import CauchyRecovery
 from rom.body.nonlinear.quartic import Quartic
 from rom.body.nonlinear.sampled import Sampled
-from rom.body.records import Body, BodyData, Marker, Patch
+from rom.body.records import Body, BodyData, Marker, Patch, Provenance
 from rom.body.recovery import CENTRIFUGAL_LOADS, N_FRAME_LOADS, StressRecovery
 from rom.body.stiffening import ANGULAR_LOADS, ELASTIC_LOAD, LINEAR_LOADS
 from rom.errors import ConfigError, ModelError
@@ -94,7 +93,7 @@ def converted(body: Body, units: str) -> Body:
     )
 
 
-def _provenance(old: dict[str, Any], f: Factors) -> dict[str, Any]:
+def _provenance(old: Provenance, f: Factors) -> Provenance:
     """With the energies to which load cases at large deflection hold, and forces that buckle."""
     found, energy = dict(old), f.force * f.length
     if cases := old.get("large deflection"):

@@ -1,8 +1,7 @@
 """The flexible body: everything a floating-frame integrator needs, independent of the mesh."""
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +13,7 @@ from rom.body.frame import on_mean_axes, seen_from
 from rom.body.nonlinear.quartic import Quartic
 from rom.body.nonlinear.sampled import Sampled
 from rom.body.nonlinear.statics import critical_shares, follow
-from rom.body.records import BodyData, Marker, Patch, Surface, still_motions
+from rom.body.records import BodyData, Loads, Marker, Patch, Surface, still_motions
 from rom.body.reference import marker_motion, rigid_elastic, rigid_mass
 from rom.body.rotating import rotating_frequencies
 from rom.body.stiffening import SecondOrder
@@ -78,6 +77,7 @@ class FlexibleBody(BodyData):
         evidence = "none" if self.certificate is None else repr(self.certificate)
         centre = ", ".join(f"{x:.5g}" for x in self.first_moment / self.mass)
         lowest = ", ".join(f"{w / (2 * np.pi):.5g}" for w in self.omega[:6])
+        places = {m.name: f"{m.kind} at {m.point.tolist()}" for m in self.markers.values()}
         rows = [
             ("mass [kg]", self.mass),
             ("mass centre [m]", centre),
@@ -86,9 +86,8 @@ class FlexibleBody(BodyData):
             ("frame", self.reference),
             ("geometric stiffness", listed(self.K_geo)),
             ("certificate", evidence),
-            *((f"interface {m.name}", f"{m.kind} at {m.point.tolist()}")
-              for m in self.markers.values()),
-        ]  # fmt: skip
+            *((f"interface {name}", place) for name, place in places.items()),
+        ]
         return html_table(f"Flexible body {self.name}", ("", ""), rows)
 
     @property
@@ -105,7 +104,7 @@ class FlexibleBody(BodyData):
         """
         return converted(self, units)
 
-    def with_reference(self, reference: Any) -> "FlexibleBody":
+    def with_reference(self, reference: object) -> "FlexibleBody":
         """The same deformations seen from another floating frame; no finite elements involved.
 
         Args:
@@ -265,7 +264,7 @@ class FlexibleBody(BodyData):
         return SecondOrder.of(self)
 
     def equilibria(
-        self, loads: Mapping[str, Any], *, shares: npt.ArrayLike = (1.0,), fixed: Fixed = ()
+        self, loads: Loads, *, shares: npt.ArrayLike = (1.0,), fixed: Fixed = ()
     ) -> Array:
         """(s, r) elastic coordinates at rest under shares of dead loads, one after the other.
 
@@ -312,7 +311,7 @@ class FlexibleBody(BodyData):
             f"beyond {most:.3g} J. Reduce it for larger loads, or for more shapes."
         )
 
-    def critical_loads(self, loads: Mapping[str, Any], *, fixed: Fixed = ()) -> Array:
+    def critical_loads(self, loads: Loads, *, fixed: Fixed = ()) -> Array:
         """(k,) shares of dead loads at which a stiffness vanishes: the body buckles or snaps [1].
 
         Of a body of large deflection, whose reference interface is held; on its path from rest by
@@ -366,7 +365,7 @@ class FlexibleBody(BodyData):
             for name, k in pulled.items()
         ]
 
-    def _rigid_rows(self, fixed: Fixed, pulled: Any = ()) -> Array:
+    def _rigid_rows(self, fixed: Fixed, pulled: Sequence[tuple[Array, Array]] = ()) -> Array:
         """Rigid motions (h, 6) of what is held or pulled."""
         pulls = [(k @ H[:, :6]) / np.abs(k).max() for H, k in pulled]
         rows = np.vstack([np.zeros((1, 6)), self.held_rows(fixed)[:, :6], *pulls])

@@ -1,7 +1,6 @@
 """The same deformations seen from another floating frame."""
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from scipy.linalg import eigh
@@ -44,7 +43,7 @@ def _moves_around_rest(body: Body) -> bool:
     return bool(body.n_modes > 0 and largest <= limit)
 
 
-def seen_from(body: Body, reference: Any) -> Body:
+def seen_from(body: Body, reference: object) -> Body:
     """The body in another frame, see `FlexibleBody.with_reference`."""
     moved = moved_to(body, reference)
     omega, V = _normal_modes(moved.K, moved.M)
@@ -52,7 +51,7 @@ def seen_from(body: Body, reference: Any) -> Body:
 
 
 def at_large_deflection(
-    body: Body, reference: Any, E: Array, model: FEModel, ops: Operators
+    body: Body, reference: object, E: Array, model: FEModel, ops: Operators
 ) -> tuple[Body, Array]:
     """The body in another frame with its energy at finite strain, and its nodal shapes there.
 
@@ -79,7 +78,7 @@ def _covariance(ops: Operators, interface: Interface, E: Array) -> Array:
     return np.einsum("nak,nb->abk", moved, weights) / float((X * weights).sum())
 
 
-def moved_to(body: Body, reference: Any) -> Body:
+def moved_to(body: Body, reference: object) -> Body:
     """The body in another frame, with the elastic coordinates it has."""
     if body.quartic is not None:
         raise ModelError(
@@ -94,11 +93,11 @@ def moved_to(body: Body, reference: Any) -> Body:
     return replace(moved, K_geo=stiffening, stress=stress, reference=reference_label(reference))
 
 
-def reference_label(reference: Any) -> str:
+def reference_label(reference: object) -> str:
     """How a reference condition is written in labels and files."""
-    if isinstance(reference, str):
-        return "mean-axis" if reference == "free" else reference
-    return ("pins " if len(reference) == 2 else "3-2-1 ") + " ".join(reference)
+    if isinstance(reference, tuple | list):
+        return ("pins " if len(reference) == 2 else "3-2-1 ") + " ".join(reference)
+    return "mean-axis" if reference == "free" else str(reference)
 
 
 def _normal_modes(K: Array, M: Array) -> tuple[Array, Array]:

@@ -7,9 +7,9 @@ itself. Acceleration and angular acceleration of a free body need no stress; the
 forces at its interfaces.
 """
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 
@@ -17,10 +17,20 @@ from rom.body.records import Marker
 from rom.body.recovery import CENTRIFUGAL_LOADS, centrifugal
 from rom.body.stiffening import elastic_loads, interface_loads
 from rom.eigen.attachments import carried_displacements
-from rom.eigen.verbs import Operators, dofs_of, mean_motion, own_points, pins, rigid_motions
+from rom.eigen.connection import Connection
+from rom.eigen.verbs import (
+    Operators,
+    dofs_of,
+    given_rigid_motions,
+    mean_motion,
+    own_points,
+    pins,
+    rigid_motions,
+)
 from rom.errors import ConfigError
 from rom.model import Array, FEModel, Index, Interface
 
+Felt = Callable[[Array], Array]  # at points (p, 3), (3 p, k)
 MAX_PAIRS = 3  # of interfaces: each costs the assembly of a matrix
 
 
@@ -42,13 +52,13 @@ class UnitLoads:
         model: the model, with finite elements.
         mesh: operators of the mesh alone, nodal dofs.
         whole: the same with attachments.
-        connection: the model in interface coordinates, see `rom.reduction.interfaces.connection`.
+        connection: the model in interface coordinates.
     """
 
     model: FEModel
     mesh: Operators
     whole: Operators
-    connection: Any
+    connection: Connection
 
     def __post_init__(self) -> None:
         if self.model.stresses is None:
@@ -112,7 +122,7 @@ class UnitLoads:
     def _points(self) -> Array:
         return own_points(self.mesh, self.model.points)
 
-    def _balanced(self, carried: list[Carried], names: tuple[str, ...]) -> tuple[Any, Array]:
+    def _balanced(self, carried: list[Carried], names: Sequence[str]) -> tuple[Felt, Array]:
         """Accelerations of body forces as a function of points, and nodal interface loads."""
         R = rigid_motions(self._points)
         wrenches = np.zeros((self.mesh.n_local, 6 + 6 * len(names)))
@@ -155,7 +165,7 @@ class UnitLoads:
         ops, candidates, x = self.connection.ops, self.connection.boundary, self.model.points
         if candidates.size == 0:
             candidates = dofs_of(np.unique(np.r_[x.argmin(axis=0), x.argmax(axis=0)]))
-        return np.sort(candidates[pins(ops.rows(ops.rigid, candidates))])
+        return np.sort(candidates[pins(ops.rows(given_rigid_motions(ops), candidates))])
 
     def _surfaces(
         self,

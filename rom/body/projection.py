@@ -1,7 +1,6 @@
 """From a basis to a flexible body: rigid motions out, integrals, markers, surface."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.linalg import eigh, null_space
@@ -10,9 +9,10 @@ from scipy.sparse import csr_matrix
 from rom.body.flexible import FlexibleBody
 from rom.body.inertia import InertiaIntegrals, fields_of, inertia_integrals, point_integrals
 from rom.body.nonlinear.cauchy import CauchyRecovery
-from rom.body.records import Marker, Patch, Surface
+from rom.body.records import Marker, Patch, Provenance, Surface
 from rom.body.recovery import StressRecovery
 from rom.eigen.attachments import carried_displacements
+from rom.eigen.connection import Tie
 from rom.eigen.verbs import (
     Operators,
     dofs_of,
@@ -85,16 +85,15 @@ def flexible_body(
     E: Array,
     omega: Array,
     *,
-    ties: dict[str, Any],
+    ties: dict[str, Tie],
     name: str,
-    provenance: dict[str, Any],
+    provenance: Provenance,
 ) -> FlexibleBody:
     """The body in its mean-axis frame.
 
     Shapes E (n_local, r) are mass-normalised, without rigid motion and in nodal dofs, omega (r,)
-    their circular frequencies [rad/s]; operators have the mass of the mesh alone. Ties of the
-    interfaces that become markers have a ``label`` and the map ``coordinates`` (n_c, 3k) from the
-    dofs of the surface to what is zero when held.
+    their circular frequencies [rad/s]; operators have the mass of the mesh alone. Ties are those of
+    the interfaces that become markers.
     """
     integrals = inertia_integrals(ops, own_points(ops, model.points), E)
     surface = None
@@ -136,7 +135,7 @@ def carried_integrals(model: FEModel, ops: Operators, E: Array) -> list[InertiaI
     return found
 
 
-def _marker(ops: Operators, interface: Interface, tie: Any, E: Array) -> Marker:
+def _marker(ops: Operators, interface: Interface, tie: Tie, E: Array) -> Marker:
     U = ops.rows(E, interface.dofs)
     motion = mean_motion(interface) @ U
     hold = np.hstack([tie.coordinates @ rigid_motions(interface.points), tie.coordinates @ U])

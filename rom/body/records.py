@@ -5,7 +5,9 @@ from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 from scipy.linalg import null_space
+from scipy.sparse import csr_matrix
 
 from rom.arguments import finite, typed
 from rom.body.nonlinear.cauchy import CauchyRecovery
@@ -17,6 +19,8 @@ from rom.errors import InterfaceError, ModelError
 from rom.model import Array, Index, Report
 from rom.names import check_text, named, offered
 
+Provenance = dict[str, Any]  # JSON: how something was made
+Loads = Mapping[str, npt.ArrayLike]  # {interface: (6,) force [N] and moment [N m]}
 REPEATED_ROW_RTOL = 1e-7  # singular value of rows that repeat others; modes are as accurate as 1e-8
 
 
@@ -44,7 +48,7 @@ class Patch:
     """
 
     points: Array
-    surface_mass: Any
+    surface_mass: csr_matrix
     shapes: Array | None = None
 
 
@@ -127,7 +131,7 @@ class BodyData:
     surface: Surface | None = None
     stress: StressRecovery | CauchyRecovery | None = None
     units: str = "SI"
-    provenance: dict[str, Any] = field(default_factory=dict)
+    provenance: Provenance = field(default_factory=dict)
     certificate: Report | None = None
 
     def __post_init__(self) -> None:
@@ -187,7 +191,7 @@ class BodyData:
             rows.append(motion_of(self.markers[name])[at])
         return np.vstack(rows)
 
-    def forces_on(self, loads: Mapping[str, Any]) -> Array:
+    def forces_on(self, loads: Loads) -> Array:
         """(r,) forces on the elastic coordinates, SI or units of the body.
 
         Args:

@@ -1,11 +1,11 @@
 """Stress of a reduced body, with the static correction for the modes left out."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from rom.arguments import finite
+from rom.eigen.connection import Connection
 from rom.eigen.verbs import Operators, own_points
 from rom.errors import ConfigError
 from rom.model import Array, Basis
@@ -122,7 +122,7 @@ def centrifugal(points: Array) -> Array:
 
 
 def residual_motion(
-    ops: Operators, connection: Any, basis: Basis, holds: dict[str, Array], points: Array
+    ops: Operators, connection: Connection, basis: Basis, holds: dict[str, Array], points: Array
 ) -> Array | None:
     """(n_local, 12 + r) displacement of the modes left out, in nodal dofs.
 

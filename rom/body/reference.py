@@ -12,7 +12,6 @@ Source:
 """
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -27,7 +26,7 @@ from rom.rotation import crossed, skew
 MEAN_AXES = ("mean-axis", "buckens", "free")
 
 
-def reference_motion(body: BodyData, reference: Any) -> Array:
+def reference_motion(body: BodyData, reference: object) -> Array:
     """(6, r) rigid motion X hidden in each shape, as the reference condition sees it."""
     if isinstance(reference, str) and reference in MEAN_AXES:
         from_rigid, from_shapes = rigid_mass(body), rigid_elastic(body)

@@ -24,7 +24,6 @@ Source:
 """
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -140,7 +139,7 @@ def _check(body: BodyData) -> None:
         symmetric(name, matrix(name, A, (r, r)), 1e-9, error=ConfigError)
 
 
-def moved_stiffening(old: BodyData, new: BodyData, X: Array, reference: Any) -> Any:
+def moved_stiffening(old: BodyData, new: BodyData, X: Array, reference: object) -> dict[str, Array]:
     """Geometric stiffness seen from another frame, its shapes phi - (t + w x X), [t; w] = X (6, r).
 
     The frame turns and moves with the body: rotations compose, and what the reference condition
@@ -181,7 +180,7 @@ def recombined_stiffening(K_geo: dict[str, Array], V: Array) -> dict[str, Array]
     return {load: 0.5 * (A + A.T) for load, A in found.items()}
 
 
-def _without_rigid(body: BodyData, psi: SecondOrder, reference: Any) -> SecondOrder:
+def _without_rigid(body: BodyData, psi: SecondOrder, reference: object) -> SecondOrder:
     """Every pair k, l counts as one shape of a body, whose frame obeys the reference condition."""
     r = body.n_modes
     flat, none = {m: motion.reshape(6, -1) for m, motion in psi.markers.items()}, (0, 6 + r * r)

@@ -1,15 +1,15 @@
 """The outer surface of a body: places on it, their areas and strains."""
 
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Iterable
 
 import numpy as np
+import numpy.typing as npt
 
 from rom.body.records import BodyData, Surface
 from rom.errors import ConfigError, ModelError
-from rom.model import Array, Index
+from rom.model import Array, Index, Mask
 
-Where = Callable[[Array], Any] | str | None
+Where = Callable[[Array], npt.ArrayLike] | str | None
 COINCIDENT_RTOL = 1e-9  # of the body's size
 GAUGE_RTOL = 0.02  # distance of a strain gauge from the surface, of the body's size
 MAX_TILT = 0.2  # sine of the angle between a strain gauge and the surface; facets of a round one
@@ -53,7 +53,11 @@ def chosen_triangles(body: BodyData, where: Where) -> tuple[Index, Array]:
 
 
 def strain_rows(
-    body: BodyData, points: Any, directions: Any, what: str, numbers: Any = None
+    body: BodyData,
+    points: npt.ArrayLike,
+    directions: npt.ArrayLike,
+    what: str,
+    numbers: Iterable[object] | None = None,
 ) -> Array:
     """(k, r) normal strain along directions in the surface per elastic coordinate [1/m].
 
@@ -67,8 +71,9 @@ def strain_rows(
     normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
     reach = GAUGE_RTOL * float(np.ptp(surface.points, axis=0).max())
     found, shapes = [], surface.shape.reshape(len(surface.points), 3, -1)
-    numbers = range(len(points)) if numbers is None else numbers
-    for k, x, d in zip(numbers, np.asarray(points), np.asarray(directions), strict=True):
+    at, along = np.asarray(points), np.asarray(directions)
+    numbers = range(len(at)) if numbers is None else numbers
+    for k, x, d in zip(numbers, at, along, strict=True):
         d = d / np.linalg.norm(d)
         lies = np.flatnonzero(np.abs(normals @ d) <= MAX_TILT)
         far = _distances(x, corners[lies])
@@ -110,7 +115,7 @@ def _to_line(p: Array, q: Array) -> Array:
     return np.linalg.norm(p + at[:, None] * along, axis=1)
 
 
-def _on_interface(body: BodyData, name: str) -> Any:
+def _on_interface(body: BodyData, name: str) -> Mask:
     """(s,) whether the points of the surface belong to a deformable interface."""
     patch = body.markers[name].patch if name in body.markers else None
     if patch is None:

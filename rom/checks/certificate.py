@@ -9,10 +9,13 @@ from scipy.linalg import eigh, null_space
 from rom.body.damping import damping_rows
 from rom.body.flexible import FlexibleBody
 from rom.body.projection import Elastic
+from rom.body.records import Provenance
 from rom.body.reference import rigid_mass
 from rom.checks.draft import COMPARISON_STAGE, Draft
 from rom.eigen.condensed import Condensed, condensed
+from rom.eigen.connection import Connection
 from rom.eigen.verbs import (
+    Held,
     Operators,
     given_rigid_motions,
     mac,
@@ -21,9 +24,8 @@ from rom.eigen.verbs import (
     unit_motions,
 )
 from rom.errors import InterfaceError
-from rom.model import Array, Basis, Report, Row
+from rom.model import Array, Basis, Mask, Report, Row
 from rom.process.progress import MANY_DOFS, stages
-from rom.reduction.interfaces.records import Connection
 from rom.rows import BELOW_FULL_RTOL, FREQUENCY_RTOL, N_COMPARED, frequency_rows, row
 
 # Relative to the diagonals it bounds the error of squared frequencies; round-off of a fine mesh on
@@ -88,14 +90,14 @@ def certify(draft: Draft) -> None:
     attach(draft, report, comparison, f"body {draft.name!r}")
 
 
-def attach(draft: Draft, report: Report, comparison: dict[str, Any], of: str) -> None:
+def attach(draft: Draft, report: Report, comparison: Provenance, of: str) -> None:
     """Give a body its certificate, and warn of what fails in it."""
     report.warn_of_failures(f"the certificate of {of}")
     provenance = draft.body.provenance | {"comparison": comparison}
     draft.body = replace(draft.body, certificate=report, provenance=provenance)
 
 
-def _round_off(rigid_energy: Any, body: FlexibleBody, full: list[float]) -> float:
+def _round_off(rigid_energy: float, body: FlexibleBody, full: list[float]) -> float:
     """By which frequencies may differ where rigid motions have energy, over that of the first mode.
 
     That energy is round-off, of which shapes have more. A slender body that is held bends with far
@@ -226,7 +228,7 @@ def _estimate_rows(support: str, table: dict[str, list[float]]) -> list[Row]:
     return [worst, row(f"{support}: largest error over its estimate", ratio, MAX_ERROR_RATIO)]
 
 
-def _static_row(connection: Connection, body: FlexibleBody, held: Any) -> list[Row]:
+def _static_row(connection: Connection, body: FlexibleBody, held: Held) -> list[Row]:
     """Deflection under unit loads on the other interfaces, the first one held; exact for CB."""
     names = tuple(connection.parts)
     ops, first = connection.ops, names[0]
@@ -277,7 +279,7 @@ def _matrix_rows(
     ]
 
 
-def _coupling_row(connection: Connection, basis: Basis, K: Array, stiff: Any) -> list[Row]:
+def _coupling_row(connection: Connection, basis: Basis, K: Array, stiff: Mask) -> list[Row]:
     """Constraint modes and fixed-interface modes do not couple in K; other modes do.
 
     Constraint modes of a single interface are rigid motions, whose stiffness is round-off.

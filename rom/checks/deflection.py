@@ -14,11 +14,18 @@ from scipy.linalg import eigh
 
 from rom.body.flexible import FlexibleBody
 from rom.body.nonlinear.cauchy import CauchyRecovery
-from rom.body.nonlinear.full import N_TANGENT, HeldSolid
-from rom.body.nonlinear.ranges import Geometric, Load, axis_point, held_motions, nodal_forces
+from rom.body.nonlinear.full import N_TANGENT, HeldSolid, nearest_rotation
+from rom.body.nonlinear.ranges import (
+    Geometric,
+    axis_point,
+    further_loads,
+    held_motions,
+    nodal_forces,
+)
 from rom.body.nonlinear.statics import follow, free_motions
 from rom.body.projection import cauchy_recovery
 from rom.checks.draft import COMPARISON_STAGE, Draft
+from rom.eigen.verbs import own_rows
 from rom.errors import ModelError
 from rom.model import Array, Row
 from rom.rows import row
@@ -55,12 +62,8 @@ def compare_deflections(draft: Draft) -> None:
     full = HeldSolid.of(model, draft.connection, body.reference, held, neo_hookean=hyperelastic)
     quartic, still, ends = body.energy(), body.mean_rows(geometric.fixed), list[Array]()
     about = axis_point(geometric, model, body.reference)
-    further = [load for name in geometric.loads for k in range(6)
-               if (load := Load(name, k)) not in held]  # fmt: skip
-    units, F = (
-        full.whole(nodal_forces(loads, model, ops, about))
-        for loads in (geometric.components(), further)
-    )
+    loads = geometric.components(), further_loads(geometric, held)
+    units, F = (full.whole(nodal_forces(some, model, ops, about)) for some in loads)
     E = full.whole(draft.E)
     tangent = Tangent(body, still, E.T @ F)
     rows, table = list[Row](), dict[str, Any]()
@@ -80,8 +83,8 @@ def compare_deflections(draft: Draft) -> None:
                 break
             step = _compared(full, tangent, F, (u, q, a))
             if isinstance(body.stress, CauchyRecovery):
-                mine = slice(ops.first, ops.first + ops.n_local)
-                known = cauchy_recovery(model, (full.T @ a)[mine, None]).field(np.ones(1))
+                u_full = own_rows(ops, full.T @ a)[:, None]
+                known = cauchy_recovery(model, u_full).field(np.ones(1))
                 gap = np.linalg.norm(body.stress.field(q) - known) / np.linalg.norm(known)
                 step = replace(step, stress=float(gap))
             steps.append(step)
@@ -97,8 +100,7 @@ def compare_deflections(draft: Draft) -> None:
             "turn": _turn(body, path[n_held - 1]) if n_held else 0.0,
         }
     # a mesh that is too coarse for a turn stiffens, and so does the full model
-    stresses: Any = model.stresses
-    unresolved = stresses.large_strain().unresolved(draft.E @ np.array(ends).T)
+    unresolved = model.stresses.large_strain().unresolved(draft.E @ np.array(ends).T)
     straight, bent = unresolved.reshape(-1, 2).T
     coarse = (bent - straight).max()
     rows.append(row("energy that cells add, too coarse to bend so far", coarse, MESH_RTOL))
@@ -113,8 +115,7 @@ def _turn(body: FlexibleBody, q: Array) -> float:
     angles = [0.0]
     for marker in body.markers.values():
         if marker.covariance is not None:
-            U, _, Vt = np.linalg.svd(marker.covariance @ np.r_[1.0, q])
-            R = U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt
+            R = nearest_rotation(marker.covariance @ np.r_[1.0, q])
             angles.append(float(np.arccos(np.clip(0.5 * (np.trace(R) - 1), -1.0, 1.0))))
     return max(angles)
 
@@ -139,9 +140,7 @@ class Step:
     stress: float | None = None
 
 
-def _compared(
-    full: HeldSolid, body: "Tangent", F: Array, at: tuple[Array, Array, Array]
-) -> Step:  # fmt: skip
+def _compared(full: HeldSolid, body: "Tangent", F: Array, at: tuple[Array, ...]) -> Step:
     """The body at u (n,), q (r,) against the full model in equilibrium at a (m,).
 
     F: (n, k) forces under which both yield.
@@ -180,11 +179,9 @@ def load_cases(geometric: Geometric) -> dict[str, Array]:
     rising proportion with alternating signs.
     """
     components = geometric.components()
-    units = np.eye(len(components))
-    cases = {"-"[sign > 0 :] + load.name: sign * unit
-             for load, unit in zip(components, units, strict=True)
-             for sign in load.signs}  # fmt: skip
-    n = len(components)
+    cases, n = dict[str, Array](), len(components)
+    for load, unit in zip(components, np.eye(n), strict=True):
+        cases |= {"-"[sign > 0 :] + load.name: sign * unit for sign in load.signs}
     if n > 1:
         falling = UNTRAINED_RATIO ** np.arange(n)
         falling /= np.linalg.norm(falling)

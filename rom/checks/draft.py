@@ -7,13 +7,13 @@ from functools import cached_property
 from typing import Any
 
 from rom.body.projection import Elastic
+from rom.eigen.connection import Connection
 from rom.eigen.verbs import Operators
 from rom.model import Array, Basis, Row
 from rom.process.stopwatch import Stopwatch, stopwatch
 from rom.reduction.full_model import mesh_operators, operators
 from rom.reduction.interfaces.kinds import by_name
 from rom.reduction.interfaces.order import open_orders
-from rom.reduction.interfaces.records import Connection
 
 log = logging.getLogger("rom")
 COMPARISON_STAGE = "comparison"  # of what certifies, which does not count as "seconds to reduce"

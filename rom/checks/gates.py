@@ -1,7 +1,5 @@
 """Quality gates on the records: is this model, this body, fit to be trusted?"""
 
-from typing import Any
-
 import numpy as np
 from scipy.linalg import eigvalsh
 
@@ -16,7 +14,7 @@ from rom.rows import row
 
 
 @typed
-def check(record: Any) -> Report:
+def check(record: object) -> Report:
     """Check a record against the limits its kind has to meet.
 
     Args:
@@ -41,7 +39,7 @@ def check_model(model: FEModel) -> Report:
         ConfigError: if stiffness and mass are not square matrices of one size.
         ModelError: if its operators were made without geometry.
     """
-    ops: Any = mesh_operators(model)
+    ops = mesh_operators(model)
     R = given_rigid_motions(ops)
     x = np.sin(np.arange(ops.first, ops.first + ops.n_local) + 1.0)[:, None]
     Kx, KR, J = ops.apply_K(x), ops.apply_K(R), ops.gram(R, ops.apply_M(R))

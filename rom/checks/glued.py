@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from rom.body.nonlinear.full import TurningSection
 from rom.body.nonlinear.ranges import Load
-from rom.eigen.verbs import mean_motion
+from rom.eigen.verbs import Matrix, dofs_of, mean_motion
 from rom.errors import ModelError
 from rom.model import Array, FEModel, Index, Interface
 
@@ -48,8 +48,7 @@ class GluedSolid:
             new = nodes < 0
             nodes[new] = n + np.arange(np.count_nonzero(new))
             number[key], n = nodes, n + int(np.count_nonzero(new))
-        dofs = {key: (3 * nodes[:, None] + np.arange(3)).ravel() for key, nodes in number.items()}
-        return cls(models, dofs, 3 * n)
+        return cls(models, {key: dofs_of(nodes) for key, nodes in number.items()}, 3 * n)
 
     def force(self, u: Array) -> Array:
         """(n,) forces that hold the solid at a displacement (n,) [N]."""
@@ -60,15 +59,13 @@ class GluedSolid:
 
     def tangent(self, u: Array) -> csr_matrix:
         """(n, n) derivative of the forces at a displacement (n,) [N/m]."""
-        return self._sum({key: solid.tangent(u[self.dofs[key]])
-                          for key, solid in self._solids.items()})  # fmt: skip
+        own = self._solids.items()
+        return self._sum({key: solid.tangent(u[self.dofs[key]]) for key, solid in own})
 
     @cached_property
     def M(self) -> csr_matrix:
         """(n, n) mass [kg]."""
-        return self._sum({key: model.operators.gathered(model.operators.M)
-                          if model.operators else model.M
-                          for key, model in self.models.items()})  # fmt: skip
+        return self._sum({key: _mass(model) for key, model in self.models.items()})
 
     def motion(self, load: Load) -> Array:
         """(n,) row of the mean motion of an interface on which a unit load works [1, 1/m]."""
@@ -93,7 +90,7 @@ class GluedSolid:
     def _solids(self) -> dict[str, Any]:
         return {key: model.stresses.finite_strain() for key, model in self.models.items()}
 
-    def _sum(self, parts: Mapping[str, Any]) -> csr_matrix:
+    def _sum(self, parts: Mapping[str, Matrix]) -> csr_matrix:
         """(n, n) sum of matrices of the pieces, by their numbers in the whole."""
         entries = [
             (self.dofs[key][A.row], self.dofs[key][A.col], A.data)
@@ -101,6 +98,10 @@ class GluedSolid:
         ]
         rows, columns, values = map(np.concatenate, zip(*entries, strict=True))
         return csr_matrix((values, (rows, columns)), shape=(self.n, self.n))
+
+
+def _mass(model: FEModel) -> Matrix:
+    return model.operators.gathered(model.operators.M) if model.operators else model.M
 
 
 def _meeting(one: Interface, other: Interface) -> Index:

@@ -5,8 +5,6 @@ A rigid body has the same kinetic energy as six point masses m/6 on its principa
 and all inertia integrals as six more nodes, with no formula of their own.
 """
 
-from typing import Any
-
 import numpy as np
 from scipy.sparse import csr_matrix
 
@@ -53,7 +51,7 @@ def added_mass(model: FEModel, first: int, n_local: int) -> csr_matrix | None:
     """Sparse (n_local, n) mass of all attachments, the rows of this process; None without any."""
     if not model.attachments:
         return None
-    dM: Any = csr_matrix((n_local, model.n_dofs))
+    dM = csr_matrix((n_local, model.n_dofs))
     for attachment in model.attachments:
         _, masses, N = carried_displacements(attachment, model)
         block = N.T @ (np.repeat(masses, 3)[:, None] * N)

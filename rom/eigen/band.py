@@ -11,7 +11,7 @@ from rom.eigen.held import HeldBody
 from rom.eigen.lanczos import capacity
 from rom.eigen.scipy import SciPyOperators, SymmetricLU
 from rom.eigen.search import dof_set
-from rom.eigen.verbs import column_blocks
+from rom.eigen.verbs import Matrix, column_blocks
 from rom.errors import ModesMissedError, ParallelError, ResourceError, SolverError
 from rom.model import Array, Modes
 from rom.process.memory import free_bytes
@@ -22,7 +22,7 @@ STIFF_ROUND_OFF = 1e-15  # of the largest eigenvalue of the mesh, likewise in so
 
 
 def substructured_modes(
-    K: Any, M: Any, f_max: float, *, rigid: Array | None = None, tol: float = 1e-3
+    K: Matrix, M: Matrix, f_max: float, *, rigid: Array | None = None, tol: float = 1e-3
 ) -> Modes:
     """All modes up to a frequency, of plain matrices.
 

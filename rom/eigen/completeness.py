@@ -17,11 +17,11 @@ Source:
     SIAM J. Numer. Anal. 17 (1980) 687, for blocks.
 """
 
-from typing import Any
-
 import numpy as np
+import numpy.typing as npt
 from scipy.special import gammainc
 
+from rom.eigen.verbs import Searched
 from rom.model import Array
 
 N_TOGETHER = 3  # members of one frequency that are left to a count
@@ -39,7 +39,7 @@ MIXING_STEPS = (  # Steele, Lea and Flood, OOPSLA 2014, with the constants of St
 )
 
 
-def gaussian_block(ops: Any, k: int, n_before: int = 0) -> Array:
+def gaussian_block(ops: Searched, k: int, n_before: int = 0) -> Array:
     """(n_local, k) Gaussian columns with components of about one in all modes.
 
     The numbers depend on the place of a dof, mixed beyond recognition, and not on its rank. Blocks
@@ -53,7 +53,7 @@ def gaussian_block(ops: Any, k: int, n_before: int = 0) -> Array:
     return normal / np.sqrt(np.maximum(ops.mass_diagonal, np.finfo(float).tiny))[:, None]
 
 
-def _mixed(x: Any) -> Any:
+def _mixed(x: npt.NDArray[np.uint64]) -> npt.NDArray[np.uint64]:
     """64 bits of which each depends on all those given: the finaliser of SplitMix64."""
     for shift, factor in MIXING_STEPS:
         x = (x ^ (x >> shift)) * factor

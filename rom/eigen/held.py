@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from rom.eigen.verbs import held_rows
+from rom.eigen.verbs import Searched, given_rigid_motions, held_rows
 from rom.errors import InterfaceError
 from rom.model import Array, Index
 
@@ -31,8 +31,9 @@ class HeldBody:
     make: Callable[[], None]
     factorable = True  # whether another factor may be made to name a place
 
-    def __init__(self, ops: Any, held: Index, shift: float = 0.0):
-        self.ops, self.held, self.shift = ops, held, shift
+    def __init__(self, ops: Searched, held: Index, shift: float = 0.0):
+        self.ops: Any = ops
+        self.held, self.shift = held, shift
         self.mine = np.flatnonzero(~held_rows(ops, held))
         self.n_free = ops.n - held.size
         self.inner: Any = ops.part(self.mine) if self.n_free else None
@@ -96,7 +97,7 @@ class HeldBody:
         self.factor = None
 
 
-def moves_most(ops: Any, X: Array, rows: Index | None = None) -> str:
+def moves_most(ops: Searched, X: Array, rows: Index | None = None) -> str:
     """Words for the node that moves most in the columns X, and for the part that moves with it.
 
     X (n_local, k) has motions on these rows of ``ops``, whose rigid motions tell where nodes are.
@@ -106,7 +107,7 @@ def moves_most(ops: Any, X: Array, rows: Index | None = None) -> str:
     size = np.sqrt(np.bincount(node, square, minlength=1))
     at = int(np.argmax(size))
     largest = float(size[at])
-    point = _point(ops.rigid, 3 * at) if largest > 0.0 else None
+    point = _point(given_rigid_motions(ops), 3 * at) if largest > 0.0 else None
     largest, found = max(ops.from_all((largest, point)), key=lambda pair: pair[0])
     if found is None:
         return ""
@@ -114,9 +115,10 @@ def moves_most(ops: Any, X: Array, rows: Index | None = None) -> str:
     return f" It moves most at {_words(found)}, {_part(ops, loose)}."
 
 
-def _part(ops: Any, loose: Index) -> str:
+def _part(ops: Searched, loose: Index) -> str:
     """Words for some nodes of this rank and those of the others: how many, and where."""
-    points = [_point(ops.rigid, 3 * int(node)) for node in loose]
+    rigid = given_rigid_motions(ops)
+    points = [_point(rigid, 3 * int(node)) for node in loose]
     there = np.array([point for point in points if point is not None]).reshape(-1, 3)
     there = np.vstack(ops.from_all(there))
     share = f"{len(there)} of {ops.n // 3} nodes move"

@@ -5,12 +5,11 @@ ones, because the factor is read from memory once. A Krylov method that asks for
 time spends twice the factorisation on twenty modes; in blocks it takes half of it.
 """
 
-from typing import Any
-
 import numpy as np
 from scipy.linalg.blas import dgemm
 
 from rom.eigen.completeness import MAX_MISS_PROBABILITY, gaussian_block, miss_probability
+from rom.eigen.verbs import Factor, Searched
 from rom.errors import SolverError
 from rom.model import Array
 from rom.process.stopwatch import MISS_NOTE, note
@@ -38,7 +37,13 @@ class BlockLanczos:
     """
 
     def __init__(
-        self, ops: Any, factor: Any, sigma: float, deflated: Array, start: Array, tolerance: Array
+        self,
+        ops: Searched,
+        factor: Factor,
+        sigma: float,
+        deflated: Array,
+        start: Array,
+        tolerance: Array,
     ):
         self.ops, self.factor, self.sigma = ops, factor, sigma
         self.k, self.tolerance = tolerance.size, tolerance

@@ -2,7 +2,6 @@
 
 from copy import copy
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -20,16 +19,15 @@ from rom.eigen.search import (
     indefinite,
     shift_is_eigenvalue,
 )
-from rom.eigen.verbs import canonical_signs
+from rom.eigen.verbs import Matrix, Value, canonical_signs
 from rom.errors import ConfigError, QualityGateError, SolverError
 from rom.model import Array, Index
 from rom.process.stopwatch import FACTORISATION_PIECE, piece
 
 ENTRY_HINT = "Look where it was assembled: a number was missing, or divided by zero."
 NO_FACTOR = SimpleNamespace(ok=False, release=lambda: None)  # of a singular stiffness
-SYMMETRIC_LU = {
-    "permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}
-}  # fmt: skip
+ON_DIAGONAL = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0}
+SYMMETRIC_LU = {**ON_DIAGONAL, "options": {"SymmetricMode": True}}
 
 
 class SymmetricLU:
@@ -38,7 +36,7 @@ class SymmetricLU:
     With ``pivoting`` elsewhere, where the diagonal has zeros; RuntimeError if A is singular.
     """
 
-    def __init__(self, A: Any, *, pivoting: bool = False):
+    def __init__(self, A: Matrix, *, pivoting: bool = False):
         self.A, kind = csc_matrix(A), {} if pivoting else SYMMETRIC_LU
         with piece(FACTORISATION_PIECE):
             self.lu = splu(self.A, **kind)
@@ -122,7 +120,9 @@ class SciPyOperators(ModeSearch):
     affordable = True
     held_kind = HeldSciPy
 
-    def __init__(self, K: Any, M: Any, rigid: Array | None = None, T: csr_matrix | None = None):
+    def __init__(
+        self, K: Matrix, M: Matrix, rigid: Array | None = None, T: csr_matrix | None = None
+    ):
         self.K, self.M = _symmetric("K", K), _symmetric("M", M)
         if self.K.shape != self.M.shape:
             raise ConfigError(f"K is {self.K.shape} and M is {self.M.shape}; they must be equal.")
@@ -142,7 +142,7 @@ class SciPyOperators(ModeSearch):
         """X[dofs]."""
         return X[np.asarray(dofs, dtype=np.int64)]
 
-    def transform(self, T: Any, rigid: Array) -> "SciPyOperators":
+    def transform(self, T: Matrix, rigid: Array) -> "SciPyOperators":
         """The same body in the coordinates a of u = T a."""
         T = csr_matrix(T)
         return SciPyOperators(T.T @ self.K @ T, T.T @ self.M @ T, rigid, T)
@@ -151,19 +151,19 @@ class SciPyOperators(ModeSearch):
         """T^T F."""
         return F if self.T is None else self.T.T @ F
 
-    def like(self, K: Any, M: Any, rigid: Array | None) -> "SciPyOperators":
+    def like(self, K: Matrix, M: Matrix, rigid: Array | None) -> "SciPyOperators":
         """Other matrices in the same coordinates."""
         return SciPyOperators(K, M, rigid, self.T)
 
-    def plus(self, A: csr_matrix, dA: Any) -> csr_matrix:
+    def plus(self, A: csr_matrix, dA: Matrix) -> csr_matrix:
         """A + dA."""
         return A + csr_matrix(dA)
 
-    def weighted(self, A: csr_matrix, weight: float, parts: list[tuple[float, Any]]) -> csr_matrix:
+    def weighted(self, A: Matrix, weight: float, parts: list[tuple[float, Matrix]]) -> csr_matrix:
         """Weight A + sum of the weighted parts."""
         return weight * A + sum(c * csr_matrix(part) for c, part in parts)
 
-    def product(self, A: Any, X: Array) -> Array:
+    def product(self, A: Matrix, X: Array) -> Array:
         """A X."""
         return A @ X
 
@@ -186,7 +186,7 @@ class SciPyOperators(ModeSearch):
         except RuntimeError as error:
             raise shift_is_eigenvalue(shift) from error
 
-    def count_below(self, sigma: float, spent: Any = None) -> int:
+    def count_below(self, sigma: float, spent: object = None) -> int:
         """Number of eigenvalues below sigma, by the inertia of K - sigma M (Sylvester)."""
         return negative_count(self.K - sigma * self.M)
 
@@ -207,7 +207,7 @@ class SciPyOperators(ModeSearch):
         at = int(np.abs(Phi).max(axis=1, initial=0.0).argmax())
         return f" Dof {at if rows is None else rows[at]} moves most."
 
-    def from_all(self, mine: Any) -> list[Any]:
+    def from_all(self, mine: Value) -> list[Value]:
         """What each process has: this one alone."""
         return [mine]
 
@@ -227,7 +227,7 @@ class SciPyOperators(ModeSearch):
         return np.asarray(self.M.diagonal())
 
 
-def _symmetric(name: str, A: Any) -> csr_matrix:
+def _symmetric(name: str, A: Matrix) -> csr_matrix:
     A = csr_matrix(matrix(name, A), dtype=float)
     if A.shape[0] != A.shape[1]:
         raise ConfigError(f"{name} has the shape {A.shape}; it must be square.")
@@ -250,6 +250,6 @@ def _refuse_massless(M: csr_matrix) -> None:
         )
 
 
-def negative_count(A: Any) -> int:
+def negative_count(A: Matrix) -> int:
     """Number of negative eigenvalues of a symmetric matrix, from its pivots (Sylvester)."""
     return SymmetricLU(A).negative_pivots()

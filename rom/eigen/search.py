@@ -6,7 +6,7 @@ over. What a count by inertia finds missing is sought beside what was found, unt
 
 from collections.abc import Callable
 from itertools import pairwise
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -17,9 +17,19 @@ from rom.eigen.completeness import gaussian_block
 from rom.eigen.condensed import Supported
 from rom.eigen.held import RIGID_RTOL, HeldBody
 from rom.eigen.lanczos import BLOCK_SIZE, EIGENVALUE_RTOLS, BlockLanczos, capacity
-from rom.eigen.verbs import Operators, Weighted, count_shift, every_row, orthonormal, own_rows
+from rom.eigen.verbs import (
+    Factor,
+    Matrix,
+    Operators,
+    Searched,
+    Weighted,
+    count_shift,
+    every_row,
+    orthonormal,
+    own_rows,
+)
 from rom.errors import ConfigError, ModelError, ModesMissedError, QualityGateError, SolverError
-from rom.model import Array, Index
+from rom.model import Array, Index, Mask
 from rom.names import named
 from rom.process.stopwatch import SEARCH_PIECE, piece
 
@@ -37,35 +47,10 @@ NO_INERTIA = "some motion would have no inertia"
 Seek = Callable[[int, Array], tuple[Array, Array, bool]]
 
 
-class ModeSearch:
-    """What `rom.eigen.scipy.SciPyOperators` and those of PETSc have in common: verbs and search.
+class ModeSearch(Searched):
+    """What `rom.eigen.scipy.SciPyOperators` and those of PETSc have in common: verbs and search."""
 
-    Beside the verbs they know ``fixed``, (n_local,) numbers that depend on the place of a dof,
-    the diagonals of their matrices, ``stiffness_diagonal`` and ``mass_diagonal``, the map T to the
-    coordinates they came from, or None, and ``like``, other matrices in the same coordinates.
-    """
-
-    n: int
-    n_local: int
-    rigid: Array | None
-    fixed: Array
-    K: Any
-    M: Any
-    T: Any
-    held_kind: Any
-    like: Any
-    plus: Callable[[Any, Any], Any]
-    weighted: Callable[..., Any]
-    product: Callable[[Any, Array], Array]
-    from_all: Callable[[Any], list[Any]]
-    gram: Callable[[Array, Array], Array]
-    signed: Callable[[Array], Array]
-    shift_inverse: Callable[[float], Any]
-    first_elastic: Callable[[Array], float]
-    count_below: Callable[..., int | None]
-    where: Callable[[Array], str]
-    stiffness_diagonal: Any
-    mass_diagonal: Any
+    held_kind: type[HeldBody]
 
     def apply_K(self, X: Array) -> Array:
         """K X."""
@@ -79,19 +64,19 @@ class ModeSearch:
         """T A."""
         return A if self.T is None else self.product(self.T, A)
 
-    def hold(self, dofs: npt.ArrayLike, shift: float = 0.0) -> Any:
+    def hold(self, dofs: npt.ArrayLike, shift: float = 0.0) -> HeldBody:
         """Eliminate the held dofs and factor the rest of K - shift M."""
         return self.held_kind(self, dof_set(dofs, self.n), shift)
 
-    def plus_mass(self, dM: Any) -> Any:
+    def plus_mass(self, dM: Matrix) -> Operators:
         """The same body with the mass M + dM."""
         return self.like(self.K, self.plus(self.M, dM), self.rigid)
 
-    def on_springs(self, dK: Any) -> Any:
+    def on_springs(self, dK: Matrix) -> Operators:
         """The body held by springs to the ground: stiffness K + dK, no rigid motion of its own."""
         return self.like(self.plus(self.K, dK), self.M, None)
 
-    def varied(self, stiffness: Weighted, mass: Weighted, rigid: Array | None = None) -> Any:
+    def varied(self, stiffness: Weighted, mass: Weighted, rigid: Array | None = None) -> Operators:
         """The same dofs with k K + sum k_i K_i and m M + sum m_i M_i."""
         K, M = self.weighted(self.K, *stiffness), self.weighted(self.M, *mass)
         return self.like(K, M, self.rigid if rigid is None else rigid)
@@ -106,7 +91,12 @@ class ModeSearch:
         return float(max(self.from_all(ratio.max(initial=0.0))))
 
     def modes(
-        self, held: Any, m: int, sigma: float | None = None, *, finished: bool = False
+        self,
+        held: Any,
+        m: int,
+        sigma: float | None = None,
+        *,
+        finished: bool = False,
     ) -> tuple[Array, Array]:
         """Lowest m modes, mass-normalised: omega (m,) [rad/s] and Phi (n_local, m)."""
         if isinstance(held, Supported):
@@ -172,7 +162,7 @@ class ModeSearch:
         """M-orthonormal rigid motions, from the geometry or, without one, none."""
         if self.rigid is None:
             return np.zeros((self.n_local, 0))
-        return orthonormal(cast(Operators, self), self.rigid)
+        return orthonormal(self, self.rigid)
 
     def _elastic_modes(self, R: Array, m: int, sigma: float | None) -> tuple[Array, Array]:
         """The m modes above the rigid ones."""
@@ -201,7 +191,7 @@ class ModeSearch:
         lam = np.where(self._at_rest(Phi, lam), 0.0, lam)
         return lam[:m], settled(self, lam, Phi)[:, :m]
 
-    def _at_rest(self, Phi: Array, lam: Array) -> Any:
+    def _at_rest(self, Phi: Array, lam: Array) -> Mask:
         """(m,) True for mass-normalised motions without stiffness."""
         alone = self.gram(Phi, self.stiffness_diagonal[:, None] * Phi)
         return lam < RIGID_RTOL * np.diag(alone)
@@ -220,7 +210,7 @@ class ModeSearch:
         return self.n <= max(MAX_DENSE_DOFS, capacity(m + N_SPARE_MODES) + beside)
 
     def _sought(
-        self, k: int, sigma: float, inverse: Any, found: Array, *, blocks: bool
+        self, k: int, sigma: float, inverse: Factor, found: Array, *, blocks: bool
     ) -> tuple[Array, Array, bool]:
         """The k lowest eigenpairs and some more beside those found, and whether surely all."""
         if blocks:
@@ -275,14 +265,14 @@ class ModeSearch:
 
     def all_modes(self) -> tuple[Array, Array]:
         """All eigenpairs of a small body, solved densely on every rank."""
-        ops, E = cast(Operators, self), np.eye(self.n)
-        K, M = (every_row(ops, apply(own_rows(ops, E))) for apply in (ops.apply_K, ops.apply_M))
+        E = own_rows(self, np.eye(self.n))
+        K, M = (every_row(self, apply(E)) for apply in (self.apply_K, self.apply_M))
         try:
             lam, Phi = eigh(K, M)
         except LinAlgError as error:
             n_negative = int(np.count_nonzero(eigvalsh(M) <= 0.0))
             raise indefinite("M", n_negative, NO_INERTIA) from error
-        return lam, own_rows(ops, Phi)
+        return lam, own_rows(self, Phi)
 
     def refuse_wrong_mass(self) -> None:
         """Say so where the mass is why search and count differ."""
@@ -292,7 +282,7 @@ class ModeSearch:
         return self.by_blocks(k - N_SPARE_MODES, sigma, inverse, deflated)[:2]
 
     def by_blocks(
-        self, m: int, sigma: float, inverse: Any, deflated: Array
+        self, m: int, sigma: float, inverse: Factor, deflated: Array
     ) -> tuple[Array, Array, bool]:
         """Some more than m eigenvalues above sigma, modes, and whether surely none is missing."""
         with piece(SEARCH_PIECE):
@@ -309,7 +299,7 @@ class ModeSearch:
             return lam[order], Phi[:, order], proven
 
 
-def refined(ops: Any, lam: Array, Phi: Array) -> Array:
+def refined(ops: Searched, lam: Array, Phi: Array) -> Array:
     """(m,) eigenvalues lam as energies of normalised modes, free of a factor's round-off.
 
     Where a body hangs almost free, energies cancel, and lam is better.
@@ -332,7 +322,7 @@ def shift_is_eigenvalue(shift: float) -> SolverError:
     return SolverError(f"K - {shift:.6g} M is singular: the shift is an eigenvalue.")
 
 
-def settled(ops: Any, lam: Array, Phi: Array) -> Array:
+def settled(ops: Searched, lam: Array, Phi: Array) -> Array:
     """Modes with equal frequencies turned within their plane to the same place on any machine."""
     Phi = Phi.copy()
     apart = np.diff(lam) > CLUSTER_RTOL * np.abs(lam[1:])
@@ -345,7 +335,7 @@ def settled(ops: Any, lam: Array, Phi: Array) -> Array:
     return Phi
 
 
-def estimated_by_iteration(ops: Any, factor: Any, R: Array) -> float:
+def estimated_by_iteration(ops: Searched, factor: Factor, R: Array) -> float:
     """The least eigenvalue that is not zero, estimated without geometry.
 
     The factor is of the stiffness with a little mass, `ESTIMATE_SHIFT`; the M-orthonormal motions

@@ -5,7 +5,7 @@ implementation below holds all rows; ``rom.fe.operators.petsc`` distributes them
 """
 
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -15,13 +15,22 @@ from scipy.sparse import csr_matrix, identity, kron
 from rom.errors import InterfaceError, ModelError
 from rom.model import Array, Index, Interface, Mask
 
+Value = TypeVar("Value")
 Product = Callable[[Array, Array], Array]
-Weighted = tuple[float, list[tuple[float, Any]]]
+Matrix = Any  # of SciPy, dense or sparse, or of PETSc, neither of which has types
+Weighted = tuple[float, list[tuple[float, Matrix]]]
 CLUSTER_RTOL = 1e-5  # relative distance of eigenvalues that belong to one space
 DEPENDENT_RTOL = 1e-9  # share of a column that is new, below which it is dropped
 CANCELLING_RATIO = 0.7  # length after over before a projection that may have left a part of it
 COLUMNS_AT_ONCE = 32  # as many as factors solve for together
 ON_A_LINE = 1e-12  # smallest over largest moment of a surface that counts as a line
+
+
+class Factor(Protocol):
+    """What solves with a matrix that was factored."""
+
+    def solve(self, F: Array) -> Array:
+        """(n_local, k) A^-1 F of (n_local, k), in units of F over those of A."""
 
 
 class Held(Protocol):
@@ -42,7 +51,7 @@ class Mass(Protocol):
     def gram(self, X: Array, Y: Array) -> Array:
         """(k, l) X^T Y summed over the ranks, in units of their product.
 
-        Any two arrays (n_local, k) and (n_local, l) with equally distributed rows.
+        Both (n_local, k) and (n_local, l) have equally distributed rows.
         """
 
 
@@ -117,7 +126,7 @@ class Operators(Mass, Protocol):
             ModesMissedError: if an inertia count says a mode was skipped.
         """
 
-    def transform(self, T: Any, rigid: Array) -> "Operators":
+    def transform(self, T: Matrix, rigid: Array) -> "Operators":
         """The same body in new coordinates u = T a, with K_a = T^T K T and M_a = T^T M T.
 
         Args:
@@ -159,16 +168,16 @@ class Operators(Mass, Protocol):
             (k, l), in units of X.
         """
 
-    def plus_mass(self, dM: Any) -> "Operators":
+    def plus_mass(self, dM: Matrix) -> "Operators":
         """The same body with more mass: M + dM, dM sparse (n_local, n) with global columns."""
 
-    def on_springs(self, dK: Any) -> "Operators":
+    def on_springs(self, dK: Matrix) -> "Operators":
         """The body held by springs to the ground, K + dK, dK like dM of `plus_mass`.
 
         It has no rigid motions then; those that no spring stops come out with almost no frequency.
         """
 
-    def product(self, A: Any, X: Array) -> Array:
+    def product(self, A: Matrix, X: Array) -> Array:
         """A X for a matrix with the layout of K, (n_local, k), in units of A times those of X."""
 
     def varied(
@@ -181,6 +190,43 @@ class Operators(Mass, Protocol):
             mass: (m, [(m_i, M_i), ...]).
             rigid: (n_local, 6) its rigid motions [1, m]; None if they are the same.
         """
+
+
+class Searched(Operators, Protocol):
+    """What a search for modes knows of a body, beside the verbs.
+
+    Attributes:
+        fixed: (n_local,) numbers that depend on the place of a dof.
+        K, M: stiffness and mass.
+        T: the map to the coordinates they came from, or None.
+        like: other matrices in the same coordinates.
+    """
+
+    fixed: Array
+    K: Matrix
+    M: Matrix
+    T: Matrix
+    like: Callable[..., Operators]
+    part: Callable[[Index], "Searched"]
+    plus: Callable[[Matrix, Matrix], Matrix]
+    weighted: Callable[..., Matrix]
+    from_all: Callable[[Value], list[Value]]
+    signed: Callable[[Array], Array]
+    shift_inverse: Callable[[float], Any]
+    indefinite: Callable[[float], Any]
+    first_elastic: Callable[[Array], float]
+    count_below: Callable[..., int | None]
+    where: Callable[..., str]
+    all_finite: Callable[[Array], bool]
+    largest: Callable[[], float]
+
+    @property
+    def stiffness_diagonal(self) -> Array:
+        """(n_local,) diagonal of K."""
+
+    @property
+    def mass_diagonal(self) -> Array:
+        """(n_local,) diagonal of M."""
 
 
 def canonical_signs(Phi: Array) -> Array:
@@ -279,7 +325,7 @@ def without_dependent(ops: Mass, X: Array) -> tuple[Array, list[int]]:
     return independent(X, lambda A, B: ops.gram(A, ops.apply_M(B)))
 
 
-def orthonormal_in(S: Any, V: Array) -> Array:
+def orthonormal_in(S: Matrix, V: Array) -> Array:
     """S-orthonormal columns with the span of V, in the order given; sums over one process.
 
     Args:

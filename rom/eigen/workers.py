@@ -1,14 +1,13 @@
 """Who solves with matrices that are whole in a process, and who shares parts of a task."""
 
 from collections.abc import Callable, Sequence
-from typing import Any, Protocol, TypeVar
+from typing import Protocol, TypeVar
 
 from rom.eigen.scipy import SciPyOperators, SymmetricLU
-from rom.eigen.verbs import every_row, own_rows
+from rom.eigen.verbs import Matrix, Searched, Value, every_row, own_rows
 from rom.model import Array, Index
 
 Item = TypeVar("Item")
-Value = TypeVar("Value")
 
 
 class Factored(Protocol):
@@ -26,15 +25,15 @@ class Workers(Protocol):
     """One process, or ranks that all have the same matrices."""
 
     def operators(
-        self, K: Any, M: Any, rigid: Array | None = None, *, together: bool = False
-    ) -> Any:
+        self, K: Matrix, M: Matrix, rigid: Array | None = None, *, together: bool = False
+    ) -> Searched:
         """`rom.eigen.verbs.Operators` of matrices (n, n) of SciPy, by this process alone.
 
         ``rigid`` (n, r) are motions without stiffness; ``together`` ranks share the rows, and all
         of them must ask.
         """
 
-    def factor(self, A: Any, *, pivoting: bool = False) -> Factored | None:
+    def factor(self, A: Matrix, *, pivoting: bool = False) -> Factored | None:
         """A factor that all ranks make together and all must ask; None if A (n, n) is singular.
 
         With ``pivoting``, where its diagonal has zeros, ``definite`` is not known.
@@ -58,7 +57,7 @@ class Workers(Protocol):
 class OneProcess:
     """SciPy, and one thing after another."""
 
-    def factor(self, A: Any, *, pivoting: bool = False) -> Factored | None:
+    def factor(self, A: Matrix, *, pivoting: bool = False) -> Factored | None:
         """By SuperLU."""
         try:
             return SymmetricLU(A, pivoting=pivoting)
@@ -66,8 +65,8 @@ class OneProcess:
             return None
 
     def operators(
-        self, K: Any, M: Any, rigid: Array | None = None, *, together: bool = False
-    ) -> Any:
+        self, K: Matrix, M: Matrix, rigid: Array | None = None, *, together: bool = False
+    ) -> Searched:
         """The verbs by SciPy."""
         return SciPyOperators(K, M, rigid)
 
@@ -78,7 +77,7 @@ class OneProcess:
         return [function(item) for item in items]
 
 
-def held_solution(workers: Workers, matrices: tuple[Any, Any], held: Index, f: Array) -> Array:
+def held_solution(workers: Workers, matrices: tuple[Matrix, ...], held: Index, f: Array) -> Array:
     """(n,) K^-1 f on all ranks, which all ask, with some dofs at rest.
 
     Of the matrices (n, n), stiffness and mass, the second tells a motion that nothing holds.

@@ -56,8 +56,8 @@ def load(path: str | Path, *, limit: int = MAX_BYTES) -> Any:
         11.775
     """
     path = Path(path)
-    others = {name.removeprefix("load."): follow(place) for name, place in names("takes").items()
-              if name.startswith("load.")}  # fmt: skip
+    loads = {name: place for name, place in names("takes").items() if name.startswith("load.")}
+    others = {name.removeprefix("load."): follow(place) for name, place in loads.items()}
     versions = {name: module.VERSION for name, module in others.items()}
     body, manifest, arrays = native.read(path, versions, limit)
     other = others.get(manifest["schema"])

@@ -1,9 +1,8 @@
 """Files for other programs, by name or by the ending of the file name."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from rom.arguments import one_of, typed
 from rom.body.flexible import FlexibleBody
@@ -22,6 +21,7 @@ from rom.io.programs.superelements import write_radioss, write_simscape
 from rom.io.sid.body import sid_body, standard_input
 from rom.io.sid.dialect import read_sid
 from rom.io.sid.format import write_sid
+from rom.model import Array
 
 SID_SUFFIX = ".sid_fem"
 HOLDING_FORMATS = ("openfast", "openfast-4")  # formats with one free interface
@@ -31,7 +31,7 @@ def _write_sid(body: FlexibleBody, path: str | Path, dialect: str) -> Path:
     return write_sid(standard_input(body), path, dialect=dialect)
 
 
-def _nastran(form: InterfaceForm) -> dict[str, Any]:
+def _nastran(form: InterfaceForm) -> dict[str, Array]:
     return {"KAAX": form.K, "MAAX": form.M, "BAAX": form.D}
 
 
@@ -52,7 +52,7 @@ def _write_abaqus(body: FlexibleBody, path: str | Path) -> Path:
 
 OWN_UNITS = ("npz", "sid", "sid-pysid", "sid-geisler")  # say the units of the body; others are SI
 NONLINEAR_FORMATS = ("npz", "vtu")  # keep the energy at large deflection, or have no need of any
-FORMATS: dict[str, tuple[str, Any]] = {  # name: (ending that chooses it, writer)
+FORMATS: dict[str, tuple[str, Callable[..., Path]]] = {  # name: (ending that chooses it, writer)
     "npz": (".npz", save),
     "vtu": (".vtu", write_vtu),
     "sid": (SID_SUFFIX, partial(_write_sid, dialect="fembs")),

@@ -2,8 +2,11 @@
 
 import os
 import shutil
+import struct
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
@@ -43,6 +46,37 @@ def write_whole(path: str | Path, content: bytes | Callable[[IO[bytes]], object]
     finally:
         Path(name).unlink(missing_ok=True)
     return path
+
+
+def write_lines(path: str | Path, lines: Iterable[str]) -> Path:
+    """Write lines of text, see `write_whole`."""
+    return write_whole(path, ("\n".join(lines) + "\n").encode())
+
+
+@dataclass(slots=True)
+class Line:
+    """A line of a file, for messages."""
+
+    path: Path
+    number: int = 0
+
+    def __str__(self) -> str:
+        return f"{self.path}, line {self.number}"
+
+
+@contextmanager
+def damaged(what: str, where: object = "") -> Iterator[None]:
+    """Turn what wrong text causes, a ValueError, say, into an error that names its place."""
+    try:
+        yield
+    except (ValueError, IndexError, KeyError, OverflowError, struct.error) as error:
+        raise FileFormatError(f"{what}: {error}.", where=str(where)) from error
+
+
+def need(holds: object, otherwise: str) -> None:
+    """Raise a ValueError, for `damaged`, in these words unless something holds."""
+    if not holds:
+        raise ValueError(otherwise)
 
 
 def check_writable(path: str | Path) -> Path:

@@ -1,14 +1,19 @@
 """Solutions under a load that grows in steps, halved where none is found."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import TypeVar
 
-Ahead = Callable[[Any, float], Any]
+State = TypeVar("State")
 
 
 def load_steps(
-    ahead: Ahead, at: Any, *, least: float, first: float = 1.0, growth: float = 1.0
-) -> tuple[float, Any]:
+    ahead: Callable[[State, float], State | None],
+    at: State,
+    *,
+    least: float,
+    first: float = 1.0,
+    growth: float = 1.0,
+) -> tuple[float, State]:
     """How much of a load was reached, one for all of it, and the solution there.
 
     Args:

@@ -4,7 +4,6 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -76,11 +75,9 @@ def make_body(draft: Draft) -> None:
     """Integrate the inertia of the shapes, and mark the interfaces: a body on its mean axes."""
     draft.watch.begin("body")
     draft.E = canonical_columns(draft.bare, draft.Psi @ draft.elastic.V, draft.model)
-    provenance = draft.model.provenance | {"reduction": _described(draft)}
-    draft.body = flexible_body(
-        draft.model, draft.bare, draft.E, draft.elastic.omega, ties=draft.connection.ties,
-        name=draft.name, provenance=provenance,
-    )  # fmt: skip
+    made = {"name": draft.name, "ties": draft.connection.ties}
+    made["provenance"] = draft.model.provenance | {"reduction": _described(draft)}
+    draft.body = flexible_body(draft.model, draft.bare, draft.E, draft.elastic.omega, **made)
 
 
 def recover(draft: Draft) -> None:
@@ -126,7 +123,7 @@ def at_work(draft: Draft, label: str, begun: int) -> Iterator[None]:
         raise
 
 
-def _described(draft: Draft) -> dict[str, Any]:
+def _described(draft: Draft) -> dict[str, object]:
     found = draft.basis
     alone = all(re.fullmatch(r"(rigid|free) \d+", label) for label in found.labels)
     return {

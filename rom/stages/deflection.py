@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from rom.body.frame import at_large_deflection
 from rom.body.nonlinear.cauchy import refuse_many
-from rom.body.nonlinear.geometric import enriched
+from rom.body.nonlinear.geometric import Bent, enriched
 from rom.body.nonlinear.sampled import sampled_energy
 from rom.body.projection import cauchy_recovery, stressed_nodes
 from rom.checks.certificate import certify
@@ -49,9 +49,8 @@ def stages(draft: Draft) -> list[Stage]:
 def enrich(draft: Draft) -> None:
     """Add the shapes that the range of loads asks for."""
     draft.watch.begin("derivatives of shapes")
-    draft.basis = enriched(
-        draft.nonlinear, draft.model, draft.ops, draft.connection, draft.basis, draft.reference
-    )
+    body = draft.model, draft.ops, draft.connection, draft.basis
+    draft.basis = enriched(Bent(draft.nonlinear, *body, draft.reference))
     if draft.stress:
         refuse_many(stressed_nodes(draft.model).size, draft.basis.Psi.shape[1] - 6)
 

@@ -9,7 +9,8 @@ from scipy.sparse import bmat, csc_matrix, csr_matrix, identity, lil_matrix, vst
 from scipy.sparse.linalg import LinearOperator, eigs, eigsh, splu
 
 from rom.body.nonlinear.ranges import Load
-from rom.eigen.verbs import mean_motion
+from rom.eigen.connection import Connection
+from rom.eigen.verbs import Matrix, mean_motion
 from rom.eigen.workers import ONE_PROCESS, Workers
 from rom.model import Array, FEModel, Index, Interface
 from rom.paths.load_steps import load_steps
@@ -52,8 +53,7 @@ class TurningSection:
 
     def force(self, B: Array, moment: Array) -> Array:
         """(3 k,) forces of a moment (3,), axes at rest, on the nodes [N]."""
-        U, _, Vt = np.linalg.svd(B)
-        R = U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt
+        R = nearest_rotation(B)
         P = B @ R.T
         x = np.linalg.solve(np.trace(P) * np.eye(3) - P, moment)
         return np.cross(x, self.weights @ R.T).ravel()
@@ -72,6 +72,12 @@ class TurningSection:
         return X, Y
 
 
+def nearest_rotation(B: Array) -> Array:
+    """(3, 3) rotation nearest to a matrix, R of B = P R."""
+    U, _, Vt = np.linalg.svd(B)
+    return U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt
+
+
 class HeldSolid:
     """A full model at finite strain, motions of its interfaces held in the mean.
 
@@ -87,9 +93,15 @@ class HeldSolid:
     """
 
     def __init__(
-        self, solid: Any, M: Any, C: Any, T: Any = None, comm: Any = None,
-        sections: Sequence[TurningSection] = (), workers: Workers = ONE_PROCESS,
-    ):  # fmt: skip
+        self,
+        solid: Any,
+        M: Matrix,
+        C: Matrix,
+        T: Matrix = None,
+        comm: Any = None,
+        sections: Sequence[TurningSection] = (),
+        workers: Workers = ONE_PROCESS,
+    ):
         self.solid, self.comm, self.sections, self.workers = solid, comm, sections, workers
         self.T = csr_matrix(identity(M.shape[0]) if T is None else T)
         self.M, self.C = self.T.T @ M @ self.T, csr_matrix(C) @ self.T
@@ -97,16 +109,16 @@ class HeldSolid:
 
     @classmethod
     def of(
-        cls, model: FEModel, connection: Any, reference: str, held: list[Load], *,
-        neo_hookean: bool = False,
-    ) -> "HeldSolid":  # fmt: skip
+        cls, model: FEModel, connection: Connection, reference: str, held: list[Load], **law: bool
+    ) -> "HeldSolid":
         """That of a model in interface coordinates, its reference and further motions held."""
-        ops, C = connection.ops, lil_matrix((6 + len(held), model.n_dofs))
+        ops: Any = connection.ops
+        C = lil_matrix((6 + len(held), model.n_dofs))
         for k, load in enumerate([*(Load(reference, k) for k in range(6)), *held]):
             interface = model.interfaces[load.interface]
             C[k, interface.dofs] = mean_motion(interface)[load.component]
         T = None if ops.T is None else rows_of(ops.T)
-        solid = model.stresses.finite_strain(neo_hookean=neo_hookean)
+        solid = model.stresses.finite_strain(**law)
         M = ops.gathered(model.operators.M)
         return cls(solid, M, C, T, ops.comm, workers=model.operators.workers)
 
@@ -118,10 +130,12 @@ class HeldSolid:
         """(m,) equilibrium in a under a load W [N, N m] near u (n,); None if not found."""
         if (found := self._newton(self.inside.solve(self.T.T @ u), W)) is not None:
             return found
-        done, a = load_steps(
-            lambda a, share: self._newton(a, share * W), np.zeros(self.T.shape[1]),
-            least=MIN_LOAD_STEP, first=0.25,
-        )  # fmt: skip
+
+        def ahead(a: Array, share: float) -> Array | None:
+            return self._newton(a, share * W)
+
+        rest = np.zeros(self.T.shape[1])
+        done, a = load_steps(ahead, rest, least=MIN_LOAD_STEP, first=0.25)
         return a if done == 1.0 else None
 
     def _newton(self, a: Array, W: Array) -> Array | None:
@@ -182,8 +196,8 @@ class HeldSolid:
         def still(f: Array) -> Array:
             return np.asarray(factor.solve(f)[: a.size])
 
-        pairs = [section.stiffness(u, moment) for section, moment in self._moments(u, W)
-                 if moment.any()]  # fmt: skip
+        turned = [(section, moment) for section, moment in self._moments(u, W) if moment.any()]
+        pairs = [section.stiffness(u, moment) for section, moment in turned]
         if not pairs:
             return still
         X, Y = (self.T.T @ np.hstack(part) for part in zip(*pairs, strict=True))
@@ -216,8 +230,8 @@ class HeldSolid:
         if not symmetric:
             squares = 1 / eigs(inverse(self.M.dot), N_TANGENT, **options).real
         else:
-            squares = eigsh(self.M, N_TANGENT, self.M, sigma=0.0, OPinv=inverse(lambda x: x),
-                            **options)  # fmt: skip
+            options |= {"sigma": 0.0, "OPinv": inverse(lambda x: x)}
+            squares = eigsh(self.M, N_TANGENT, self.M, **options)
         return np.sqrt(np.sort(np.maximum(squares, 0.0)))
 
     def compliances(self, soft: Callable[[Array], Array] | None, F: Array) -> Array:
@@ -228,7 +242,7 @@ class HeldSolid:
         return np.array([f @ soft(np.r_[f, held]) for f in forces.T])
 
 
-def rows_of(A: Any) -> csr_matrix:
+def rows_of(A: Matrix) -> csr_matrix:
     """All rows of a distributed PETSc matrix, on every rank, as a SciPy matrix."""
     starts, columns, values = A.getValuesCSR()
     mine = csr_matrix((values, columns, starts), shape=(len(starts) - 1, A.getSize()[1]))

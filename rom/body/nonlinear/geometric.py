@@ -26,9 +26,24 @@ from scipy.sparse import issparse
 from rom import rotation
 from rom.body.nonlinear.full import HeldSolid
 from rom.body.nonlinear.quartic import Quartic
-from rom.body.nonlinear.ranges import Geometric, Load, axis_point, held_motions, nodal_forces
+from rom.body.nonlinear.ranges import (
+    Geometric,
+    Load,
+    axis_point,
+    further_loads,
+    held_motions,
+    nodal_forces,
+)
 from rom.body.nonlinear.statics import Held, free_motions, newton, passages
-from rom.eigen.verbs import Operators, column_blocks, mean_motion, quadratic, whole_clusters
+from rom.eigen.connection import Connection, Tie
+from rom.eigen.verbs import (
+    Operators,
+    column_blocks,
+    mean_motion,
+    own_rows,
+    quadratic,
+    whole_clusters,
+)
 from rom.errors import ConfigError, InterfaceError, ModelError, ResourceError, warn
 from rom.model import Array, Basis, FEModel, Index, Interface
 from rom.names import check_known, offered
@@ -53,6 +68,37 @@ FLOP_RATE = 1e10  # of one core in a product of matrices [1/s]
 # stretch at which the force of St. Venant-Kirchhoff material, proportional to F^3 - F, has its
 # extremum: from there on a compressed layer gives way, and the equations are no longer elliptic
 ELLIPTIC_STRETCH = 3.0**-0.5
+
+
+@dataclass(frozen=True)
+class Bent:
+    """A reduction under way, and the range of loads by which the body is to bend far.
+
+    Attributes:
+        geometric: the range.
+        model: the full model.
+        ops: its operators, in nodal dofs.
+        connection: the model in interface coordinates.
+        basis: constraint and fixed-interface modes, and the factor of K_ii.
+        reference: the interface from which the body is seen.
+    """
+
+    geometric: Geometric
+    model: FEModel
+    ops: Operators
+    connection: Connection
+    basis: Basis
+    reference: str
+
+    @property
+    def held(self) -> list[Load]:
+        """Each motion held beside the reference, as the load that would move it."""
+        return held_motions(self.geometric, self.model.interfaces)
+
+    def nodal(self, loads: list[Load]) -> Array:
+        """(n_local, l) forces of loads on the nodes of this process [N]."""
+        about = axis_point(self.geometric, self.model, self.reference)
+        return nodal_forces(loads, self.model, self.ops, about)
 
 
 @dataclass(frozen=True)
@@ -107,18 +153,15 @@ class Section:
         return np.asarray(turned - np.einsum("raak,k->r", self.tractions, moment))
 
 
-def enriched(
-    geometric: Geometric, model: FEModel, ops: Operators, connection: Any, basis: Basis,
-    reference: Any,
-) -> Basis:  # fmt: skip
+def enriched(bent: Bent) -> Basis:
     """The basis with the shapes that its load range asks for, seen from a reference interface.
 
-    It has constraint and fixed-interface modes and the factor of K_ii, and a stable equilibrium
-    everywhere within the range.
+    There is a stable equilibrium everywhere within the range.
     """
-    refuse(geometric, model, connection, basis, reference)
-    energy = model.stresses.large_strain()
-    shapes, theta = _with_derivatives(geometric, model, ops, connection, basis, reference, energy)
+    _refuse(bent)
+    geometric, ops, basis = bent.geometric, bent.ops, bent.basis
+    energy = bent.model.stresses.large_strain()
+    shapes, theta = _with_derivatives(bent, energy)
     quartic = Quartic.from_gram(energy.gram(shapes.E, exact=False), shapes.E.shape[1])
     passed = _states(geometric, quartic, shapes)
     states = np.vstack(passed)
@@ -130,10 +173,10 @@ def enriched(
     return replace(basis, Psi=np.hstack([basis.Psi, added]), labels=(*basis.labels, *labels))
 
 
-def refuse(
-    geometric: Geometric, model: FEModel, connection: Any, basis: Basis, reference: Any
-) -> None:
+def _refuse(bent: Bent) -> None:
     """Say what does not go together with large deflection."""
+    geometric, model, connection = bent.geometric, bent.model, bent.connection
+    basis, reference = bent.basis, bent.reference
     if model.stresses is None:
         raise ConfigError(
             "the model has no finite elements, from which alone large strain follows.",
@@ -176,7 +219,7 @@ def refuse(
             )
 
 
-def _turns(tie: Any, interface: Interface) -> bool:
+def _turns(tie: Tie, interface: Interface) -> bool:
     """Whether a section can turn far: it averages, has all dofs, or any affine motion."""
     if not tie.removed.size or tie.kept.size:
         return True
@@ -200,35 +243,30 @@ def _normal(basis: Basis) -> Array:
     return basis.Psi[:, basis.Psi.shape[1] - basis.omega.size :]
 
 
-def _with_derivatives(
-    geometric: Geometric, model: FEModel, ops: Operators, connection: Any, basis: Basis,
-    reference: str, energy: Any,
-) -> tuple[Shapes, Array]:  # fmt: skip
+def _with_derivatives(bent: Bent, energy: Any) -> tuple[Shapes, Array]:
     """All shapes as nodal displacements, and the derivatives in interface coordinates."""
-    n_b = connection.boundary.size
+    geometric, ops, connection, basis = bent.geometric, bent.ops, bent.connection, bent.basis
+    n_b, interfaces = connection.boundary.size, bent.model.interfaces
     Psi = connection.ops.expand(basis.Psi)
-    root = model.interfaces[reference]
+    root = interfaces[bent.reference]
     still = mean_motion(root) @ ops.rows(Psi[:, :n_b], root.dofs)
     N = free_motions(still)
     moving = Psi[:, :n_b] @ N
     K = quadratic(ops, ops.apply_K, moving)
-    held = held_motions(geometric, model.interfaces)
-    every = [load for name in geometric.loads for k in range(6)
-             if (load := Load(name, k)) not in held]  # fmt: skip
-    turning = [Load("", load.component) for load in geometric.components() if not load.interface]
-    about = axis_point(geometric, model, reference)
+    components, every = geometric.components(), further_loads(geometric, bent.held)
+    turning = [Load("", load.component) for load in components if not load.interface]
 
     def forces(loads: list[Load], E: Array) -> Array:
-        return ops.gram(E, nodal_forces(loads, model, ops, about))
+        return ops.gram(E, bent.nodal(loads))
 
-    F = free_motions(forces(held, moving).T)
+    F = free_motions(forces(bent.held, moving).T)
     borne = F @ np.linalg.solve(F.T @ K @ F, F.T @ forces(every + turning, moving))
     # what turns bears its own load along the way: interfaces held, and K-orthogonal to their motion
-    along = basis.held(connection.ops.restrict(nodal_forces(turning, model, ops, about)))
+    along = basis.held(connection.ops.restrict(bent.nodal(turning)))
     static = moving @ borne
     static[:, len(every) :] += connection.ops.expand(along)
-    bent = [name for name, load in geometric.loads.items() if np.any(load[3:])]
-    units = [nodal_forces([Load(name, k) for k in (3, 4, 5)], model, ops, about) for name in bent]
+    turned = [name for name, load in geometric.loads.items() if np.any(load[3:])]
+    units = [bent.nodal([Load(name, k) for k in (3, 4, 5)]) for name in turned]
     squeezed = [basis.held(connection.ops.restrict(_turnable(F))) for F in units]
     n_modes = min(geometric.n_modes, basis.omega.size)
     if n_modes:
@@ -241,29 +279,24 @@ def _with_derivatives(
     size = np.diag(quadratic(ops, ops.apply_K, active))
     further = [along, *squeezed]
     if geometric.snapshots:
-        further.append(_snapshots(geometric, model, ops, connection, basis, reference))
-    theta = _derivatives(connection.ops, basis, energy, (active, size), further)
+        further.append(_snapshots(bent))
+    theta = _derivatives(bent, energy, (active, size), further)
     E = np.hstack([moving, active[:, static.shape[1] :], connection.ops.expand(theta)])
-    components = geometric.components()
-    sections = [Section.of(ops, F, E, _moments(name, components))
-                for name, F in zip(bent, units, strict=True)]  # fmt: skip
-    loads, still = forces(components, E), forces(held, E).T
+    moments = [_moments(name, components) for name in turned]
+    sections = [Section.of(ops, F, E, of) for F, of in zip(units, moments, strict=True)]
+    loads, still = forces(components, E), forces(bent.held, E).T
     # a given number of shapes is spent on the loads of the range alone
     beside = forces(every if geometric.n_shapes is None else [], E)
-    turns = {name: mean_motion(one)[3:] @ ops.rows(E, one.dofs)
-             for name, one in model.interfaces.items() if name in geometric.loads}  # fmt: skip
+    loaded = {name: one for name, one in interfaces.items() if name in geometric.loads}
+    turns = {name: mean_motion(one)[3:] @ ops.rows(E, one.dofs) for name, one in loaded.items()}
     return Shapes(E, loads, beside, turns, still, n_basis, sections), theta
 
 
-def _snapshots(
-    geometric: Geometric, model: FEModel, ops: Operators, connection: Any, basis: Basis,
-    reference: str,
-) -> Array:  # fmt: skip
+def _snapshots(bent: Bent) -> Array:
     """(n_local, c) full states at the largest loads, in interface coordinates at rest there."""
-    full = HeldSolid.of(model, connection, reference, held_motions(geometric, model.interfaces))
-    about = axis_point(geometric, model, reference)
-    units = full.whole(nodal_forces(geometric.components(), model, ops, about))
-    mine = slice(connection.ops.first, connection.ops.first + connection.ops.n_local)
+    geometric, connection = bent.geometric, bent.connection
+    full = HeldSolid.of(bent.model, connection, bent.reference, bent.held)
+    units = full.whole(bent.nodal(geometric.components()))
     n_b, found = connection.boundary.size, []
     for case, share in product(geometric.load_cases(), SNAPSHOT_SHARES):
         a = full.state(np.zeros(len(units)), share * units @ case)
@@ -273,14 +306,17 @@ def _snapshots(
                 where=f"load {np.round(case, 3).tolist()} of the range",
                 hint="Ask for smaller loads, or leave snapshots out.",
             )
-        found.append(a[mine] - basis.Psi[:, :n_b] @ a[connection.boundary])
+        static = bent.basis.Psi[:, :n_b] @ a[connection.boundary]
+        found.append(own_rows(connection.ops, a) - static)
     return np.array(found).T
 
 
 def _moments(interface: str, components: list[Load]) -> Array:
     """(3, l) moments about the axes of the components of a range on an interface [N m]."""
-    return np.array([[load.largest * (load.interface == interface and load.component == k)
-                      for load in components] for k in (3, 4, 5)])  # fmt: skip
+    found = np.zeros((6, len(components)))
+    for k, load in enumerate(components):
+        found[load.component, k] = load.largest * (load.interface == interface)
+    return found[3:]
 
 
 def _turnable(F: Array) -> Array:
@@ -326,9 +362,8 @@ def _refuse_collapse(geometric: Geometric, stretches: Array, counts: list[int]) 
 
 
 def _derivatives(
-    ops: Operators, basis: Basis, energy: Any, dragging: tuple[Array, Array],
-    further: list[Array],
-) -> Array:  # fmt: skip
+    bent: Bent, energy: Any, dragging: tuple[Array, Array], further: list[Array]
+) -> Array:
     """(n_local, p) derivatives in interface coordinates, orthonormal in K and to normal modes.
 
     Two shapes that drag nothing along, as pull and twist of a prism, have round-off as their
@@ -336,7 +371,7 @@ def _derivatives(
     (n_local, a), with (a,) twice their energies [J]; further shapes (n_local, t) of the same span
     are in interface coordinates; of each kind those with much less energy are round-off.
     """
-    active, size = dragging
+    (active, size), ops, basis = dragging, bent.connection.ops, bent.basis
     i, j = np.triu_indices(active.shape[1])
     pairs: Index = np.column_stack([i, j])
     theta = np.zeros((ops.n_local, len(pairs)))
@@ -364,8 +399,8 @@ def _states(geometric: Geometric, quartic: Quartic, shapes: Shapes) -> list[Arra
     for case in geometric.load_cases():
         try:
             passed = passages(quartic, np.outer(share, shapes.loads @ case), shapes.held)
-            found += [_turned(quartic, shapes, x * case, states)
-                      for x, states in zip(share, passed, strict=True)]  # fmt: skip
+            pairs = zip(share, passed, strict=True)
+            found += [_turned(quartic, shapes, x * case, states) for x, states in pairs]
         except ModelError as error:
             error.where = error.where or f"load {np.round(case, 3).tolist()} of the range"
             raise
@@ -400,8 +435,8 @@ def _warn_of_turns(geometric: Geometric, quartic: Quartic, shapes: Shapes, state
     """
     N = free_motions(shapes.held)
     small = N @ np.linalg.solve(N.T @ quartic.K @ N, N.T @ shapes.loads)
-    moments = [bool(load.interface) and not np.any(geometric.loads[load.interface][:3])
-               for load in geometric.components()]  # fmt: skip
+    pushed = {name for name, load in geometric.loads.items() if np.any(load[:3])} | {""}
+    moments = [load.interface not in pushed for load in geometric.components()]
     for name, turn in shapes.turns.items():
         sines = np.linalg.norm(turn @ states.T, axis=0)
         by_moments = np.linalg.norm(turn @ small[:, moments], axis=0)

@@ -1,6 +1,6 @@
 """The loads under which a body is to deflect far, as forces on its nodes."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from itertools import combinations, product
 from typing import Annotated, Any, ClassVar
@@ -128,19 +128,25 @@ class Geometric:
         components = self.components()
         units = np.eye(len(components))
         alone = [s * unit for unit, load in zip(units, components, strict=True) for s in load.signs]
-        skew = [(a * units[i] + b * units[j]) / np.sqrt(2)
-                for i, j in combinations(range(len(units)), 2)
-                for a, b in product(components[i].signs, components[j].signs)]  # fmt: skip
-        return np.array(alone + skew)
+        for (one, u), (other, v) in combinations(zip(components, units, strict=True), 2):
+            signs = product(one.signs, other.signs)
+            alone += [(a * u + b * v) / np.sqrt(2) for a, b in signs]
+        return np.array(alone)
 
 
-def held_motions(geometric: Geometric, known: Any) -> list[Load]:
+def held_motions(geometric: Geometric, known: Iterable[str]) -> list[Load]:
     """Each motion held beside the reference, as the load that would move it."""
     return [
         Load(name, DIRECTIONS.index(direction))
         for name, directions in supports(geometric.fixed, known).items()
         for direction in directions or DIRECTIONS
     ]
+
+
+def further_loads(geometric: Geometric, held: list[Load]) -> list[Load]:
+    """Unit forces and moments on the interfaces of a range, but those on what is held."""
+    every = (Load(name, k) for name in geometric.loads for k in range(len(FORCES)))
+    return [load for load in every if load not in held]
 
 
 def axis_point(geometric: Geometric, model: FEModel, reference: str) -> Array:

@@ -98,7 +98,7 @@ class Sampled(Energy):
 
 def sampled_energy(
     body: Any, geometric: Geometric, energy: Any, E: Array
-) -> tuple[Sampled, dict[str, Any]]:
+) -> tuple[Sampled, dict[str, float]]:
     """The energy of a body of neo-Hookean material by a few elements, and how it was trained.
 
     The body is seen from its reference, and has nodal shapes E (n, r); its finite elements are
@@ -114,15 +114,11 @@ def sampled_energy(
     G, w, cell, C = energy.at_points(E)
     every = Sampled(body.K, G, w, np.column_stack([C[:, 0, 1], C[:, 3, 3]]))
     _refuse_grain(C, every.lame)
-    units = np.array(
-        [
-            load.largest * body.forces_on({load.interface: np.eye(6)[load.component]})
-            for load in geometric.components()
-        ]
-    )
-    still = body.mean_rows(geometric.fixed)
-    states = np.vstack([follow(every, np.outer(STEP_SHARES, case @ units), still)
-                        for case in geometric.load_cases()])  # fmt: skip
+    sixes = [(x.interface, x.largest * np.eye(6)[x.component]) for x in geometric.components()]
+    units = np.array([body.forces_on({name: six}) for name, six in sixes])
+    still, cases = body.mean_rows(geometric.fixed), geometric.load_cases()
+    paths = [follow(every, np.outer(STEP_SHARES, case @ units), still) for case in cases]
+    states = np.vstack(paths)
     assert geometric.sampling is not None
     share, error = chosen(every, cell, states, geometric.sampling)
     kept = share[cell] > 0

@@ -1,12 +1,14 @@
 """Deflections of a body on its supports under loads that keep their direction."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Any
 
 import numpy as np
 from scipy.linalg import eigh, null_space
 
+from rom.body.nonlinear.quartic import Energy
 from rom.errors import ModelError, SolverError
 from rom.model import Array
 from rom.paths.arc_length import Curve, Point
@@ -22,31 +24,20 @@ LOCATION_RTOL = 1e-7  # of a step, to which a stiffness that vanishes is found
 MAX_POINTS = 400  # of a path between two loads
 
 
-@dataclass(frozen=True)
-class Held:
+class Held(Energy):
     """The strain energy of a body with some of its motions held.
 
-    Attributes:
-        energy: of all coordinates q (r,).
+    Args:
+        whole: energy of all coordinates q (r,).
         N: (r, m) motions that are left, q = N y.
     """
 
-    energy: Any
-    N: Array
-
-    @property
-    def n(self) -> int:
-        """Number m of motions left."""
-        return int(self.N.shape[1])
-
-    @cached_property
-    def K(self) -> Array:
-        """(m, m) stiffness without load [N/m]."""
-        return self.N.T @ self.energy.K @ self.N
+    def __init__(self, whole: Energy, N: Array):
+        self.whole, self.N, self.K = whole, N, N.T @ whole.K @ N
 
     def expansion(self, y: Array) -> tuple[float, Array, Array]:
         """Energy [J], force (m,) [N] and tangent (m, m) [N/m] at y (m,) at once."""
-        U, force, K = self.energy.expansion(self.N @ y)
+        U, force, K = self.whole.expansion(self.N @ y)
         return U, self.N.T @ force, self.N.T @ K @ self.N
 
 
@@ -57,7 +48,7 @@ def free_motions(rows: Array) -> Array:
     return null_space(rows) if len(rows) else np.eye(rows.shape[1])
 
 
-def follow(energy: Any, loads: Array, held: Array | None = None) -> Array:
+def follow(energy: Energy, loads: Array, held: Array | None = None) -> Array:
     """(s, r) coordinates in equilibrium with loads (s, r) [N], one after the other from rest.
 
     Supports let rows (h, r) of coordinates vanish. A load without stable equilibrium is refused.
@@ -65,7 +56,7 @@ def follow(energy: Any, loads: Array, held: Array | None = None) -> Array:
     return np.array([passed[-1] for passed in passages(energy, loads, held)])
 
 
-def passages(energy: Any, loads: Array, held: Array | None = None) -> list[Array]:
+def passages(energy: Energy, loads: Array, held: Array | None = None) -> list[Array]:
     """For each load the states (k, r) on the way to it, itself the last; see `follow`.
 
     Where a body snaps, these are the states of its path by arc length, stable or not.
@@ -81,39 +72,41 @@ def passages(energy: Any, loads: Array, held: Array | None = None) -> list[Array
 
 def _led_to(body: Held, y: Array, start: Array, end: Array) -> list[Array]:
     """The equilibrium at the end of a stretch of load, halved where Newton's method fails."""
-    done, y = load_steps(
-        lambda y, share: newton(body, y, start + share * (end - start)),
-        y, least=MIN_LOAD_STEP, growth=2.0,
-    )  # fmt: skip
+
+    def ahead(y: Array, share: float) -> Array | None:
+        return newton(body, y, start + share * (end - start))
+
+    done, y = load_steps(ahead, y, least=MIN_LOAD_STEP, growth=2.0)
     return [y] if done == 1.0 else _beyond(body, y, (start, end), done)
 
 
 def _beyond(body: Held, y: Array, stretch: tuple[Array, Array], done: float) -> list[Array]:
     """States on the path by arc length, from a share of a stretch of load to its end."""
-    path = Stretch(body, *stretch)
-    curve, passed = Curve(path, 1.0), list[Array]()
-    try:
-        steps = curve.steps(curve.start(y, done, forwards=True), LONGEST_STEP)
-        for _, (one, h, two) in zip(range(MAX_POINTS), steps, strict=False):
+    path, passed = Stretch(body, *stretch), list[Array]()
+    with _found_beyond(done):
+        for curve, one, h, two in path.steps(y, done):
             if two.p < 1.0:
                 passed.append(two.at)
                 continue
             _, last = curve.located(one, h, lambda x: x.p - 1.0)
             stable = newton(body, last.at, stretch[1])
-            if stable is None or not path.size(stable - last.at) < LONGEST_STEP:
-                break
-            return [*passed, stable]
+            if stable is not None and path.size(stable - last.at) < LONGEST_STEP:
+                return [*passed, stable]
+            break
+        raise SolverError("the path leads past the load.")
+
+
+@contextmanager
+def _found_beyond(done: float) -> Iterator[None]:
+    """Where no path leads from a share of a load to its end, there is no equilibrium."""
+    try:
+        yield
     except SolverError as error:
-        raise _lost(done) from error
-    raise _lost(done)
-
-
-def _lost(done: float) -> ModelError:
-    return ModelError(
-        f"no stable equilibrium was found beyond {done:.4g} of a step of load.",
-        hint="Ask for smaller loads: the body buckles before, or gives way. A piece of a slender "
-        "body that is cut (rom.fe.pieces) has more of them to share the turning with.",
-    )
+        raise ModelError(
+            f"no stable equilibrium was found beyond {done:.4g} of a step of load.",
+            hint="Ask for smaller loads: the body buckles before, or gives way. A piece of a "
+            "slender body that is cut (rom.fe.pieces) has more of them to share the turning with.",
+        ) from error
 
 
 @dataclass(frozen=True)
@@ -128,6 +121,14 @@ class Stretch:
     body: Held
     start: Array
     end: Array
+
+    def steps(self, y: Array, done: float) -> Iterator[tuple[Curve, Point, float, Point]]:
+        """The path from a state on, and its neighbouring points, with the arc length between."""
+        curve = Curve(self, 1.0)
+        steps = curve.steps(curve.start(y, done, forwards=True), LONGEST_STEP)
+        for _, step in zip(range(MAX_POINTS), steps, strict=False):
+            yield curve, *step
+        raise SolverError(f"the path is longer than {MAX_POINTS} points.")
 
     def corrections(self, at: Array, p: float) -> tuple[Array, Array]:
         """Newton's correction, and the change of the state per share of the load."""
@@ -165,7 +166,8 @@ class Stretch:
         return float(largest @ np.linalg.solve(self.body.K, largest))
 
 
-def critical_shares(energy: Any, load: Array, held: Array) -> Array:
+@_found_beyond(0.0)
+def critical_shares(energy: Energy, load: Array, held: Array) -> Array:
     """(k,) shares, at most one, of a load (r,) [N] at which a stiffness vanishes on the way.
 
     In the order in which they are passed on the path by arc length, limits and bifurcations; one
@@ -173,25 +175,20 @@ def critical_shares(energy: Any, load: Array, held: Array) -> Array:
     """
     body = Held(energy, free_motions(held))
     rest = np.zeros(body.n)
-    path = Stretch(body, rest, load @ body.N)
-    curve, found = Curve(path, 1.0), list[float]()
-    try:
-        steps = curve.steps(curve.start(rest, 0.0, forwards=True), LONGEST_STEP)
-        for _, (one, h, two) in zip(range(MAX_POINTS), steps, strict=False):
-            below = [int(np.count_nonzero(path.stiffness(x.at) < 0)) for x in (one, two)]
-            points = [
-                curve.located(one, h, partial(path.stiffness_of, k), LOCATION_RTOL)
-                for k in range(min(below), max(below))
-            ]
-            found += [point.p for _, point in sorted(points, key=lambda x: x[0])]
-            if two.p >= 1.0:
-                return np.array([p for p in found if p <= 1.0])
-    except SolverError as error:
-        raise _lost(0.0) from error
-    raise _lost(0.0)
+    path, found = Stretch(body, rest, load @ body.N), list[float]()
+    for curve, one, h, two in path.steps(rest, 0.0):
+        below = [int(np.count_nonzero(path.stiffness(x.at) < 0)) for x in (one, two)]
+        points = [
+            curve.located(one, h, partial(path.stiffness_of, k), LOCATION_RTOL)
+            for k in range(min(below), max(below))
+        ]
+        found += [point.p for _, point in sorted(points, key=lambda x: x[0])]
+        if two.p >= 1.0:
+            break
+    return np.array([p for p in found if p <= 1.0])
 
 
-def newton(energy: Any, q: Array, load: Array) -> Array | None:
+def newton(energy: Energy, q: Array, load: Array) -> Array | None:
     """The minimum (r,) of energy less work of a load (r,) [N] near q (r,); None if there is none.
 
     Newton's method with a search along each increment.
@@ -215,7 +212,7 @@ def newton(energy: Any, q: Array, load: Array) -> Array | None:
 
 
 def _descent(
-    energy: Any, q: Array, load: Array, step: Array, slope: float, start: float
+    energy: Energy, q: Array, load: Array, step: Array, slope: float, start: float
 ) -> tuple[Array, tuple[float, Array, Array]] | None:
     """Where a step, or a half of it and so on, falls from a start by a slope; None if nowhere."""
     share = 1.0

@@ -11,9 +11,9 @@ import json
 import struct
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from rom import rotation
 from rom.io.files import write_whole
@@ -22,6 +22,7 @@ from rom.model import Array, Index
 FLOAT_TYPE, UNSIGNED_TYPE = 5126, 5125  # componentType
 VERTICES_TARGET, INDICES_TARGET = 34962, 34963  # target of a bufferView
 KINDS = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
+Entry = dict[str, object]  # of the JSON
 SHAPE_RTOL = 1e-6  # of the largest displacement: shapes below are left out
 
 
@@ -54,16 +55,16 @@ class MovingMesh:
 class _Document:
     """A file as it grows: its JSON and its one buffer."""
 
-    json: dict[str, Any]
+    lists: dict[str, list[Entry]] = field(default_factory=dict)
     data: bytearray = field(default_factory=bytearray)
 
-    def put(self, kind: str, entry: dict[str, Any]) -> int:
-        self.json.setdefault(kind, []).append(entry)
-        return len(self.json[kind]) - 1
+    def put(self, kind: str, entry: Entry) -> int:
+        self.lists.setdefault(kind, []).append(entry)
+        return len(self.lists[kind]) - 1
 
     def accessor(
         self,
-        values: Any,
+        values: npt.ArrayLike,
         *,
         component: int = FLOAT_TYPE,
         target: int | None = None,
@@ -71,11 +72,11 @@ class _Document:
     ) -> int:
         """Add an array (m,) or (m, c)."""
         A = np.ascontiguousarray(values, dtype="<f4" if component == FLOAT_TYPE else "<u4")
-        view = {"buffer": 0, "byteOffset": len(self.data), "byteLength": A.nbytes}
+        view: Entry = {"buffer": 0, "byteOffset": len(self.data), "byteLength": A.nbytes}
         self.data += A.tobytes()
         if target is not None:
             view["target"] = target
-        entry = {
+        entry: Entry = {
             "bufferView": self.put("bufferViews", view),
             "componentType": component,
             "count": len(A),
@@ -103,16 +104,15 @@ def write_glb(
         ConfigError: if the place is not writable.
         ResourceError: if the disk is full.
     """
-    generator = {"version": "2.0", "generator": "fenicsx-rom"}
-    document = _Document({"asset": generator, "scene": 0})
-    root = document.put("nodes", {"name": "world", "rotation": _scalar_last(upright(up))})
+    document, samplers, channels = _Document(), list[Entry](), list[Entry]()
+    children = list(range(1, 1 + len(bodies)))
+    world: Entry = {"name": "world", "rotation": _scalar_last(upright(up)), "children": children}
+    root = document.put("nodes", world)
     clock = document.accessor(times, bounds=True)
-    motion: dict[str, Any] = {"name": title, "samplers": [], "channels": []}
     for body in bodies:
-        _add(document, body, clock, motion)
-    document.json["nodes"][root]["children"] = list(range(1, 1 + len(bodies)))
-    document.json["scenes"] = [{"name": title, "nodes": [root]}]
-    document.json["animations"] = [motion]
+        _add(document, body, clock, (samplers, channels))
+    document.put("scenes", {"name": title, "nodes": [root]})
+    document.put("animations", {"name": title, "samplers": samplers, "channels": channels})
     return write_whole(path, _packed(document))
 
 
@@ -125,31 +125,33 @@ def upright(up: Array) -> Array:
     return p / np.linalg.norm(p)
 
 
-def _add(document: _Document, body: MovingMesh, clock: int, motion: dict[str, Any]) -> None:
+def _add(
+    document: _Document, body: MovingMesh, clock: int, motion: tuple[list[Entry], list[Entry]]
+) -> None:
     shapes, weights = _targets(body)
     points = document.accessor(body.points, target=VERTICES_TARGET, bounds=True)
     corners = body.triangles.ravel()
     indices = document.accessor(corners, component=UNSIGNED_TYPE, target=INDICES_TARGET)
-    primitive: dict[str, Any] = {"attributes": {"POSITION": points}, "indices": indices}
+    primitive: Entry = {"attributes": {"POSITION": points}, "indices": indices}
     primitive["material"] = document.put("materials", _material(body.colour))
-    mesh: dict[str, Any] = {"name": body.name, "primitives": [primitive]}
+    mesh: Entry = {"name": body.name, "primitives": [primitive]}
     if shapes:
         primitive["targets"] = [
             {"POSITION": document.accessor(u, target=VERTICES_TARGET, bounds=True)} for u in shapes
         ]
         mesh["weights"] = weights[0].tolist()
     quaternion = _scalar_last(rotation.continuous(body.orientation))
-    node = {"name": body.name, "mesh": document.put("meshes", mesh)}
+    node: Entry = {"name": body.name, "mesh": document.put("meshes", mesh)}
     node |= {"translation": body.origin[0].tolist(), "rotation": quaternion[0]}
     number = document.put("nodes", node)
     tracks = {"translation": body.origin, "rotation": np.array(quaternion)}
     if shapes:
         tracks["weights"] = weights.ravel()
+    samplers, channels = motion
     for kind, values in tracks.items():
-        sampler = {"input": clock, "output": document.accessor(values), "interpolation": "LINEAR"}
-        motion["samplers"].append(sampler)
-        target = {"node": number, "path": kind}
-        motion["channels"].append({"sampler": len(motion["samplers"]) - 1, "target": target})
+        channels.append({"sampler": len(samplers), "target": {"node": number, "path": kind}})
+        output = document.accessor(values)
+        samplers.append({"input": clock, "output": output, "interpolation": "LINEAR"})
 
 
 def _targets(body: MovingMesh) -> tuple[list[Array], Array]:
@@ -162,19 +164,20 @@ def _targets(body: MovingMesh) -> tuple[list[Array], Array]:
     return shapes, body.q[:, kept] / np.where(reach[kept] > 0, reach[kept], 1.0)
 
 
-def _material(colour: tuple[float, float, float]) -> dict[str, Any]:
+def _material(colour: tuple[float, float, float]) -> Entry:
     surface = {"baseColorFactor": [*colour, 1.0], "metallicFactor": 0.2, "roughnessFactor": 0.6}
     return {"pbrMetallicRoughness": surface, "doubleSided": True}
 
 
-def _scalar_last(p: Array) -> Any:
+def _scalar_last(p: Array) -> list[float]:
     return np.roll(p, -1, axis=-1).tolist()
 
 
 def _packed(document: _Document) -> bytes:
     """The header and the two chunks, each filled up to a multiple of four bytes."""
-    document.json["buffers"] = [{"byteLength": len(document.data)}]
-    text = json.dumps(document.json, separators=(",", ":")).encode()
+    head = {"asset": {"version": "2.0", "generator": "fenicsx-rom"}, "scene": 0}
+    whole = head | document.lists | {"buffers": [{"byteLength": len(document.data)}]}
+    text = json.dumps(whole, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)
     data = bytes(document.data) + b"\0" * (-len(document.data) % 4)
     chunks = struct.pack("<I4s", len(text), b"JSON") + text

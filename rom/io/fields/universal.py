@@ -4,18 +4,19 @@ Source:
     SDRC, Universal file datasets 58 and 58b, as published by the University of Cincinnati.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import accumulate, pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from rom.errors import ConfigError, FileFormatError
-from rom.io.files import check_readable
+from rom.io.files import check_readable, damaged, need
 from rom.model import Array
 
+Complex = npt.NDArray[np.complex128]
 MAX_BYTES = 2**30  # of a file that is still read
 BLOCK_MARK = b"    -1"
 N_HEADER_RECORDS = 11  # before the values
@@ -33,7 +34,7 @@ class Function:
 
     kind: int  # 4 is a frequency response, 6 a coherence, 1 a time response
     x: Array  # (n,) abscissa, mostly frequency [Hz] or time [s]
-    y: Any  # (n,) real or complex ordinate
+    y: Array | Complex  # (n,) real or complex ordinate
     # node and direction: 1 to 3 translation, 4 to 6 rotation, negative against it
     response: tuple[int, int]
     reference: tuple[int, int]  # the same of the force
@@ -44,7 +45,7 @@ class Function:
     entities: tuple[str, str] = ("", "")  # of response and reference; "NONE" without one
     abscissa: str = ""  # label of its unit
 
-    def receptance(self) -> npt.NDArray[np.complex128]:
+    def receptance(self) -> Complex:
         """(n,) displacement per force [m/N], whatever was measured."""
         if self.kind != FREQUENCY_RESPONSE or self.denominator != FORCE_TYPE:
             raise ConfigError(f"{_name(self)}: the function must be a response to a force.")
@@ -83,19 +84,17 @@ def scan(path: str | Path) -> tuple[tuple[Function, ...], dict[str, list[list[st
     while (place := _mark(data, place)) >= 0:
         place = _line_end(data, place)
         head = data[place : (after := _line_end(data, place))].split()
-        try:
-            place, function = _dataset(data, after, head)
-        except (ValueError, IndexError, OverflowError) as error:
-            where = f"dataset {len(found) + 1}"
-            raise FileFormatError(f"{path}: {where} is cut or no dataset 58: {error}.") from error
+        kind = head[0].decode("ascii", "replace") if head else ""
+        with damaged(f"dataset {len(found) + 1} is cut or no dataset 58", path):
+            place, function = _dataset(data, after, kind.lower(), head)
         if function:
             found.append(function)
-        elif (end := _mark(data, after)) < 0:
-            kind = head[0].decode("ascii", "replace") if head else "without a number"
-            raise FileFormatError(f"{path}: dataset {kind} is cut: the closing -1 is missing.")
-        elif head:
+            continue
+        with damaged(f"dataset {kind or 'without a number'} is cut", path):
+            end = _closed(data, after)
+        if kind:
             text = data[after:end].decode("ascii", "replace")
-            others.setdefault(head[0].decode("ascii", "replace"), []).append(text.splitlines())
+            others.setdefault(kind, []).append(text.splitlines())
     return tuple(found), others
 
 
@@ -103,15 +102,14 @@ def assemble(
     functions: tuple[Function, ...],
     responses: list[tuple[int, int]],
     references: list[tuple[int, int]],
-) -> tuple[Array, npt.NDArray[np.complex128]]:
+) -> tuple[Array, Complex]:
     """Frequencies (n_f,) [Hz] and receptances (n_f, n_s, n_e) [m/N] of chosen dofs.
 
     Sensors (n_s) and exciters (n_e) are nodes and directions; a dof measured against its direction
     counts with the opposite sign.
     """
     known = {_key(f): f for f in functions if f.kind == FREQUENCY_RESPONSE}
-    columns: list[npt.NDArray[np.complex128]] = []
-    x = np.empty(0)
+    columns, x = list[Complex](), np.empty(0)
     for wanted in ((r, e) for r in responses for e in references):
         if wanted not in known:
             raise ConfigError(f"no frequency response of {wanted[0]} to {wanted[1]}; it is needed.")
@@ -149,33 +147,36 @@ def _mark(data: bytes, place: int) -> int:
     return -1
 
 
-def _dataset(data: bytes, place: int, head: list[bytes]) -> tuple[int, Function | None]:
+def _closed(data: bytes, place: int) -> int:
+    """Where a dataset ends."""
+    need((end := _mark(data, place)) >= 0, "the closing -1 is missing")
+    return end
+
+
+def _dataset(data: bytes, place: int, kind: str, head: list[bytes]) -> tuple[int, Function | None]:
     """The place behind the dataset whose first record starts here, and what it holds."""
-    binary = bool(head) and head[0].lower().startswith(b"58b")
-    if not head or not (binary or head[0] == b"58"):
+    binary = kind.startswith("58b")
+    if not binary and kind != "58":
         return _behind(data, place), None
     lines = []
     for _ in range(N_HEADER_RECORDS):
         end = _line_end(data, place)
         lines.append(data[place:end].decode("ascii", "replace").rstrip("\r\n"))
         place = end
-    kind, spacing = int(lines[6][:10]), int(lines[6][20:30])
-    n, parts = int(lines[6][10:20]), 2 if kind in COMPLEX_TYPES else 1
+    ordinate, n, spacing = (int(lines[6][a : a + 10]) for a in (0, 10, 20))
+    parts = 2 if ordinate in COMPLEX_TYPES else 1
     width = parts + (spacing == 0)
     if binary:
-        if spacing == 0 and kind in DOUBLE_TYPES:
-            raise ValueError("uneven abscissas of double values are not read from binary")
-        values, place = _binary(data, place, head, kind, n * width)
+        even = spacing != 0 or ordinate not in DOUBLE_TYPES
+        need(even, "uneven abscissas of double values are not read from binary")
+        values, place = _binary(data, place, head, ordinate, n * width)
         closing = _closing(data, place)
         place = _behind(data, place) if closing < 0 else _line_end(data, closing)
     else:
-        end = _mark(data, place)
-        if end < 0:
-            raise ValueError("the closing -1 is missing")
-        values = _numbers(data[place:end].decode("ascii"), kind, spacing == 0, parts)
+        end = _closed(data, place)
+        values = _numbers(data[place:end].decode("ascii"), ordinate, spacing == 0, parts)
         place = _line_end(data, end)
-    if values.size < n * width:
-        raise ValueError(f"{values.size} numbers where {n * width} are announced")
+    need(values.size >= n * width, f"{values.size} numbers where {n * width} are announced")
     return place, _function(lines, values[: n * width].reshape(n, width), spacing, parts)
 
 
@@ -207,12 +208,13 @@ def _numbers(text: str, kind: int, uneven: bool, parts: int) -> Array:
     widths = [20] * 4 if kind in DOUBLE_TYPES else [13] * 6
     if kind in DOUBLE_TYPES and uneven:
         widths = [13, 20, 20] if parts == 2 else [13, 20] * 2
-    ends = np.cumsum([0, *widths])
-    found = []
-    for line in text.splitlines():
-        cells = (line[a:b].strip() for a, b in pairwise(ends))
-        found += [float(cell.replace("D", "E")) for cell in cells if cell]
-    return np.array(found)
+    return np.array([x for line in text.splitlines() for x in reals(line, widths)])
+
+
+def reals(line: str, widths: Iterable[int]) -> list[float]:
+    """Numbers in columns of these widths, which may touch; empty columns are left out."""
+    cells = (line[a:b].strip() for a, b in pairwise(accumulate(widths, initial=0)))
+    return [float(cell.replace("D", "E")) for cell in cells if cell]
 
 
 def _binary(data: bytes, place: int, head: list[bytes], kind: int, count: int) -> tuple[Array, int]:
@@ -222,19 +224,18 @@ def _binary(data: bytes, place: int, head: list[bytes], kind: int, count: int) -
     where the closing mark stands behind as many bytes as the numbers need.
     """
     fields = [int(word) for word in b" ".join(head)[3:].split()]
-    if fields[1] != 2:
-        raise ValueError("its numbers are not IEEE floating point")
-    if len(data) < place + fields[3]:
-        raise ValueError(f"{fields[3]} bytes announced, {len(data) - place} left")
+    need(fields[1] == 2, "its numbers are not IEEE floating point")
+    left = len(data) - place
+    need(fields[3] <= left, f"{fields[3]} bytes announced, {left} left")
     order = "<" if fields[0] == 1 else ">"
     size = 8 if kind in DOUBLE_TYPES else 4
     needed = count * size
-    if fields[3] < needed and _closing(data, place + needed) < 0:
-        raise ValueError(f"{fields[3]} bytes for {count} numbers of {size}")
+    enough = fields[3] >= needed or _closing(data, place + needed) >= 0
+    need(enough, f"{fields[3]} bytes for {count} numbers of {size}")
     with np.errstate(invalid="ignore"):
         values = np.frombuffer(data, f"{order}f{size}", count, place).astype(float)
-    if (np.abs(values) > MAX_MEASURED).any():
-        raise ValueError("numbers beyond all that is measured: the order of bytes is not that said")
+    measured = not (np.abs(values) > MAX_MEASURED).any()
+    need(measured, "numbers beyond all that is measured: the order of bytes is not that said")
     return values, place + max(fields[3], needed)
 
 

@@ -1,11 +1,13 @@
 """Mode shapes on the surface of a body, and meshes, for ParaView (VTK XML, unstructured grid)."""
 
 import base64
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
+import numpy.typing as npt
 
 from rom.arguments import AnySolution, Count, typed
 from rom.body.flexible import FlexibleBody
@@ -17,6 +19,8 @@ from rom.model import Array, Index
 from rom.names import ORIGIN_MARK, check_ending
 
 VTK_TRIANGLE = 5  # number of this cell type
+Values = npt.NDArray[np.generic]
+Fields = Mapping[str, Values]
 TYPES = {"<f8": "Float64", "<i8": "Int64", "|u1": "UInt8"}
 
 
@@ -112,7 +116,7 @@ def _stressed(surface: Surface, q: Array, stress: Array) -> bytes:
     return _drawn(surface, fields)
 
 
-def _drawn(surface: Surface, fields: dict[str, Any]) -> bytes:
+def _drawn(surface: Surface, fields: Fields) -> bytes:
     return grid(surface.points, surface.triangles, VTK_TRIANGLE, at_points=fields).encode()
 
 
@@ -121,8 +125,8 @@ def grid(
     cells: Index,
     kind: int,
     *,
-    at_points: dict[str, Any] | None = None,
-    at_cells: dict[str, Any] | None = None,
+    at_points: Fields | None = None,
+    at_cells: Fields | None = None,
 ) -> str:
     """Text of a file with cells of one kind, VTK's number of it.
 
@@ -154,11 +158,11 @@ def grid(
     )
 
 
-def _section(name: str, arrays: dict[str, Any]) -> list[str]:
+def _section(name: str, arrays: Fields) -> list[str]:
     return [f"<{name}>", *(_array(key, values) for key, values in arrays.items()), f"</{name}>"]
 
 
-def _array(name: str, values: Any) -> str:
+def _array(name: str, values: Values) -> str:
     values = np.ascontiguousarray(values)
     values = values.astype(values.dtype.newbyteorder("<"))
     data = values.tobytes()

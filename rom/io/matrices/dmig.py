@@ -4,9 +4,8 @@ Source:
     MSC Nastran Quick Reference Guide, entries DMIG, GRID and SPOINT, formats of bulk data.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy.sparse import coo_matrix, csc_matrix, csr_matrix
@@ -14,15 +13,16 @@ from scipy.sparse import coo_matrix, csc_matrix, csr_matrix
 from rom.decks.bulk import POINTS, Card, cards, grids
 from rom.decks.lines import at, real, whole
 from rom.errors import FileFormatError
-from rom.io.files import check_last_line, write_whole
+from rom.io.files import check_last_line, damaged, need, write_lines
 from rom.model import Array, Index
 from rom.names import ORIGIN_MARK, named
 
 SYMMETRIC_FORM, SQUARE_FORM = 6, 1
 Dofs = Index  # (n, 2) label and component, 1 to 6, or 0 for a scalar point
+Entry = tuple[int, int, int, int, float]  # node and component of row and column, value
 
 
-def read_dmig(path: str | Path) -> dict[str, tuple[Any, Dofs]]:
+def read_dmig(path: str | Path) -> dict[str, tuple[csr_matrix, Dofs]]:
     """All real square matrices of a file: {name: (sparse (n, n), (n, 2) label and component)}.
 
     Of symmetric ones only the triangle that is written.
@@ -33,16 +33,11 @@ def read_dmig(path: str | Path) -> dict[str, tuple[Any, Dofs]]:
     """
     path = Path(path)
     check_last_line(path)
-    entries: dict[str, list[tuple[int, int, int, int, float]]] = {}
+    entries: dict[str, list[Entry]] = {}
     for card in cards(path):
-        if card.name != "DMIG":
-            continue
-        try:
-            _enter(entries, card.fields)
-        except (ValueError, IndexError) as error:
-            raise FileFormatError(
-                f"this is no DMIG card: {error}.", where=at(card.place)
-            ) from error
+        if card.name == "DMIG":
+            with damaged("this is no DMIG card", at(card.place)):
+                _enter(entries, card.fields)
     if not entries:
         raise FileFormatError("the file holds no DMIG matrix.", where=str(path))
     return {name: labelled(rows) for name, rows in entries.items()}
@@ -71,7 +66,11 @@ def read_grids(path: str | Path) -> tuple[Index, Array]:
 
 
 def write_dmig(
-    matrices: dict[str, Any], dofs: Dofs, path: str | Path, *, nodes: dict[int, Array] | None = None
+    matrices: Mapping[str, Array | csr_matrix],
+    dofs: Dofs,
+    path: str | Path,
+    *,
+    nodes: dict[int, Array] | None = None,
 ) -> Path:
     """Write symmetric matrices, ten digits each.
 
@@ -89,19 +88,18 @@ def write_dmig(
     lines = [f"$ {ORIGIN_MARK}", *_points(dofs, nodes)] if nodes else []
     for name, A in matrices.items():
         lines += _written(name.upper(), csc_matrix(A), dofs)
-    text = "\n".join(lines) + "\n"
-    return write_whole(path, text.encode("ascii"))
+    return write_lines(path, lines)
 
 
-def _enter(entries: dict[str, list[tuple[int, int, int, int, float]]], fields: list[str]) -> None:
+def _enter(entries: dict[str, list[Entry]], fields: list[str]) -> None:
     name = fields[0].upper()
     if fields[1] == "0":  # the header card: form, type
-        if int(fields[2]) not in (SYMMETRIC_FORM, SQUARE_FORM) or int(fields[3]) not in (1, 2):
-            raise ValueError(f"{name} is not square and real (form {fields[2]}, type {fields[3]})")
+        form, kind = int(fields[2]), int(fields[3])
+        real_square = form in (SYMMETRIC_FORM, SQUARE_FORM) and kind in (1, 2)
+        need(real_square, f"{name} is not square and real (form {form}, type {kind})")
         entries.setdefault(name, [])
         return
-    if name not in entries:
-        raise ValueError(f"{name} has no header")
+    need(name in entries, f"{name} has no header")
     column = whole(fields[1]), whole(fields[2] or "0")
     for k in range(4, len(fields), 4):
         node, component, value = fields[k : k + 3]
@@ -109,8 +107,8 @@ def _enter(entries: dict[str, list[tuple[int, int, int, int, float]]], fields: l
             entries[name].append((whole(node), whole(component or "0"), *column, real(value)))
 
 
-def labelled(rows: list[tuple[int, int, int, int, float]]) -> tuple[csr_matrix, Dofs]:
-    """Matrix (n, n) and dofs of entries: node and component of row and column, value."""
+def labelled(rows: list[Entry]) -> tuple[csr_matrix, Dofs]:
+    """Matrix (n, n) and dofs of entries."""
     table = np.array([row[:4] for row in rows], dtype=np.int64).reshape(-1, 2, 2)
     dofs, place = np.unique(table.reshape(-1, 2), axis=0, return_inverse=True)
     i, j = place.reshape(-1, 2).T

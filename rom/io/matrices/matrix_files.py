@@ -18,17 +18,18 @@ Source:
 
 import re
 import warnings
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TextIO
 
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 
 from rom.decks.lines import whole
 from rom.errors import ConfigError, FileFormatError, UnsafeFileError, in_file
-from rom.io.files import check_last_line, check_readable, write_whole
-from rom.io.matrices.dmig import Dofs, labelled, read_dmig
+from rom.io.files import Line, check_last_line, check_readable, damaged, need, write_lines
+from rom.io.matrices.dmig import Dofs, Entry, labelled, read_dmig
 from rom.io.matrices.op4 import Matrices, read_op4
 from rom.io.matrices.user_element import read_user_element
 from rom.model import Array, Index
@@ -52,7 +53,7 @@ class NamedMatrix:
     dofs: Dofs | None = None  # (n, 2) label, component 1 to 6; None for rows in the order of nodes
 
 
-def read_matrix(source: Any) -> NamedMatrix:
+def read_matrix(source: str | Path | tuple[str | Path, str]) -> NamedMatrix:
     """A square matrix: Matrix Market, Abaqus, CalculiX, OUTPUT4, or DMIG.
 
     Args:
@@ -83,7 +84,7 @@ def read_matrix(source: Any) -> NamedMatrix:
     return NamedMatrix(f"{path} {key}".strip(), csr_matrix(A), dofs.get(key))
 
 
-def write_abaqus_matrix(A: Any, dofs: Dofs, path: str | Path) -> Path:
+def write_abaqus_matrix(A: Array | csr_matrix, dofs: Dofs, path: str | Path) -> Path:
     """Write the lower triangle of a symmetric matrix as text that ``*MATRIX INPUT`` reads.
 
     Args:
@@ -96,13 +97,13 @@ def write_abaqus_matrix(A: Any, dofs: Dofs, path: str | Path) -> Path:
         ResourceError: if the disk is full.
     """
     found = coo_matrix(np.tril(A) if isinstance(A, np.ndarray) else A)
-    lines = [
+    entries = zip(found.row, found.col, found.data, strict=True)
+    lines = (
         f"{dofs[i, 0]},{dofs[i, 1]}, {dofs[j, 0]},{dofs[j, 1]}, {v:.16e}"
-        for i, j, v in zip(found.row, found.col, found.data, strict=True)
+        for i, j, v in entries
         if i >= j and v
-    ]
-    text = "\n".join(lines) + "\n"
-    return write_whole(path, text.encode("ascii"))
+    )
+    return write_lines(path, lines)
 
 
 def _all(path: Path) -> tuple[Matrices, dict[str, Dofs]]:
@@ -114,10 +115,10 @@ def _all(path: Path) -> tuple[Matrices, dict[str, Dofs]]:
     return Matrices(str(path), {name: A for name, (A, _) in pairs.items()}), dofs
 
 
-def _pairs(path: Path) -> dict[str, tuple[Any, Dofs | None]]:
+def _pairs(path: Path) -> Mapping[str, tuple[csr_matrix, Dofs | None]]:
     ending = path.suffix.lower()
     if ending in (".bdf", ".dat", ".pch", ".dmig"):
-        return dict(read_dmig(path))
+        return read_dmig(path)
     if ending in MATRIX_ENDINGS:
         A, dofs = read_stored_matrix(path)
         return {"": (_finite(A, path), dofs)}
@@ -129,38 +130,28 @@ def _pairs(path: Path) -> dict[str, tuple[Any, Dofs | None]]:
     with path.open("rb") as file:
         start = file.read(HEAD_BYTES)
     if ending == ".inp" or b"*USER ELEMENT" in start.upper():
-        return dict(read_user_element(path))
-    return {
-        "": (_finite(read_market(path), path), None)
-        if start.startswith(BANNER_TEXT)
-        else _abaqus(path)
-    }
+        return read_user_element(path)
+    market = start.startswith(BANNER_TEXT)
+    return {"": (_finite(read_market(path), path), None) if market else _abaqus(path)}
 
 
-def _abaqus(path: Path) -> tuple[Any, Dofs]:
+def _abaqus(path: Path) -> tuple[csr_matrix, Dofs]:
     """Lines ``node, component, node, component, value`` of ``*MATRIX GENERATE`` output."""
     check_last_line(path)
-    rows = []
-    with path.open(encoding="ascii", errors="replace") as file:
-        for number, line in enumerate(file, 1):
-            if not line.strip() or line.startswith("*"):
-                continue
-            words = line.replace(",", " ").split()
-            try:
-                if len(words) != 5:
-                    raise ValueError(f"{len(words)} numbers instead of 5")
-                i, a, j, b = map(whole, words[:4])
-                rows.append((i, a, j, b, float(words[4])))
-            except ValueError as error:
-                where = f"{path}, line {number}"
-                raise FileFormatError(f"this is no entry: {error}.", where=where) from error
+    rows, at = list[Entry](), Line(path)
+    with path.open(encoding="ascii", errors="replace") as file, damaged("this is no entry", at):
+        for at.number, line in enumerate(file, 1):
+            if line.strip() and not line.startswith("*"):
+                *place, value = line.replace(",", " ").split()
+                i, a, j, b = map(whole, place)
+                rows.append((i, a, j, b, float(value)))
     if not rows:
         raise FileFormatError("the file holds no entry.", where=str(path))
     A, dofs = labelled(rows)
     return _finite(A, path), dofs
 
 
-def _finite(A: Any, path: Path) -> Any:
+def _finite(A: csr_matrix, path: Path) -> csr_matrix:
     if not np.isfinite(A.data).all():
         raise FileFormatError("a number is not finite.", where=str(path))
     return A
@@ -183,32 +174,30 @@ def read_market(path: str | Path) -> csr_matrix:
         if words[:1] != ["matrix"] or len(words) != 4 or words[2] not in ("real", "integer"):
             raise FileFormatError("the matrix is not real.")
         _, form, _, symmetry = words
-        try:
-            if form not in ("coordinate", "array") or symmetry not in SIGNS:
-                raise ValueError(f"'{form} {words[2]} {symmetry}' is unknown")
+        with damaged("this is no Matrix Market file", path):
+            known = form in ("coordinate", "array") and symmetry in SIGNS
+            need(known, f"'{form} {words[2]} {symmetry}' is unknown")
             sizes = _sizes(line, 3 if form == "coordinate" else 2)
             if max(sizes[:2]) > MOST_ROWS or 2 * sizes[-1] > path.stat().st_size:
                 raise UnsafeFileError(f"sizes {sizes} do not fit the file.")
             table = _market_table(file)
             read = _coordinates if form == "coordinate" else _dense
             i, j, values = read(table, sizes, SIGNS[symmetry])
-        except (ValueError, OverflowError) as error:
-            raise FileFormatError(f"this is no Matrix Market file: {error}.") from error
-    mirrored = SIGNS[symmetry] * values * (i != j)
-    both = (np.r_[values, mirrored], (np.r_[i, j], np.r_[j, i])) if SIGNS[symmetry] else (
-        values, (i, j))  # fmt: skip
-    return coo_matrix(both, shape=sizes[:2]).tocsr()
+    if SIGNS[symmetry]:
+        mirrored = SIGNS[symmetry] * values * (i != j)
+        i, j, values = np.r_[i, j], np.r_[j, i], np.r_[values, mirrored]
+    return coo_matrix((values, (i, j)), shape=sizes[:2]).tocsr()
 
 
 def _sizes(line: str, n: int) -> tuple[int, ...]:
     """Rows and columns, and entries of coordinates."""
     sizes = tuple(int(word) for word in line.split())
-    if len(sizes) != n or min(sizes) < 0 or min(sizes[:2]) < 1:
-        raise ValueError(f"{line.strip()!r} are no sizes")
+    possible = len(sizes) == n and min(sizes) >= 0 and min(sizes[:2]) >= 1
+    need(possible, f"{line.strip()!r} are no sizes")
     return sizes
 
 
-def _market_table(file: Any) -> Array:
+def _market_table(file: TextIO) -> Array:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # of NumPy, if there is no line
         return np.loadtxt(file, comments="%", ndmin=2)
@@ -216,11 +205,11 @@ def _market_table(file: Any) -> Array:
 
 def _coordinates(table: Array, sizes: tuple[int, ...], _: float) -> tuple[Index, Index, Array]:
     """Rows and columns from zero, and values."""
-    if table.size != 3 * sizes[2] or table.shape[1] not in (0, 3):
-        raise ValueError(f"{len(table)} lines where {sizes[2]} entries are announced")
+    fits = table.size == 3 * sizes[2] and table.shape[1] in (0, 3)
+    need(fits, f"{len(table)} lines where {sizes[2]} entries are announced")
     place = table.reshape(-1, 3)[:, :2]
-    if not ((place >= 1) & (place <= sizes[:2]) & (place % 1 == 0)).all():
-        raise ValueError(f"an entry is outside of {sizes[0]} x {sizes[1]}")
+    inside = ((place >= 1) & (place <= sizes[:2]) & (place % 1 == 0)).all()
+    need(inside, f"an entry is outside of {sizes[0]} x {sizes[1]}")
     i, j = place.astype(np.int64).T - 1
     return i, j, table.reshape(-1, 3)[:, 2]
 
@@ -229,13 +218,11 @@ def _dense(table: Array, sizes: tuple[int, ...], sign: float) -> tuple[Index, In
     """Column by column; of symmetric matrices the lower triangle, of skew ones without diagonal."""
     rows, columns = sizes
     n = rows * columns if not sign else rows * (rows + int(sign)) // 2
-    if table.size != n:
-        raise ValueError(f"{table.size} numbers where {n} are announced")
+    need(table.size == n, f"{table.size} numbers where {n} are announced")
     if not sign:
         j, i = np.divmod(np.arange(n), rows)
         return i, j, table.ravel()
-    if rows != columns:
-        raise ValueError(f"{rows} x {columns} is not square")
+    need(rows == columns, f"{rows} x {columns} is not square")
     j, i = np.triu_indices(rows, 0 if sign > 0 else 1)
     return i, j, table.ravel()
 

@@ -1,9 +1,9 @@
 """Nodes, and sets of nodes, in the files of other finite element programs."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from rom.decks.keywords import Block
 from rom.decks.nodes import NODE_KEYWORDS, Nodes
@@ -18,7 +18,7 @@ CARDS = (".bdf", ".dat")
 REFUSED_KEYWORDS = ("NGEN", "NFILL", "NCOPY", "NMAP", "TRANSFORM", "PARAMETER")
 
 
-def read_nodes(nodes: Any) -> tuple[Index, Array]:
+def read_nodes(nodes: str | Path | tuple[npt.ArrayLike, npt.ArrayLike]) -> tuple[Index, Array]:
     """Ascending labels (k,) and positions (k, 3), in units of the file.
 
     Args:

@@ -11,17 +11,18 @@ Source:
 import re
 import struct
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import NoReturn
 
 import numpy as np
 import numpy.typing as npt
 from scipy.sparse import csc_matrix, csr_matrix
 
 from rom.errors import ConfigError, FileFormatError, UnsafeFileError
-from rom.io.files import check_readable, write_whole
+from rom.io.files import check_readable, damaged, need, write_lines
 from rom.model import Array
 from rom.names import MAX_NAMED
 
@@ -32,7 +33,7 @@ FORMAT_PATTERN = re.compile(r"\(?(?:1P,?)?(\d+)[EDG](\d+)\.\d+(?:E\d)?\)?")
 BARE_EXPONENT = re.compile(r"(?<=\d)(?=[+-])")  # where Fortran leaves no place for the letter
 WIDE_MARK = "|I16"  # ends headers whose first two numbers have 16 columns
 COMPLEX_KINDS, DOUBLE_KINDS = (3, 4), (2, 4)
-Values = npt.NDArray[Any]
+Values = Array | npt.NDArray[np.complex128]
 
 
 @dataclass(slots=True)
@@ -51,10 +52,9 @@ class _Strings:
         values: Values = numbers
         if self.kind in COMPLEX_KINDS:
             values = np.ascontiguousarray(numbers).view(np.complex128)
-        if not (0 <= column < self.columns and 0 <= row <= self.rows - values.size):
-            raise ValueError(f"a string of {self.name} reaches beyond {self.rows} rows")
-        if not np.isfinite(values).all():
-            raise ValueError(f"{self.name} holds a number that is not finite")
+        inside = 0 <= column < self.columns and 0 <= row <= self.rows - values.size
+        need(inside, f"a string of {self.name} reaches beyond {self.rows} rows")
+        need(np.isfinite(values).all(), f"{self.name} holds a number that is not finite")
         self.found.append((column, row, values))
 
     def matrix(self) -> csr_matrix:
@@ -65,7 +65,7 @@ class _Strings:
         return csr_matrix((v, (i.astype(int), j.astype(int))), shape=(self.rows, self.columns))
 
 
-class Matrices(dict[str, Any]):
+class Matrices(dict[str, csr_matrix]):
     """Matrices of a file by their names; ``NAME#1``, ``NAME#2`` where a name stands twice.
 
     Args:
@@ -74,7 +74,9 @@ class Matrices(dict[str, Any]):
         places: {key: where it stands in the file}.
     """
 
-    def __init__(self, where: str, found: dict[str, Any], places: dict[str, str] | None = None):
+    def __init__(
+        self, where: str, found: dict[str, csr_matrix], places: dict[str, str] | None = None
+    ):
         super().__init__(found)
         self.where, self.places = where, places or {}
 
@@ -111,16 +113,15 @@ def read_op4(path: str | Path) -> Matrices:
     """
     path = check_readable(path)
     data = path.read_bytes()
-    reader: Any = _Text(data) if DIGITS.match(data[:24]) else _Binary(data)
+    reader: _Text | _Binary = _Text(data) if DIGITS.match(data[:24]) else _Binary(data)
     all_found: list[_Strings] = []
     try:
-        while (found := reader.next()) is not None:
-            all_found.append(found)
-    except UnsafeFileError as error:
-        raise UnsafeFileError(error.message, where=f"{path}, {reader.place}") from error
-    except (ValueError, IndexError, struct.error, OverflowError) as error:
-        where = f"{path}, {reader.place}"
-        raise FileFormatError(f"no OUTPUT4 matrix stands here: {error}.", where=where) from error
+        with damaged("no OUTPUT4 matrix stands here"):
+            while (found := reader.next()) is not None:
+                all_found.append(found)
+    except FileFormatError as error:
+        error.where = f"{path}, {reader.place}"
+        raise
     if not all_found:
         raise FileFormatError("the file holds no matrix.", where=str(path))
     return _by_name(str(path), all_found)
@@ -136,7 +137,7 @@ def _by_name(where: str, all_found: list[_Strings]) -> Matrices:
     return Matrices(where, matrices, dict(zip(keys, (f.place for f in all_found), strict=True)))
 
 
-def write_op4(matrices: dict[str, Any], path: str | Path) -> Path:
+def write_op4(matrices: Mapping[str, Array | csr_matrix], path: str | Path) -> Path:
     """Write matrices as text with 17 digits.
 
     Args:
@@ -147,24 +148,24 @@ def write_op4(matrices: dict[str, Any], path: str | Path) -> Path:
         ConfigError: if the place is not writable.
         ResourceError: if the disk is full.
     """
-    text = "".join(_written(name, csc_matrix(A)) for name, A in matrices.items())
-    return write_whole(path, text.encode("ascii"))
+    texts = (_written(name, csc_matrix(A)) for name, A in matrices.items())
+    return write_lines(path, chain.from_iterable(texts))
 
 
-def _written(name: str, A: csc_matrix) -> str:
+def _written(name: str, A: csc_matrix) -> Iterator[str]:
     rows, columns = A.shape
     symmetric = rows == columns and abs(A - A.T).max() == 0
     form = SYMMETRIC_FORM if symmetric else RECTANGULAR_FORM
-    lines = [f"{columns:8d}{rows:8d}{form:8d}{2:8d}{name.upper():<8.8}1P,3E23.16"]
+    yield f"{columns:8d}{rows:8d}{form:8d}{2:8d}{name.upper():<8.8}1P,3E23.16"
     for c in range(columns):
         column = A[:, c].toarray().ravel()
         (filled,) = np.nonzero(column)
         if filled.size:
             values = column[filled[0] : filled[-1] + 1]
-            lines.append(f"{c + 1:8d}{filled[0] + 1:8d}{values.size:8d}")
-            lines += _packed(values)
-    lines += [f"{columns + 1:8d}{1:8d}{1:8d}", *_packed(np.ones(1))]
-    return "\n".join(lines) + "\n"
+            yield f"{c + 1:8d}{filled[0] + 1:8d}{values.size:8d}"
+            yield from _packed(values)
+    yield f"{columns + 1:8d}{1:8d}{1:8d}"
+    yield from _packed(np.ones(1))
 
 
 def _packed(values: Array) -> Iterator[str]:
@@ -173,10 +174,8 @@ def _packed(values: Array) -> Iterator[str]:
 
 
 def _checked(columns: int, rows: int, kind: int, name: str, place: str) -> _Strings:
-    if not 1 <= kind <= 4:
-        raise ValueError(f"{name} is of the unknown type {kind}")
-    if not (columns and rows):
-        raise ValueError(f"{name} has {rows} rows and {columns} columns")
+    need(1 <= kind <= 4, f"{name} is of the unknown type {kind}")
+    need(columns and rows, f"{name} has {rows} rows and {columns} columns")
     if max(abs(columns), abs(rows)) > MOST_ROWS:
         raise UnsafeFileError(f"{name} has {abs(rows)} rows and {columns} columns.")
     return _Strings(name.strip().upper(), place, abs(rows), abs(columns), rows < 0, kind)
@@ -233,8 +232,8 @@ class _Text:
         self.per_line, self.width = int(found[1]), int(found[2])
 
     def _values(self, n: int) -> Array:
-        if not 0 < n <= (len(self.lines) - self.number) * self.per_line:
-            raise ValueError(f"{n} values are announced")
+        most = (len(self.lines) - self.number) * self.per_line
+        need(0 < n <= most, f"{n} values are announced")
         out: list[float] = []
         while len(out) < n:
             line, count = self._line().upper().replace("D", "E"), min(self.per_line, n - len(out))
@@ -244,8 +243,7 @@ class _Text:
 
     def _line(self) -> str:
         self.number += 1
-        if self.number > len(self.lines):
-            raise ValueError("the file ends too early")
+        need(self.number <= len(self.lines), "the file ends too early")
         return self.lines[self.number - 1]
 
 
@@ -264,8 +262,7 @@ class _Binary:
         if self.at >= len(self.data):
             return None
         place, head = self.place, self._record()
-        if len(head) not in (24, 48):
-            raise ValueError(f"a header has 24 or 48 bytes, not {len(head)}")
+        need(len(head) in (24, 48), f"a header has 24 or 48 bytes, not {len(head)}")
         self.size = len(head) // 6  # bytes of a word
         columns, rows, _, kind = self._integers(head, 0, 4)
         name = head[4 * self.size :].decode("ascii", "replace")
@@ -291,8 +288,7 @@ class _Binary:
             else:
                 (both,) = self._integers(data, at, 1)
                 length, row, at = both // 65536 - 1, both % 65536, at + self.size
-            if length <= 0:
-                raise ValueError(f"a string of {length} words")
+            need(length > 0, f"a string of {length} words")
             matrix.add(column, row - 1, self._values(data[at:], length))
             at += self.size * length
 
@@ -302,14 +298,14 @@ class _Binary:
 
     def _values(self, data: bytes, words: int) -> Array:
         n, rest = divmod(self.size * words, int(self.real[-1]))
-        if not 0 < self.size * words <= len(data) or rest:
-            raise ValueError(f"{words} words are announced, {len(data) // self.size} are there")
+        there = 0 < self.size * words <= len(data) and not rest
+        need(there, f"{words} words are announced, {len(data) // self.size} are there")
         return np.frombuffer(data, self.real, n).astype(float)
 
     def _record(self) -> bytes:
         (n,) = struct.unpack_from(f"{self.order}i", self.data, self.at)
         end = self.at + 4 + n
-        if n < 12 or struct.unpack_from(f"{self.order}i", self.data, end) != (n,):
-            raise ValueError(f"a record of {n} bytes does not close")
+        closes = n >= 12 and struct.unpack_from(f"{self.order}i", self.data, end) == (n,)
+        need(closes, f"a record of {n} bytes does not close")
         record, self.at = self.data[self.at + 4 : end], end + 4
         return record

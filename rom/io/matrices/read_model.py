@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -78,14 +77,14 @@ def read_model(
     found = [read_matrix(source) for source in (K, M)]
     labels, points = _used(labels, points, found)
     stiffness, mass = (_placed(A, labels) for A in found)
+    points = points * unit.length
     model = FEModel(
         stiffness * (unit.force / unit.length),
         mass * unit.mass,
-        points * unit.length,
-        {name: _interface(name, wanted, labels, points * unit.length)
-         for name, wanted in interfaces.items()},
+        points,
+        {name: _interface(name, own, labels, points) for name, own in interfaces.items()},
         provenance={"K": _name(K), "M": _name(M), "units": units},
-    )  # fmt: skip
+    )
     _check_mass(model)
     _check_free(model)
     _doubt_units(model)
@@ -212,5 +211,5 @@ def _speed_of_sound(model: FEModel) -> float:
     return float(np.median(near * np.sqrt(k / m)) / NODE_SPEED)
 
 
-def _name(source: Any) -> str:
+def _name(source: str | Path | tuple[str | Path, str]) -> str:
     return " ".join(map(str, source)) if isinstance(source, tuple) else str(source)

@@ -13,17 +13,16 @@ Source:
 """
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy.sparse import csr_matrix, tril
 
 from rom.decks.lines import whole
 from rom.errors import ConfigError, FileFormatError, UnsafeFileError, in_file
-from rom.io.files import check_last_line, write_whole
+from rom.io.files import Line, check_last_line, damaged, need, write_lines
 from rom.io.matrices.dmig import Dofs
 from rom.model import Array
 from rom.names import ORIGIN_MARK
@@ -53,25 +52,21 @@ def read_user_element(path: str | Path) -> dict[str, tuple[csr_matrix, Dofs]]:
     """
     path = Path(path)
     check_last_line(path)
-    element, keyword, kind = _Element(), "", ""
-    with path.open(encoding="latin1") as file:
-        for number, line in enumerate(file, 1):
-            try:
-                if line.startswith("**"):
-                    keyword = _comment(element, keyword, line)
-                elif line.startswith("*"):
-                    keyword, kind = _keyword(element, line)
-                elif line.strip():
-                    _data(element, keyword, kind, line.replace(",", " ").split())
-            except ValueError as error:
-                where = f"{path}, line {number}"
-                raise FileFormatError(f"this is no user element: {error}.", where=where) from error
+    element, keyword, kind, at = _Element(), "", "", Line(path)
+    with path.open(encoding="latin1") as file, damaged("this is no user element", at):
+        for at.number, line in enumerate(file, 1):
+            if line.startswith("**"):
+                keyword = _comment(element, keyword, line)
+            elif line.startswith("*"):
+                keyword, kind = _keyword(element, line)
+            elif line.strip():
+                _data(element, keyword, kind, line.replace(",", " ").split())
     with in_file(path):
         return _matrices(element)
 
 
 def write_user_element(
-    matrices: dict[str, Any], dofs: Dofs, path: str | Path, *, nodes: dict[int, Array]
+    matrices: Mapping[str, Array], dofs: Dofs, path: str | Path, *, nodes: dict[int, Array]
 ) -> Path:
     """Write symmetric matrices as an element U1 between its nodes.
 
@@ -86,8 +81,7 @@ def write_user_element(
         ConfigError: if the place is not writable.
         ResourceError: if the disk is full.
     """
-    text = "\n".join(_document(matrices, np.asarray(dofs), nodes)) + "\n"
-    return write_whole(path, text.encode("ascii"))
+    return write_lines(path, _document(matrices, np.asarray(dofs), nodes))
 
 
 def _comment(element: _Element, keyword: str, line: str) -> str:
@@ -104,15 +98,13 @@ def _keyword(element: _Element, line: str) -> tuple[str, str]:
     words = [" ".join(word.split()).upper() for word in line.split(",")]
     options = dict(word.replace(" =", "=").replace("= ", "=").partition("=")[::2] for word in words)
     if words[0] == "*USER ELEMENT":
-        if element.n_nodes:
-            raise ValueError("there is a second one in the file")
-        if "LINEAR" not in options or "UNSYMM" in options:
-            raise ValueError("it is not linear and symmetric")
+        need(not element.n_nodes, "there is a second one in the file")
+        symmetric = "LINEAR" in options and "UNSYMM" not in options
+        need(symmetric, "it is not linear and symmetric")
         element.n_nodes = whole(options.get("NODES", ""))
     kind = options.get("TYPE", "") if words[0] == "*MATRIX" else ""
     if words[0] == "*MATRIX":
-        if kind in element.values:
-            raise ValueError(f"it has two matrices {kind!r}")
+        need(kind not in element.values, f"it has two matrices {kind!r}")
         element.values[kind] = []
     return words[0], kind
 
@@ -124,8 +116,8 @@ def _data(element: _Element, keyword: str, kind: str, words: list[str]) -> None:
         numbers = [whole(word) for word in words]
         place, components = (numbers[0], numbers[1:]) if element.lists else (1, numbers)
         after = element.lists[-1][0] if element.lists else 0
-        if not after < place <= element.n_nodes or not set(components) <= set(range(1, 7)):
-            raise ValueError("places ascend up to NODES, and components are 1 to 6")
+        fits = after < place <= element.n_nodes and set(components) <= set(range(1, 7))
+        need(fits, "places ascend up to NODES, and components are 1 to 6")
         element.lists.append((place, components))
 
 
@@ -169,7 +161,7 @@ def _dofs(element: _Element) -> Dofs:
     return dofs
 
 
-def _document(matrices: dict[str, Any], dofs: Dofs, nodes: dict[int, Array]) -> Iterator[str]:
+def _document(matrices: Mapping[str, Array], dofs: Dofs, nodes: dict[int, Array]) -> Iterator[str]:
     labels = list(dict.fromkeys(dofs[:, 0].tolist()))
     components = {label: dofs[dofs[:, 0] == label, 1].tolist() for label in labels}
     if [label for label in labels for _ in components[label]] != dofs[:, 0].tolist():

@@ -20,7 +20,6 @@ import io
 import json
 import textwrap
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -29,7 +28,7 @@ from rom.body.reference import skew_tensor
 from rom.errors import warn
 from rom.io.files import write_whole
 from rom.io.sid.body import invariants
-from rom.model import Array
+from rom.model import Array, Index
 from rom.names import ORIGIN_MARK
 
 STAR_POINTS = np.vstack([np.eye(3), -np.eye(3)])  # nodes around an interface
@@ -144,7 +143,7 @@ def write_exudyn(body: FlexibleBody, path: str | Path) -> Path:
     return write_whole(path, text.encode())
 
 
-def arrays(body: FlexibleBody) -> dict[str, Array]:
+def arrays(body: FlexibleBody) -> dict[str, Array | Index]:
     """Arrays by the names of Exudyn's arguments, and K, M, D, triangles."""
     r, integrals = body.n_modes, invariants(body)
     return {
@@ -164,14 +163,14 @@ def arrays(body: FlexibleBody) -> dict[str, Array]:
     }
 
 
-def _nodes(body: FlexibleBody) -> dict[str, Array]:
+def _nodes(body: FlexibleBody) -> dict[str, Array | Index]:
     points, modes = [np.zeros((0, 3))], [np.zeros((0, body.n_modes))]
     arms = STAR_RADIUS_RATIO * body.size * STAR_POINTS
     for m in body.markers.values():
         points.append(m.point + arms)
         turned = np.einsum("abc,ck,nb->nak", skew_tensor(), m.rotation, arms)
         modes.append((m.translation + turned).reshape(18, -1))
-    triangles: Any = np.zeros((0, 3), dtype=np.int64)
+    triangles: Index = np.zeros((0, 3), dtype=np.int64)
     if body.surface is not None:
         points.append(body.surface.points)
         modes.append(body.surface.shape)

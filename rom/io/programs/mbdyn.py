@@ -22,7 +22,7 @@ import numpy as np
 from rom.body.flexible import FlexibleBody
 from rom.body.stiffening import ELASTIC_LOAD, known_loads
 from rom.errors import ConfigError
-from rom.io.files import write_whole
+from rom.io.files import write_lines
 from rom.io.sid.body import invariants
 from rom.model import Array
 from rom.names import ORIGIN_MARK
@@ -51,8 +51,7 @@ def write_mbdyn(body: FlexibleBody, path: str | Path) -> Path:
     labels = ["_".join(name.split()) for name in body.markers]
     if len(set(labels)) < len(labels):
         raise ConfigError(f"interfaces need names that differ in more than blanks, got {labels}.")
-    text = "\n".join(_document(body, labels)) + "\n"
-    return write_whole(path, text.encode())
+    return write_lines(path, _document(body, labels))
 
 
 def _document(body: FlexibleBody, labels: list[str]) -> Iterator[str]:

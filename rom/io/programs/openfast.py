@@ -20,7 +20,7 @@ import numpy.typing as npt
 from rom.arguments import symmetric
 from rom.body.flexible import FlexibleBody
 from rom.errors import ConfigError, FileFormatError, QualityGateError, UnsafeFileError
-from rom.io.files import check_readable, write_whole
+from rom.io.files import check_readable, write_lines
 from rom.io.programs.interface_form import InterfaceForm, interface_form
 from rom.model import Array
 from rom.names import ORIGIN_MARK, check_known
@@ -91,8 +91,8 @@ def write_openfast(
     if version not in VERSIONS:
         raise ConfigError(f"version {version!r} of OpenFAST is unknown; known: {VERSIONS}.")
     found = superelement(body, held=held, gravity=gravity)
-    lines = [f"! {body.name}, {ORIGIN_MARK}", *(_current(found) if version == 5 else _old(found))]
-    return write_whole(path, ("\n".join(lines) + "\n").encode())
+    lines = _current(found) if version == 5 else _old(found)
+    return write_lines(path, [f"! {body.name}, {ORIGIN_MARK}", *lines])
 
 
 def superelement(

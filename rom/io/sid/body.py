@@ -1,7 +1,5 @@
 """A flexible body as Standard Input Data, and back."""
 
-from typing import Any
-
 import numpy as np
 from scipy.linalg import eigh
 
@@ -77,11 +75,11 @@ def _inertia(body: FlexibleBody, K: dict[str, Array]) -> dict[str, Taylor]:
     return {
         "mdCM": Taylor(body.first_moment[:, None], body.S.T[:, :, None]),
         "J": Taylor(body.inertia, -(C4 + C4.swapaxes(1, 2))),
-        "Ct": Taylor(body.S.T, _loads(K, LINEAR_LOADS, r)),
-        "Cr": Taylor(integrals["Inv4"].T, cross + _loads(K, ANGULAR_LOADS, r, zero=True)),
+        "Ct": Taylor(body.S.T, _loads(K, LINEAR_LOADS, r) if K.keys() & LINEAR_LOADS else None),
+        "Cr": Taylor(integrals["Inv4"].T, cross + _loads(K, ANGULAR_LOADS, r)),
         "Gr": Taylor(-2 * _by_axis(C4)),
         "Ge": Taylor(2 * _by_axis(cross)),
-        "Oe": Taylor(Oe0, Oe1 + _loads(K, CENTRIFUGAL_LOADS, r, zero=True)),
+        "Oe": Taylor(Oe0, Oe1 + _loads(K, CENTRIFUGAL_LOADS, r)),
     }
 
 
@@ -95,10 +93,8 @@ def _by_axis(A: Array) -> Array:
     return A.transpose(1, 2, 0).reshape(A.shape[1], -1)
 
 
-def _loads(K: dict[str, Array], names: tuple[str, ...], r: int, *, zero: bool = False) -> Any:
-    """(r, r, k) geometric stiffness of k loads; None where there is none, unless zeros serve."""
-    if not zero and not any(name in K for name in names):
-        return None
+def _loads(K: dict[str, Array], names: tuple[str, ...], r: int) -> Array:
+    """(r, r, k) geometric stiffness of k loads."""
     return np.stack([K.get(name, np.zeros((r, r))) for name in names], axis=-1)
 
 
@@ -114,9 +110,9 @@ def _elasticity(body: FlexibleBody) -> dict[str, Taylor]:
 def _node(marker: Marker, K: dict[str, Array]) -> dict[str, Taylor]:
     """A force moves with the node: the work on displacements of second order, K_l = -l . psi."""
     r, loads = marker.translation.shape[1], interface_loads(marker.name)
-    motion = _loads(K, loads, r)  # (j, i, 6)
     shift = turn = None
-    if motion is not None:
+    if K.keys() & loads:
+        motion = _loads(K, loads, r)  # (j, i, 6)
         shift, turn = -motion[..., :3].swapaxes(1, 2), -motion[..., 3:].swapaxes(1, 2)
     tilt = np.einsum("abc,bk->kac", EPS, marker.rotation)
     return {

@@ -22,6 +22,7 @@ from rom.model import Array
 from rom.names import ORIGIN_MARK
 
 ZERO, DIAGONAL, SYMMETRIC, GENERAL, UNIT = range(5)
+SIZES = ("order", "nrow", "ncol", "nq", "nqn", "structure")
 NODE_BLOCKS = ("origin", "phi", "psi", "AP", "sigma")
 BLOCKS = ("mdCM", "J", "Ct", "Cr", "Me", "Gr", "Ge", "Oe", "ksigma", "Ke", "De")
 ALWAYS_SYMMETRIC = ("J", "Me", "Ke", "De")
@@ -144,9 +145,8 @@ def _block(depth: int, name: str, block: Taylor, r: int, dialect: str) -> Iterat
     structure = _structure(name, M0, M1)
     triangle = structure == SYMMETRIC and not mode_second  # FEMBeam writes the lower one only
     yield _indented(depth, name)
-    sizes = {"order": int(M1 is not None), "nrow": M0.shape[0], "ncol": M0.shape[1], "nq": r,
-             "nqn": 0, "structure": structure}  # fmt: skip
-    for key, value in sizes.items():
+    sizes = int(M1 is not None), *M0.shape, r, 0, structure
+    for key, value in zip(SIZES, sizes, strict=True):
         yield _assigned(depth + 1, key, f" {value}")
     if structure not in (ZERO, UNIT):
         for i, j in np.argwhere(M0):

@@ -10,7 +10,7 @@ import numpy as np
 
 from rom.errors import FileFormatError, UnsafeFileError
 from rom.io.files import check_readable
-from rom.io.sid.format import BLOCKS, NODE_BLOCKS, SYMMETRIC, UNIT, ZERO, shape_of
+from rom.io.sid.format import BLOCKS, NODE_BLOCKS, SIZES, SYMMETRIC, UNIT, ZERO, shape_of
 from rom.model import Array
 from rom.names import ORIGIN_MARK, is_whole
 
@@ -18,7 +18,6 @@ MAX_BYTES = 2**28  # of a file that is still read
 MOST_MODES = 1000  # blocks grow with their square
 ASSIGNMENT_PATTERN = re.compile(r"([A-Za-z]\w*(?:\s+\w+)?)\s*(?:\(([^)]*)\))?\s*=\s*(.*)")
 HEAD_PATTERN = re.compile(r"^\d+\s+\d+\s*:No\. nodes, No\. modes:")
-SIZES = ("order", "nrow", "ncol", "nq", "nqn", "structure")
 LONGEST_MESSAGE = 200  # characters that quote a damaged file
 
 

@@ -105,8 +105,8 @@ def second_order_balanced_truncation(
     """
     K, M, D, B, C = (np.atleast_2d(np.asarray(A, dtype=float)) for A in (K, M, D, B, C))
     n = K.shape[0]
-    for name, A, shape in (("K", K, (n, n)), ("M", M, (n, n)), ("D", D, (n, n)),
-                           ("B", B, (n, None)), ("C", C, (None, n))):  # fmt: skip
+    shapes = (n, n), (n, n), (n, n), (n, None), (None, n)
+    for name, A, shape in zip("KMDBC", (K, M, D, B, C), shapes, strict=True):
         matrix(name, A, shape)
     whole("r", r, 1, n, reason="the coordinates of the system")
     S, R = _gramian_factors(K, M, D, B, C)
@@ -133,10 +133,8 @@ def _gramian_factors(K: Array, M: Array, D: Array, B: Array, C: Array) -> tuple[
             hint="Reduce with CraigBampton first, or choose a smaller pool.",
         )
     scale = np.sqrt(np.linalg.norm(np.linalg.solve(M, K), 2))  # of time, for the conditioning
-    A = np.block(
-        [[np.zeros((n, n)), np.eye(n)],
-         [-np.linalg.solve(M, K) / scale**2, -np.linalg.solve(M, D) / scale]]
-    )  # fmt: skip
+    back = [-np.linalg.solve(M, K) / scale**2, -np.linalg.solve(M, D) / scale]
+    A = np.block([[np.zeros((n, n)), np.eye(n)], back])
     if np.linalg.eigvals(A).real.max() >= 0.0:
         raise ModelError(
             "the system is not stable: its Gramians do not exist.",

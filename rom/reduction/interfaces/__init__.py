@@ -1,5 +1,5 @@
 """Interfaces of reduced bodies.
 
 `kinds` tie nodes to few coordinates, `polynomial`, `snapshots` and `characteristic` give them
-shapes, `order` finds how many; `connection` is what a basis sees, as `records`.
+shapes, `order` finds how many; `connection` is what a basis sees.
 """

@@ -2,13 +2,13 @@
 
 import logging
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.linalg import eigh, null_space, orth
 from scipy.sparse import identity, kron
 
 from rom.arguments import typed, whole
+from rom.eigen.connection import Connection
 from rom.eigen.verbs import (
     Operators,
     given_rigid_motions,
@@ -19,9 +19,6 @@ from rom.eigen.verbs import (
 from rom.errors import ConfigError
 from rom.model import Array, Interface
 from rom.reduction.bases.method import Guyan, Method
-
-if TYPE_CHECKING:
-    from rom.reduction.interfaces.records import Connection
 
 log = logging.getLogger("rom")
 
@@ -56,7 +53,7 @@ class Characteristic:
     def __post_init__(self) -> None:
         whole("n", self.n, 6, reason="the rigid motions count")
 
-    def kinds(self, connection: "Connection", interfaces: dict[str, Any]) -> dict[str, Any]:
+    def kinds(self, connection: Connection, interfaces: dict[str, object]) -> dict[str, object]:
         """The kinds of all interfaces, functions in the place of "full".
 
         Args:
@@ -88,8 +85,8 @@ class Characteristic:
             found[name] = CharacteristicFunctions(part[:, :kept])
             if kept > m and ops.first == 0:
                 repeated = np.sqrt(lam[m - 1]) / (2 * np.pi)
-                log.info("interface %r: more than %d functions, %.4g Hz is repeated", name, self.n,
-                         repeated)  # fmt: skip
+                text = "interface %r: more than %d functions, %.4g Hz is repeated"
+                log.info(text, name, self.n, repeated)
         return interfaces | found
 
     def _number(self, part: Array, rigid: Array) -> int:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 
+from rom.eigen.connection import Connection, Tie
 from rom.eigen.verbs import (
     Operators,
     given_rigid_motions,
@@ -21,7 +22,6 @@ from rom.errors import InterfaceError
 from rom.model import FEModel, Index, Interface
 from rom.names import named, offered
 from rom.reduction.interfaces.kinds import tie
-from rom.reduction.interfaces.records import Connection, Tie
 
 
 def connect(ops: Operators, model: FEModel, interfaces: dict[str, Any]) -> Connection:

@@ -7,13 +7,13 @@ import numpy as np
 from scipy.linalg import qr
 from scipy.sparse import identity, kron
 
+from rom.eigen.connection import Tie
 from rom.eigen.verbs import mean_motion, rigid_motions
 from rom.errors import ConfigError, ResourceError
 from rom.model import Array, Interface
 from rom.names import is_whole
 from rom.reduction.interfaces.characteristic import CharacteristicFunctions
 from rom.reduction.interfaces.polynomial import FourierLegendre, Polynomial, interface_functions
-from rom.reduction.interfaces.records import Tie
 from rom.reduction.interfaces.snapshots import Snapshots, snapshot_functions
 
 RBE3_DOFS = 6000  # an averaging interface couples all its dofs: 6000 of them fill 0.3 GB

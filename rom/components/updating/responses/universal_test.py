@@ -5,7 +5,6 @@ Source:
 """
 
 from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +19,8 @@ from rom.components.updating.responses.unit_labels import (
     plain,
 )  # fmt: skip
 from rom.errors import ConfigError, FileFormatError
-from rom.io.fields.universal import FREQUENCY_RESPONSE, Function, scan
+from rom.io.fields.universal import FREQUENCY_RESPONSE, Function, reals, scan
+from rom.io.files import damaged, need
 from rom.model import Array
 
 SETS = dict[str, list[list[str]]]
@@ -60,10 +60,8 @@ def _factors(others: SETS) -> tuple[float, float] | None:
     """Units of the file per metre and newton, where it says."""
     found = set()
     for lines in others.get("164", []):
-        try:
-            length, force = (float(lines[1][a:b].replace("D", "E")) for a, b in ((0, 25), (25, 50)))
-        except (ValueError, IndexError) as error:
-            raise FileFormatError(f"dataset 164 is cut: {error}.") from error
+        with damaged("dataset 164 is cut"):
+            length, force = reals(lines[1], (25, 25))
         found.add((length, force))
     if len(found) > 1 or not all(np.isfinite(f).all() and min(f) > 0 for f in found):
         raise FileFormatError(f"dataset 164 has the factors {sorted(found)}.")
@@ -73,17 +71,15 @@ def _factors(others: SETS) -> tuple[float, float] | None:
 def _points(others: SETS, factors: tuple[float, float] | None) -> dict[int, Array]:
     length = factors[0] if factors else 1.0
     points: dict[int, Array] = {}
-    try:
+    with damaged("a dataset 18 or 2420 is cut"):
         names, same = _systems(others)
-    except (ValueError, IndexError) as error:
-        raise FileFormatError(f"a dataset 18 or 2420 is cut: {error}.") from error
     local = any(name in others for name in AXES_SETS)
     for name in NODE_SETS:
         for lines in others.get(name, []):
-            records = lines if name == "15" else _pairs(lines)
-            width = 13 if name == "15" else 25
-            for line in records:
-                node, system, turned, x = _node(name, line, width)
+            with damaged(f"dataset {name} is cut"):
+                records = lines if name == "15" else _pairs(lines)
+                nodes = [_node(line, 13 if name == "15" else 25) for line in records]
+            for node, system, turned, x in nodes:
                 if local and (other := {system, turned} - same):
                     named = [f"{k} {names.get(k, '')}".strip() for k in sorted(other)]
                     raise FileFormatError(
@@ -122,18 +118,15 @@ def _along_axes(A: Array) -> bool:
     )
 
 
-def _node(name: str, line: str, width: int) -> tuple[int, int, int, Array]:
-    try:
-        whole = [int(line[a : a + 10]) for a in (0, 10, 20)]
-        x = [float(line[40 + width * k : 40 + width * (k + 1)].replace("D", "E")) for k in range(3)]
-    except ValueError as error:
-        raise FileFormatError(f"dataset {name} is cut: {error}.") from error
-    return whole[0], whole[1], whole[2], np.array(x)
+def _node(line: str, width: int) -> tuple[int, int, int, Array]:
+    """Number, coordinate systems of place and displacement, and place of a node."""
+    node, system, turned = (int(line[a : a + 10]) for a in (0, 10, 20))
+    x, y, z = reals(line[40:], [width] * 3)
+    return node, system, turned, np.array([x, y, z])
 
 
 def _pairs(lines: list[str]) -> list[str]:
-    if len(lines) % 2:
-        raise FileFormatError("dataset 2411 is cut: it has an odd line.")
+    need(len(lines) % 2 == 0, "it has an odd line")
     return [f"{a:<40}"[:40] + b for a, b in zip(lines[::2], lines[1::2], strict=True)]
 
 
@@ -173,7 +166,7 @@ def _agreed(label: float, units: float) -> float:
 
 def _shape(lines: list[str]) -> tuple[float, float, dict[int, Array]] | None:
     """Frequency [Hz], damping ratio and {node: (3,)} of one dataset 55; None if it is no mode."""
-    try:
+    with damaged("dataset 55 is cut"):
         analysis, kind = (int(lines[5][a : a + 10]) for a in (10, 40))
         if analysis not in (NORMAL, COMPLEX):
             return None
@@ -183,10 +176,7 @@ def _shape(lines: list[str]) -> tuple[float, float, dict[int, Array]] | None:
         else:
             size = np.hypot(real[0], real[1])
             f, zeta = size / (2 * np.pi), -real[0] / size
-        values = _values(lines[N_SHAPE_RECORDS:], kind == 5)
-    except (ValueError, IndexError, KeyError) as error:
-        raise FileFormatError(f"dataset 55 is cut: {error}.") from error
-    return float(f), float(zeta), values
+        return float(f), float(zeta), _values(lines[N_SHAPE_RECORDS:], kind == 5)
 
 
 def _values(lines: list[str], is_complex: bool) -> dict[int, Array]:
@@ -199,13 +189,11 @@ def _values(lines: list[str], is_complex: bool) -> dict[int, Array]:
         else:
             numbers[node := int(line)] = []
     sizes = {len(found) for found in numbers.values()}
-    if len(sizes) != 1 or min(sizes) < (6 if is_complex else 3):
-        raise ValueError(f"nodes have {sorted(sizes)} numbers")
+    enough = len(sizes) == 1 and min(sizes) >= (6 if is_complex else 3)
+    need(enough, f"nodes have {sorted(sizes)} numbers")
     found = {node: np.array(x) for node, x in numbers.items()}
     return {n: (x[:6:2] + 1j * x[1:6:2] if is_complex else x[:3]) for n, x in found.items()}
 
 
 def _columns(line: str, width: int = 13) -> list[float]:
-    ends = range(0, len(line.rstrip()) + width, width)
-    cells = (line[a:b].strip() for a, b in pairwise(ends))
-    return [float(cell.replace("D", "E")) for cell in cells if cell]
+    return reals(line, [width] * (len(line) // width + 1))
