@@ -10,7 +10,7 @@ Source:
 
 import math
 from functools import cache
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 import numpy.typing as npt
@@ -131,7 +131,7 @@ def late_strip(t, parameters, motion, memory, out):
 
 
 @cache
-def compiled_late_strip() -> Any:
+def compiled_late_strip() -> object:
     """The compiled law of a strip behind its own wake."""
     return compiled_entry(late_strip, LAW_TYPES)
 
