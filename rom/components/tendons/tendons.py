@@ -168,7 +168,7 @@ def tendon(  # noqa: PLR0913  one keyword per property
     self.add(name, Tendon(stations, numbers, EA is None, function), TENDONS_FAMILY)
 
 
-def _station(mechanism: Whole, name: str, place: Any, friction: float) -> Station:
+def _station(mechanism: Whole, name: str, place: Marker | Pulley, friction: float) -> Station:
     """A place of the path in the axes of its marker."""
     if isinstance(place, Marker):
         mechanism.check_markers(name, place)
@@ -193,8 +193,8 @@ def _design_length(whole: Whole, name: str, stations: Sequence[Station]) -> floa
         text = f"tendon {name!r} ends at a pulley."
         raise ConfigError(text, hint="It is fixed at a marker at both ends.")
     path = path_through(name, [_placed(whole, one) for one in stations])
-    arcs = (one.radius * (wrap + 2 * np.pi * one.turns)
-            for one, wrap in zip(stations, path.wrap, strict=True))  # fmt: skip
+    wraps = zip(stations, path.wrap, strict=True)
+    arcs = (one.radius * (wrap + 2 * np.pi * one.turns) for one, wrap in wraps)
     return float(path.straight.sum() + sum(arcs))
 
 
@@ -264,8 +264,8 @@ class Tendons(Table):
 
 def pack(tendons: Mapping[str, Tendon], places: Places) -> Tendons:
     """The tendons as arrays."""
-    named = [(f"place {k} of {name}", one) for name, tendon in tendons.items()
-             for k, one in enumerate(tendon.stations)]  # fmt: skip
+    each = ((name, k, one) for name, x in tendons.items() for k, one in enumerate(x.stations))
+    named = [(f"place {k} of {name}", one) for name, k, one in each]
     stations = [one for _, one in named]
     sizes = [len(tendon.stations) for tendon in tendons.values()]
     p, m = len(stations), max(sizes)
@@ -400,12 +400,15 @@ def tensions(tendons: Tendons) -> list[Array]:
     return [tendons.tension[a : b - 1] for a, b in pairwise(tendons.first.tolist())]
 
 
+FORCES = tendon_wrenches, tendon_tangents, tendon_energy
+LOST = "the path of {} is lost: it has left a pulley, its places meet, or a winch took it all"
 TENDONS_FAMILY = Family(
-    "tendons", Tendon, pack, tendon_wrenches, tendon_tangents, tendon_energy, ends=ends,
-    couples=coupled, by_rate=lambda tendons: tendons.rated.any(),
-    hooks=Hooks(
-        answers=tensions,
-        lost="the path of {} is lost: it has left a pulley, its places meet, or a winch took it "
-        "all",
-    ),
-)  # fmt: skip
+    "tendons",
+    Tendon,
+    pack,
+    *FORCES,
+    ends=ends,
+    couples=coupled,
+    by_rate=lambda tendons: tendons.rated.any(),
+    hooks=Hooks(answers=tensions, lost=LOST),
+)

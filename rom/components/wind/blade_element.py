@@ -12,14 +12,13 @@ Source:
 
 import math
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import numpy.typing as npt
 from numba import carray
 
 from rom.arguments import finite, positive, unit_vector
-from rom.components.cosserat.bodies import RodBody
+from rom.components.cosserat.bodies import RodBody, law_of
 from rom.components.wind.blading import (
     AIR_DENSITY,
     CHORD,
@@ -44,7 +43,7 @@ from rom.components.wind.wind_turbine import (
     stations,
 )
 from rom.errors import ConfigError
-from rom.mbs.elements.nonlinear import Elements, compiled_law
+from rom.mbs.elements.nonlinear import Elements
 from rom.mbs.kernels.algebra import rotation, unit
 from rom.mbs.kernels.compiled import inner
 from rom.model import Array
@@ -217,12 +216,6 @@ def strip(numbers, pose, wanted, answer, space):
     spread(R, J, L, W, out)
 
 
-@cache
-def compiled_strip() -> object:
-    """The compiled law of a strip."""
-    return compiled_law(strip)
-
-
 def in_wind(
     blade: RodBody,
     wind: npt.ArrayLike,
@@ -250,7 +243,7 @@ def in_wind(
     """
     far = far_away(wind, axis, tower=tower, density=density)
     rows = enumerate(strip_rows(blade, far, cone))
-    groups = [Elements.of(compiled_strip(), np.array([[k]]), row[None, :]) for k, row in rows]
+    groups = [Elements.of(law_of(strip), np.array([[k]]), row[None, :]) for k, row in rows]
     return replace(blade, elements=(*blade.elements, *groups))
 
 

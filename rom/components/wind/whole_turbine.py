@@ -12,7 +12,6 @@ Source:
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
 from typing import Annotated, Any
 
 import numpy as np
@@ -26,7 +25,7 @@ from rom.components.cosserat import RodBody, body
 from rom.components.wind.blade_element import in_wind
 from rom.components.wind.blading import Pitch
 from rom.components.wind.control import CUT_OUT_WIND, Controller, advance
-from rom.components.wind.wake import NEVER_BEFORE, in_late_wind, over_time
+from rom.components.wind.wake import NEVER_BEFORE, entry_of, in_late_wind, over_time
 from rom.components.wind.wind_turbine import (
     CONE_ANGLE,
     GEAR_RATIO,
@@ -44,7 +43,7 @@ from rom.components.wind.wind_turbine import (
 )
 from rom.errors import ConfigError
 from rom.mbs.analysis.equilibrium import equilibrium
-from rom.mbs.elements.law_calls import LAW_TYPES, compiled_entry
+from rom.mbs.elements.law_calls import LAW_TYPES
 from rom.mbs.elements.nonlinear import Assembly
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.mechanism import Mechanism
@@ -376,12 +375,6 @@ def control(t, parameters, motion, memory, out):
             moment[3 * a + i] = held * axis[i]
 
 
-@cache
-def compiled_control() -> object:
-    """The compiled law."""
-    return compiled_entry(control, LAW_TYPES)
-
-
 def add_control(
     mechanism: Mechanism, markers: tuple[Marker, ...], axis: Array, start: tuple[float, float]
 ) -> None:
@@ -398,7 +391,7 @@ def add_control(
     turned = [(A.T @ B)[:, :2].T.ravel() for A, B in zip(axes[2::2], axes[3::2], strict=True)]
     mechanism.law(
         "control",
-        compiled_control(),
+        entry_of(control, LAW_TYPES),
         *markers,
         parameters=np.concatenate([axes[0].T @ axis, [pitch], *turned]),
         memory=[one.filtered, one.integral, one.pitch, one.torque, NEVER_BEFORE],
