@@ -12,10 +12,10 @@ from rom.view.canvas.scene import Actor
 from rom.view.scenes.connections import DAMPER_COLOUR, LINE_WIDTH
 from rom.view.scenes.ground import Scenery
 
+Drawn = Actor | tuple[Marker, Array, float]  # or axis and radius of a circle at a marker
 
-def draw(
-    scenery: Scenery, name: str, tendon: Tendon
-) -> Iterator[Actor | tuple[Marker, Array, float]]:
+
+def draw(scenery: Scenery, name: str, tendon: Tendon) -> Iterator[Drawn]:
     """The line of a cable, and the circles of its pulleys."""
     places, stations = scenery.places, tendon.stations
     x = [places.point(one.marker) for one in stations]

@@ -143,17 +143,13 @@ def tendon(  # noqa: PLR0913  one keyword per property
     stations = tuple(_station(self, name, place, friction) for place in path)
     length = _design_length(self, name, stations)
     if any(one.friction for one in stations[1:-1]) and transition_speed is None:
-        raise ConfigError(
-            f"tendon {name!r} has friction, but no transition_speed.",
-            hint="Take a hundredth of the speed with which it slides.",
-        )
+        text = f"tendon {name!r} has friction, but no transition_speed."
+        raise ConfigError(text, hint="Take a hundredth of the speed with which it slides.")
     if (EA is None) == (tension is None):
         raise ConfigError(f"tendon {name!r} needs either EA or tension.")
     if EA is None and (damping or pretension or free_length is not None):
-        raise ConfigError(
-            f"tendon {name!r} is pulled by a given tension and does not stretch; leave damping, "
-            "free_length and pretension out."
-        )
+        text = f"tendon {name!r} is pulled by a given tension and does not stretch"
+        raise ConfigError(f"{text}; leave damping, free_length and pretension out.")
     if pretension and free_length is not None:
         raise ConfigError(f"tendon {name!r} has pretension and free_length; give only one.")
     given = free_length if EA else tension
@@ -402,13 +398,7 @@ def tensions(tendons: Tendons) -> list[Array]:
 
 FORCES = tendon_wrenches, tendon_tangents, tendon_energy
 LOST = "the path of {} is lost: it has left a pulley, its places meet, or a winch took it all"
+WHERE = {"ends": ends, "couples": coupled, "hooks": Hooks(answers=tensions, lost=LOST)}
 TENDONS_FAMILY = Family(
-    "tendons",
-    Tendon,
-    pack,
-    *FORCES,
-    ends=ends,
-    couples=coupled,
-    by_rate=lambda tendons: tendons.rated.any(),
-    hooks=Hooks(answers=tensions, lost=LOST),
+    "tendons", Tendon, pack, *FORCES, **WHERE, by_rate=lambda tendons: tendons.rated.any()
 )
