@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose
 
 import rom
 from benchmarks.models import bar
+from cases.components.rods import ALONG_X
 from cases.mbs.floating_rod import swing
 from cases.mbs.mechanisms import residual_at, tangents_at
 from cases.refusals import refuses
@@ -24,7 +25,6 @@ from rom.mbs.integrate.consistent_start import initial_state
 from rom.mbs.kernels.work import workspace
 from rom.view.scenes.film import shades_of
 
-ALONG_X = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])  # section axes: y, z, x
 ORIGIN = (0.0, 0.0, 0.0)
 SECTION = {"stretch": (5e5, 5e5, 1e6), "bend": (1e3, 2e3, 1.5e3), "mass": 1.0,
            "inertia": (1e-2, 2e-2, 3e-2)}  # fmt: skip
