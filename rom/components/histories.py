@@ -12,18 +12,19 @@ Source:
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import finite, is_number, number, positive, typed
+from rom.arguments import Positive, is_number, typed
 from rom.errors import ConfigError, FileFormatError
 from rom.model import Array
 
 MAX_GAP_RATIO = 1.5  # longest interval of a record over its usual one; more is a gap
 MAX_HALVINGS = 20  # of 256 intervals: jumps of functions become as steep as 4e-9 of the span
 STRAIGHT_RTOL = 1e-5  # of the largest value: how far lines stray from a function
+Duration = Annotated[float, Positive("s")]
 Pair = tuple[npt.ArrayLike, npt.ArrayLike]
 History = float | Callable[[Array], Array] | Pair
 
@@ -56,10 +57,8 @@ class Table:
         for name, x in (("time", t), ("value", values)):
             if not np.isfinite(x).all():
                 k = int(np.argmin(np.isfinite(x)))
-                raise ConfigError(
-                    f"{name} {k} of the history is {x[k]}.",
-                    hint="Records with gaps are not mended; fill them, or cut the record there.",
-                )
+                hint = "Records with gaps are not mended; fill them, or cut the record there."
+                raise ConfigError(f"{name} {k} of the history is {x[k]}.", hint=hint)
         if not (np.diff(t) > 0).all():
             k = int(np.argmin(np.diff(t) > 0))
             raise ConfigError(f"times of a history must grow: {t[k]} s comes before {t[k + 1]} s.")
@@ -131,7 +130,9 @@ def read_record(path: str | Path, *, scale: float = 1.0) -> Table:
 
 
 @typed
-def sine(amplitude: float, period: float, *, cycles: float = np.inf, phase: float = 0.0) -> History:
+def sine(
+    amplitude: float, period: Duration, *, cycles: float = np.inf, phase: float = 0.0
+) -> History:
     """Harmonic motion, or a pulse of some cycles of it: half a one, one, ten.
 
     Args:
@@ -143,8 +144,6 @@ def sine(amplitude: float, period: float, *, cycles: float = np.inf, phase: floa
     Raises:
         ConfigError: if there is no such motion.
     """
-    finite("amplitude and phase", [amplitude, phase], (2,))
-    positive("period", period)
     if not cycles > 0:
         raise ConfigError(f"cycles = {cycles} must be positive.")
 
@@ -156,26 +155,22 @@ def sine(amplitude: float, period: float, *, cycles: float = np.inf, phase: floa
 
 
 @typed
-def rectangle(amplitude: float, duration: float) -> History:
+def rectangle(amplitude: float, duration: Duration) -> History:
     """A value that stays for a time [s] and ends.
 
     Raises:
         ConfigError: if there is no such pulse.
     """
-    number("amplitude", amplitude)
-    positive("duration", duration)
     return lambda t: np.where(np.asarray(t) < duration, amplitude, 0.0)
 
 
 @typed
-def ramp(duration: float) -> History:
+def ramp(duration: Duration) -> History:
     """From 0 to 1 along half a cosine in a time [s], and 1 from there on.
 
     Raises:
         ConfigError: if the time is not positive.
     """
-    if not 0 < duration < np.inf:
-        raise ConfigError(f"no ramp takes {duration} s.")
     return lambda t: (1 - np.cos(np.pi * np.clip(np.asarray(t) / duration, 0.0, 1.0))) / 2
 
 
@@ -198,10 +193,8 @@ def corners_of(name: str, pair: Pair, n: int = 1, *, rows: bool = False) -> tupl
             f"{name}: its history must be a number, a function, or a pair of times and values."
         ) from error
     if t.ndim != 1 or not t.size or y.shape[:1] != t.shape or not np.all(np.diff(t) > 0):
-        raise ConfigError(
-            f"{name}: times of the shape {t.shape} with values {y.shape}.",
-            hint="Times that grow, and one value, or row of values, for each.",
-        )
+        text = f"{name}: times of the shape {t.shape} with values {y.shape}."
+        raise ConfigError(text, hint="Times that grow, and one value, or row of values, for each.")
     y = np.repeat(y[:, None], n, axis=1) if y.ndim == 1 and not rows else y
     if y.shape != (len(t), n) or not (np.isfinite(t).all() and np.isfinite(y).all()):
         raise ConfigError(f"{name}: values {y.shape}, needed are {(len(t), n)} finite ones.")
@@ -260,10 +253,8 @@ def values_at(name: str, history: History, t: Array) -> Array:
     given = history(t) if callable(history) else np.full(len(t), history)
     found = np.asarray(given, dtype=float)
     if found.shape != t.shape:
-        raise ConfigError(
-            f"the history of {name} gives the shape {found.shape} for {len(t)} times.",
-            hint="Write it for arrays, with np.where for cases.",
-        )
+        text = f"the history of {name} gives the shape {found.shape} for {len(t)} times."
+        raise ConfigError(text, hint="Write it for arrays, with np.where for cases.")
     if not np.isfinite(found).all():
         raise ConfigError(
             f"the history of {name} is {found[~np.isfinite(found)][0]} at "

@@ -86,7 +86,9 @@ def test_the_wheel_holds_every_module_and_its_data(shipped):
     names = set(zipfile.ZipFile(shipped[1]).namelist())
     files = [p for p in (ROOT / "rom").rglob("*") if p.is_file() and "__pycache__" not in p.parts]
     wanted = {str(p.relative_to(ROOT)) for p in files}
-    tables = {f"rom/components/wind/nrel5mw_{name}.csv" for name in ("blade", "profiles")}
+    tables = {
+        f"rom/components/wind/nrel5mw_{name}.csv" for name in ("blade", "elements", "profiles")
+    }
     assert {"rom/py.typed", *tables} <= wanted <= names
     assert not {n for n in names if not n.startswith(("rom/", "fenicsx_rom-"))}
 

@@ -13,7 +13,6 @@ Source:
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
 
 import numpy as np
 from numba import carray
@@ -30,6 +29,7 @@ from rom.components.cosserat.shapes import Shape, reference
 from rom.errors import ModelError
 from rom.mbs.elements.nonlinear import LAW_MEMORY_SIZE, Elements, Frames, compiled_law
 from rom.mbs.kernels.compiled import inner, spliced
+from rom.mbs.results.solution import Solution
 from rom.model import Array
 
 POSE_SIZE = 13  # numbers of a frame: position, quaternion, velocity, angular velocity
@@ -39,6 +39,7 @@ SEGMENT_DOFS = np.array([0, 1, 2, 9, 10, 11, 6, 7, 8])
 VERTEX_DOFS = np.array([3, 4, 5, 0, 1, 2, 9, 10, 11])
 # inertia that a plate without one takes over from the segment beside it: a trapezoid's share
 PLATE_INERTIA_SHARE = 0.25
+law_of = cache(compiled_law)
 
 
 @spliced
@@ -105,12 +106,6 @@ def vertex(numbers, pose, wanted, answer, space):
     answer_of(W, B, given[4:7], given[0], VERTEX_DOFS, poses, wanted, result)
 
 
-@cache
-def laws() -> tuple[Any, Any]:
-    """Compiled laws of segments and vertices."""
-    return compiled_law(segment), compiled_law(vertex)
-
-
 @dataclass(frozen=True)
 class RodBody:
     """A rod for `rom.Mechanism.add_nonlinear`, see `body`.
@@ -151,8 +146,8 @@ def body(rod: Rod, start: Shape | None = None) -> RodBody:
     """
     shape = reference(rod) if start is None else start
     if rod.mass.min() <= 0.0 or rod.inertia[1:-1].min() <= 0.0:
-        raise ModelError("a rod without mass or inertia cannot move in a mechanism.",
-                         hint="Give rod(...) mass and inertia of its sections.")  # fmt: skip
+        text = "a rod without mass or inertia cannot move in a mechanism."
+        raise ModelError(text, hint="Give rod(...) mass and inertia of its sections.")
     mass = np.append(rod.mass, 0.5 * rod.mass[-1])
     mass[-2] *= 0.5
     frames = Frames(np.vstack([shape.x, shape.x[-1:]]), shape.p.copy(), mass, _inertia(rod))
@@ -160,11 +155,10 @@ def body(rod: Rod, start: Shape | None = None) -> RodBody:
     pairs = np.column_stack([np.arange(n + 1), np.arange(1, n + 2)])
     stretch = np.column_stack([rod.h, rod.stretch, rod.viscous_stretch, rod.a0])
     bend = np.column_stack([rod.l, rod.bend, rod.viscous_bend, rod.s, rod.S.reshape(n + 1, 9)])
-    by_segment, by_vertex = laws()
     by_rate = bool(rod.viscous_stretch.any() or rod.viscous_bend.any())
     along = (
-        Elements.of(by_segment, pairs[:-1], stretch, by_rate=by_rate),
-        Elements.of(by_vertex, pairs, bend, by_rate=by_rate),
+        Elements.of(law_of(segment), pairs[:-1], stretch, by_rate=by_rate),
+        Elements.of(law_of(vertex), pairs, bend, by_rate=by_rate),
     )
     return RodBody(rod, frames, along)
 
@@ -180,7 +174,7 @@ def _inertia(rod: Rod) -> Array:
     return J
 
 
-def shape_of(solution: Any, name: str, k: int = -1) -> Shape:
+def shape_of(solution: Solution, name: str, k: int = -1) -> Shape:
     """Shape of a rod of a mechanism at a saved instant, in the world.
 
     Args:

@@ -10,16 +10,14 @@ a force grows in proportion, along the line and against the angle.
 
 import math
 from dataclasses import replace
-from functools import cache
-from typing import Any
 
 import numpy as np
 from numba import carray
 
 from rom.arguments import not_negative, positive
-from rom.components.cosserat.bodies import POSE_SIZE, RodBody
+from rom.components.cosserat.bodies import POSE_SIZE, RodBody, law_of
 from rom.components.cosserat.energy import product
-from rom.mbs.elements.nonlinear import Elements, compiled_law
+from rom.mbs.elements.nonlinear import Elements
 from rom.mbs.kernels.algebra import dot, scale, sub, vec
 from rom.mbs.kernels.compiled import inner
 
@@ -123,11 +121,6 @@ def coils(numbers, pose, wanted, answer, _space):
         gradient[i] *= stiffness * gap
 
 
-@cache
-def _law() -> Any:
-    return compiled_law(coils)
-
-
 def with_coils(body: RodBody, *, radius: float, solid: float, stiffness: float) -> RodBody:
     """The body of the rod of a spring with coils that stop it where they touch.
 
@@ -136,6 +129,6 @@ def with_coils(body: RodBody, *, radius: float, solid: float, stiffness: float) 
     """
     n = len(body.frames.x)
     not_negative("solid", solid)
-    numbers = [n, positive("radius", radius), solid, positive("stiffness", stiffness)]
-    stop = Elements.of(_law(), np.arange(n)[None], np.array([numbers], dtype=float), by_rate=False)
+    numbers = np.array([[n, positive("radius", radius), solid, positive("stiffness", stiffness)]])
+    stop = Elements.of(law_of(coils), np.arange(n)[None], numbers, by_rate=False)
     return replace(body, elements=(*body.elements, stop))

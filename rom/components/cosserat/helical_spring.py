@@ -10,7 +10,7 @@ Source:
 """
 
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
@@ -49,13 +49,12 @@ class HelicalSpring:
     total_coils: float | None = None
 
     def __post_init__(self) -> None:
-        if self.diameter <= self.wire:
-            raise ModelError(
-                f"wire = {self.wire:g} m must be below diameter = {self.diameter:g} m."
-            )
-        if self.length <= self.solid_length:
-            raise ModelError(f"free length {self.length:g} m is not above the solid length "
-                             f"{self.solid_length:g} m.", hint="Take fewer coils.")  # fmt: skip
+        wire, solid = self.wire, self.solid_length
+        if self.diameter <= wire:
+            raise ModelError(f"wire = {wire:g} m must be below diameter = {self.diameter:g} m.")
+        if self.length <= solid:
+            text = f"free length {self.length:g} m is not above the solid length {solid:g} m."
+            raise ModelError(text, hint="Take fewer coils.")
 
     @property
     def G(self) -> float:
@@ -120,8 +119,8 @@ class HelicalSpring:
         Displacements [m], then rotations [rad]; forces [N], then moments [N m]; third axis along.
         """
         l, B, S = self.length, self.bending, self.shear
-        C = np.diag([l**3 / (3 * B) + l / S] * 2 + [l / self.axial] + [l / B] * 2 +
-                    [l / self.torsion])  # fmt: skip
+        across, turned = l**3 / (3 * B) + l / S, l / B
+        C = np.diag([across, across, l / self.axial, turned, turned, l / self.torsion])
         C[0, 4] = C[4, 0] = l**2 / (2 * B)
         C[1, 3] = C[3, 1] = -(l**2) / (2 * B)
         return C
@@ -168,7 +167,7 @@ class HelicalSpring:
         return shear, 32 * moment / (np.pi * self.wire**3)
 
 
-def spring_rod(spring: HelicalSpring, n: int = 16, **options: Any) -> Rod:
+def spring_rod(spring: HelicalSpring, n: int = 16, **options: npt.ArrayLike) -> Rod:
     """The spring as a rod of n segments; options as for `cosserat.straight`."""
     return straight(spring.length, n, **spring.rigidities(), **options)
 
@@ -187,14 +186,13 @@ def wire_rod(spring: HelicalSpring, per_coil: int = 40) -> Rod:
         c, s = np.cos(angle), np.sin(angle)
         tangent = np.array([-R * s, R * c, rise]) / slope
         outward = np.array([c, s, 0.0])
-        return (np.array([R * c, R * s, rise * angle]),
-                np.column_stack([outward, np.cross(tangent, outward), tangent]))  # fmt: skip
+        axes = np.column_stack([outward, np.cross(tangent, outward), tangent])
+        return np.array([R * c, R * s, rise * angle]), axes
 
     stations = np.linspace(0, 2 * np.pi * spring.coils, round(per_coil * spring.coils) + 1)
     area, EI = np.pi * spring.wire**2 / 4, spring.E * np.pi * spring.wire**4 / 64
-    GA = 0.9 * spring.G * area
-    return along(place, stations, stretch=(GA, GA, spring.E * area),
-                 bend=(EI, EI, EI / (1 + spring.nu)))  # fmt: skip
+    GA, bend = 0.9 * spring.G * area, (EI, EI, EI / (1 + spring.nu))
+    return along(place, stations, stretch=(GA, GA, spring.E * area), bend=bend)
 
 
 def plate_compliance(rod: Rod, centre: npt.ArrayLike) -> Array:

@@ -18,40 +18,43 @@ if TYPE_CHECKING:
     from rom.model import Array
 
 LENGTH_KIND = Positive("m")
+THREE = ((3,),)
+TUBE_KEYS = (
+    Key("diameter", LENGTH_KIND, "Outer diameter.", ...),
+    Key("thickness", LENGTH_KIND, "Of the wall.", ...),
+)
+RECTANGLE_KEYS = (
+    Key("width", LENGTH_KIND, "Along the first axis.", ...),
+    Key("height", LENGTH_KIND, "Along the second axis.", ...),
+)
+NUMBER_KEYS = (
+    Key("stretch", Quantity("N", THREE), "GA1, GA2, EA.", ...),
+    Key("bend", Quantity("N m^2", THREE), "EI1, EI2, GJ.", ...),
+    Key("mass", Positive("kg/m"), "Per length.", ...),
+    Key("inertia", Quantity("kg m", THREE), "Per length, about the axes.", ...),
+)
 SECTION_KINDS = {
     "circle": Table("A full circle.", (Key("diameter", LENGTH_KIND, "Diameter.", ...),)),
-    "tube": Table("A circle with a bore.", (
-        Key("diameter", LENGTH_KIND, "Outer diameter.", ...),
-        Key("thickness", LENGTH_KIND, "Of the wall.", ...),
-    )),
-    "rectangle": Table("A full rectangle.", (
-        Key("width", LENGTH_KIND, "Along the first axis.", ...),
-        Key("height", LENGTH_KIND, "Along the second axis.", ...),
-    )),
-    "numbers": Table("A section by its rigidities; it takes no material.", (
-        Key("stretch", Quantity("N", ((3,),)), "GA1, GA2, EA.", ...),
-        Key("bend", Quantity("N m^2", ((3,),)), "EI1, EI2, GJ.", ...),
-        Key("mass", Positive("kg/m"), "Per length.", ...),
-        Key("inertia", Quantity("kg m", ((3,),)), "Per length, about the axes.", ...),
-    )),
-}  # fmt: skip
+    "tube": Table("A circle with a bore.", TUBE_KEYS),
+    "rectangle": Table("A full rectangle.", RECTANGLE_KEYS),
+    "numbers": Table("A section by its rigidities; it takes no material.", NUMBER_KEYS),
+}
+AXIS = "Its axis without stress in its own frame: a line through two, a smooth curve through more."
+NORMAL = "First axis of the section at the start, in its own frame; it turns only with the curve."
 ROD_KEYS = (
-    Key("points", Quantity("m", ((None, 3),)),
-        "Its axis without stress, in its own frame: the line through two, a smooth curve through "
-        "more.", ...),
+    Key("points", Quantity("m", ((None, 3),)), AXIS, ...),
     Key("section", Variants(SECTION_KINDS), "Its section.", ...),
     Key("material", ISOTROPIC, "What it is made of."),
     Key("elements", Whole(1, 10000), "Number of segments, about equally long.", 20),
-    Key("normal", Quantity("1", ((3,),)),
-        "First axis of the section at the start, in its own frame; from there on it turns no more "
-        "than the curve does."),
+    Key("normal", Quantity("1", THREE), NORMAL),
     Key("viscosity", Quantity("s"), "Viscous over elastic rigidities.", 0.0),
-)  # fmt: skip
+)
+Values = dict[str, Any]  # of the keys of an entry
 MAX_POINTS = 10000
 FINE_STEPS = 16  # of the curve per segment, to measure its length
 
 
-def rod_of(values: dict[str, Any], place: Place) -> "Rod":
+def rod_of(values: Values, place: Place) -> "Rod":
     """The rod that an entry describes.
 
     Raises:
@@ -70,7 +73,7 @@ def rod_of(values: dict[str, Any], place: Place) -> "Rod":
         raise
 
 
-def _rigidities(values: dict[str, Any], place: Place) -> dict[str, Any]:
+def _rigidities(values: Values, place: Place) -> Values:
     """Rigidities, mass and inertia per length.
 
     Source:
@@ -127,7 +130,7 @@ def _ring(section: dict[str, float], place: Place, nu: float) -> tuple[float, ..
     return np.pi * (outer**2 - inner**2), I, I, 2 * I, share
 
 
-def _curve(values: dict[str, Any], place: Place) -> tuple["Array", "Array"]:
+def _curve(values: Values, place: Place) -> tuple["Array", "Array"]:
     """(N + 1, 3) vertices, and (N + 2, 4) quaternions of plates and segments."""
     from scipy.interpolate import CubicSpline
 
@@ -151,7 +154,7 @@ def _curve(values: dict[str, Any], place: Place) -> tuple["Array", "Array"]:
     return vertices, _frames(along(at), slopes, values.get("normal"), place)
 
 
-def _frames(x: "Array", tangents: "Array", normal: Any, place: Place) -> "Array":
+def _frames(x: "Array", tangents: "Array", normal: list[float] | None, place: Place) -> "Array":
     """(N + 2, 4) quaternions of sections that turn about their tangent as little as possible.
 
     Source:
@@ -185,12 +188,11 @@ def add_rod(entry: "Entry") -> None:
     entry.made.add_nonlinear(entry.name, body(rod_of(entry.values, entry.place)), **pose)
 
 
-SECTION = Section(
-    "rods",
-    Declared(
-        "add_nonlinear", *ROD_KEYS, ORIENTATION,
-        about="A geometrically exact rod. Markers are its ends, `rod.start` and `rod.end`, and its "
-        "frames by number, `rod.0`, `rod.1`, ...",
-    ),
-    add_rod, bodies=True, summary="Slender bodies of any deflection.",
-)  # fmt: skip
+ROD = Declared(
+    "add_nonlinear",
+    *ROD_KEYS,
+    ORIENTATION,
+    about="A geometrically exact rod. Markers are its ends, `rod.start` and `rod.end`, and its "
+    "frames by number, `rod.0`, `rod.1`, ...",
+)
+SECTION = Section("rods", ROD, add_rod, bodies=True, summary="Slender bodies of any deflection.")

@@ -34,8 +34,8 @@ def cut(whole: Rod, k: int) -> list[Rod]:
     pieces = []
     for a, b in pairwise(ends):
         p = [plates.get(a, middle[a]), *whole.p[a + 1 : b + 1], plates.get(b, middle[b])]
-        pieces.append(rod(whole.x[a : b + 1], p, stretch=whole.stretch[a:b],
-                          bend=whole.bend[a : b + 1]))  # fmt: skip
+        stretch, bend = whole.stretch[a:b], whole.bend[a : b + 1]
+        pieces.append(rod(whole.x[a : b + 1], p, stretch=stretch, bend=bend))
     return pieces
 
 
@@ -55,8 +55,8 @@ def bend_in_pieces(whole: Rod, k: int, force: Array) -> Array:
         SolverError: if linear pieces find no equilibrium, because they turn too far.
     """
     pieces = cut(whole, k)
-    flexibility = [np.linalg.inv(linearised(one, reference(one))[1][np.ix_(free, free)])
-                   for one in pieces for free in [clamped(one)]]  # fmt: skip
+    bent = ((linearised(one, reference(one))[1], clamped(one)) for one in pieces)
+    flexibility = [np.linalg.inv(K[np.ix_(free, free)]) for K, free in bent]
     ends = np.cumsum([0, *(one.h.size for one in pieces)])
     x, turns = whole.x.copy(), [np.eye(3)] * (k + 1)  # of the pieces, from where they started
     for _ in range(MAX_ITERATIONS):
@@ -73,8 +73,8 @@ def bend_in_pieces(whole: Rod, k: int, force: Array) -> Array:
             u.ravel()[6:-3] = C @ load.ravel()[6:-3]
             shape = Shape(one.x + u[:-1, 3:], one.p)
             new.append(at + (shape.x[1:] - one.x[0]) @ turn[-1].T)
-            bent = rotation.matrix(rotation.exp(rotation.matrix(one.p[-1]) @ u[-1, :3]))
-            at, turn = new[-1][-1], [*turn, turn[-1] @ bent]
+            last = rotation.matrix(rotation.exp(rotation.matrix(one.p[-1]) @ u[-1, :3]))
+            at, turn = new[-1][-1], [*turn, turn[-1] @ last]
         step = np.abs(np.concatenate(new) - x).max()
         x, turns = np.concatenate(new), turn
         if step < INCREMENT_RTOL * whole.h.sum():

@@ -10,7 +10,8 @@ Source:
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, partial
-from typing import Annotated, Any
+from itertools import product
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
@@ -109,8 +110,8 @@ def simulate(  # noqa: PLR0913  keywords of one run, all with defaults
         ModelError: if the rod has no mass at all.
         SolverError: if a step has no solution; its ``solution`` is what came before.
     """
-    constant = loads(rod) if load is None else load
-    acting: Any = cache(load) if callable(load) else lambda _: constant
+    constant = loads(rod) if load is None or callable(load) else load
+    acting: Callable[[float], Loads] = cache(load) if callable(load) else lambda _: constant
     moving = fitting(rod, acting(0.0), free)[1]
     times = dt * np.arange(round(t_end / dt) + 1)
     rod, shape = _heavy(rod), reference(rod) if start is None else start
@@ -120,8 +121,9 @@ def simulate(  # noqa: PLR0913  keywords of one run, all with defaults
     _hold(mech, moving, led=root is not None)
     _press(mech, acting, times if callable(load) else times[:1])
     try:
-        found = simulate_mechanism(mech, t_end=float(times[-1]), dt=dt, rho_inf=rho_inf,
-                                   save_every=save_every)  # fmt: skip
+        found = simulate_mechanism(
+            mech, t_end=float(times[-1]), dt=dt, rho_inf=rho_inf, save_every=save_every
+        )
     except RomError as error:
         if isinstance(error.solution, Solution):
             error.solution = _motion(rod, error.solution, acting, moving)
@@ -162,8 +164,8 @@ def _lead(mech: Mechanism, root: Callable[[float], Placement], times: Array) -> 
     world, _, own = np.linalg.svd(turned.mean(axis=0))
     seen, change = world.T @ turned @ own.T, world.T @ turning @ own.T
     if not seen[:, 0, 0].min() > LEAST_COSINE:
-        raise ConfigError("the root tumbles: none of its axes stays on one side of a plane.",
-                          hint="Cut the run in two.")  # fmt: skip
+        text = "the root tumbles: none of its axes stays on one side of a plane."
+        raise ConfigError(text, hint="Cut the run in two.")
     (c, s), (dc, ds) = (A[:, 1:, 1].T for A in (seen, change))
     angle, rate = np.unwrap(np.arctan2(s, c)), (c * ds - s * dc) / (c * c + s * s)
     values = np.column_stack([x, angle, seen[:, 0, 1:]])
@@ -187,10 +189,10 @@ def _hold(mech: Mechanism, free: Mask, *, led: bool) -> None:
             continue
         A, turns = rotation.matrix(part.p), np.flatnonzero(held[k, 0])
         if turns.size == 1:
-            raise ConfigError(f"section {k} is free to turn about two of its axes, which no joint "
-                              "leaves.", hint="Free one, or all.")  # fmt: skip
-        pairs = ((0, 1), (1, 2), (2, 0)) if turns.size == 3 else [
-            (a, c) for a in turns for c in np.flatnonzero(~held[k, 0])]  # fmt: skip
+            text = f"section {k} is free to turn about two of its axes, which no joint leaves."
+            raise ConfigError(text, hint="Free one, or all.")
+        pairs = list(product(turns, np.flatnonzero(~held[k, 0])))
+        pairs = list(zip(turns, np.roll(turns, -1), strict=True)) if turns.size == 3 else pairs
         rows = [Row(POINT, e, NO_VECTOR, NO_VECTOR) for e in np.eye(3)[held[k, 1]]]
         rows += [Row(NORMAL, A[:, a], np.eye(3)[c], NO_VECTOR) for a, c in pairs]
         if rows:
@@ -209,7 +211,7 @@ def _press(mech: Mechanism, acting: Callable[[float], Loads], times: Array) -> N
             add(name, marker, one(0.0) if constant else one)
 
 
-def _motion(rod: Rod, found: Solution, acting: Any, free: Mask) -> Motion:
+def _motion(rod: Rod, found: Solution, acting: Callable[[float], Loads], free: Mask) -> Motion:
     """What the mechanism did, in the order of the rod."""
     q, v = found.q.reshape(len(found.t), -1, 7), found.v.reshape(len(found.t), -1, 6)
     x, p = q[:, :-1, :3].copy(), q[:, :, 3:].copy()

@@ -7,7 +7,6 @@ Source:
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -15,8 +14,9 @@ import numpy.typing as npt
 from rom import rotation
 from rom.components.cosserat.energy import Rod, strains, work
 from rom.errors import ModelError
-from rom.model import Array
+from rom.model import Array, Mask
 
+Curve = Callable[[float], tuple[npt.ArrayLike, npt.ArrayLike]]
 FLAT_COSINE = np.cos(np.pi / 4 * 0.99)  # neighbours turned further have no side to bend to
 
 
@@ -73,8 +73,8 @@ def rod(  # noqa: PLR0913  one keyword per property of the rod
     x, p = np.array(x, dtype=float), np.array(p, dtype=float)
     n = len(x) - 1
     if n < 1 or x.shape != (n + 1, 3) or p.shape != (n + 2, 4):
-        raise ModelError(f"a rod of {len(x)} vertices with quaternions of shape {p.shape}.",
-                         hint="N segments have N + 1 vertices and N + 2 quaternions.")  # fmt: skip
+        text = f"a rod of {len(x)} vertices with quaternions of shape {p.shape}."
+        raise ModelError(text, hint="N segments have N + 1 vertices and N + 2 quaternions.")
     h = np.linalg.norm(np.diff(x, axis=0), axis=1)
     _refuse(h <= 0.0, "segment", "has coincident stations", "Remove one of them.")
     rigid = ~np.broadcast_to(np.asarray(bends, dtype=bool), n)
@@ -89,8 +89,8 @@ def rod(  # noqa: PLR0913  one keyword per property of the rod
     turns: Array = p / np.linalg.norm(p, axis=1)[:, None]
     s = np.array([_root(a, b) for a, b in pairwise(turns)])
     _refuse(s[:, 0] < FLAT_COSINE, "vertex", "turns back on itself", "Place stations more densely.")
-    a0 = np.array([rotation.matrix(q).T @ d for q, d in zip(turns[1:-1], np.diff(x, axis=0),
-                                                          strict=True)]) / h[:, None]  # fmt: skip
+    ways = zip(turns[1:-1], np.diff(x, axis=0), strict=True)
+    a0 = np.array([rotation.matrix(q).T @ d for q, d in ways]) / h[:, None]
     lumped = np.zeros(n + 1)
     lumped[:-1] += h / 2 * mass
     lumped[1:] += h / 2 * mass
@@ -109,15 +109,19 @@ def _root(a: Array, b: Array) -> Array:
     return r / np.linalg.norm(r)
 
 
-def _refuse(bad: Any, what: str, why: str, hint: str) -> None:
+def _refuse(bad: Mask, what: str, why: str, hint: str) -> None:
     if np.any(bad):
         raise ModelError(f"{what} {int(np.argmax(bad))} of the rod {why}.", hint=hint)
 
 
 def straight(
-    length: float, n: int, *, start: npt.ArrayLike = (0, 0, 0), frame: npt.ArrayLike | None = None,
-    **section: Any,
-) -> Rod:  # fmt: skip
+    length: float,
+    n: int,
+    *,
+    start: npt.ArrayLike = (0, 0, 0),
+    frame: npt.ArrayLike | None = None,
+    **section: npt.ArrayLike,
+) -> Rod:
     """A straight rod of n equal segments.
 
     Args:
@@ -136,8 +140,7 @@ def straight(
     return rod(x, np.tile(rotation.quaternion(A), (n + 2, 1)), **section)
 
 
-def along(place: Callable[[float], tuple[npt.ArrayLike, npt.ArrayLike]], stations: npt.ArrayLike,
-          **section: Any) -> Rod:  # fmt: skip
+def along(place: Curve, stations: npt.ArrayLike, **section: npt.ArrayLike) -> Rod:
     """A rod along a curve.
 
     Args:

@@ -6,7 +6,7 @@ Source:
 """
 
 from dataclasses import replace
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -108,8 +108,14 @@ def normal_section(pair: GearPair) -> GearPair:
         raise ModelError("compliances of racks and internal teeth are not known; give numbers.")
     if pair.helix == 0.0:
         return pair
-    teeth: Any = tuple(z / (np.cos(pair.base_helix) ** 2 * np.cos(pair.helix)) for z in pair.teeth)
+    teeth = _virtual_teeth(pair)
     return replace(pair, teeth=teeth, helix=0.0, centre_distance=None, thinning=0.0)
+
+
+def _virtual_teeth(pair: GearPair) -> tuple[float, float]:
+    """Their numbers on the virtual spur gears."""
+    first, second = (z / (np.cos(pair.base_helix) ** 2 * np.cos(pair.helix)) for z in pair.teeth)
+    return first, second
 
 
 def in_normal_section(pair: GearPair, s: float) -> tuple[Array, Array]:
@@ -200,8 +206,7 @@ def iso_stiffness(pair: GearPair) -> tuple[float, float, float]:
 
     Solid wheels; the basic rack counts by its dedendum and its normal pressure angle.
     """
-    z1, z2 = (z / (np.cos(pair.base_helix) ** 2 * np.cos(pair.helix)) for z in pair.teeth)
-    x1, x2 = pair.shift
+    (z1, z2), (x1, x2) = _virtual_teeth(pair), pair.shift
     q = 0.04723 + 0.15551 / z1 + 0.25791 / z2 - 0.00635 * x1 - 0.11654 * x1 / z1 - 0.00193 * x2
     q += -0.24188 * x2 / z2 + 0.00529 * x1**2 + 0.00182 * x2**2
     ideal = 1e9 / q  # from mm um / N

@@ -9,8 +9,7 @@ Source:
 """
 
 from dataclasses import dataclass, field
-from functools import cached_property
-from typing import Any
+from functools import cached_property, partial
 
 import numpy as np
 import numpy.typing as npt
@@ -87,7 +86,7 @@ class Mesh:
     """
 
     pair: GearPair
-    stiffness: Any
+    stiffness: npt.ArrayLike
     correction: Correction = field(default_factory=Correction)
     damping: float = 0.0
     cells: int = 21
@@ -99,7 +98,9 @@ class Mesh:
         if self.correction.measured:
             raise ModelError("maps and run-out are for elements; use Mechanism.gear_mesh.")
         if not (k.size and np.isfinite(k).all() and (k > 0).all()):
-            raise ModelError(f"stiffness {self.stiffness} of the teeth must be positive [N/m^2].")
+            raise ModelError(
+                f"stiffness {np.asarray(self.stiffness)} of the teeth must be positive [N/m^2]."
+            )
         for errors, z in zip(self.correction.pitch, self.pair.teeth, strict=True):
             if len(errors):
                 one_each("pitch errors", len(errors), "teeth", z, error=ModelError)
@@ -136,10 +137,8 @@ class Mesh:
         now, q = self._wheels, np.asarray(q, dtype=float)
         apart = float(np.hypot(self.pair.distance + q[6] - q[0], q[7] - q[1]))
         if not apart > self.pair.rb.sum():
-            raise ModelError(
-                f"the wheels are {apart * 1e3:.4f} mm apart: their base circles overlap.",
-                hint="Motions are in metres and radians.",
-            )
+            text = f"the wheels are {apart * 1e3:.4f} mm apart: their base circles overlap."
+            raise ModelError(text, hint="Motions are in metres and radians.")
         W, teeth, still = now.W, now.packed.elements[GEAR_MESHES_FAMILY], np.zeros(12)
         teeth.size[0, PHASE], none = theta, np.zeros(0)
         W.base[-2:] = q[[5, 11]]  # turns are followed from there
@@ -159,7 +158,7 @@ class Mesh:
         K, C = teeth.tangent.copy()
         return MeshForce(force, K, C, energy, lost, slices, load)
 
-    def __getstate__(self) -> dict[str, Any]:
+    def __getstate__(self) -> dict[str, object]:
         """All but memory of kernels, which no copy shares."""
         return {name: value for name, value in vars(self).items() if name != "_wheels"}
 
@@ -167,11 +166,12 @@ class Mesh:
     def _wheels(self) -> Instant:
         """The element between two free wheels at the datum."""
         mech = Mechanism(gravity=(0.0, 0.0, 0.0))
-        ends = [mech.add_rigid(name, mass=1.0, inertia=(1, 1, 1), at=(x, 0, 0)).marker((0, 0, 0))
-                for name, x in (("pinion", 0.0), ("gear", self.pair.distance))]  # fmt: skip
-        mech.gear_mesh("teeth", *ends, axis=(0, 0, 1), pair=self.pair, stiffness=self.stiffness,
-                       correction=self.correction, damping=self.damping, entry=0.0,
-                       conservative=False, cells=self.cells, phase=0.0)  # fmt: skip
+        wheel, apart = partial(mech.add_rigid, mass=1.0, inertia=(1, 1, 1)), self.pair.distance
+        both = wheel("pinion", at=(0, 0, 0)), wheel("gear", at=(apart, 0, 0))
+        ends = [part.marker((0, 0, 0)) for part in both]
+        mesh = partial(mech.gear_mesh, pair=self.pair, stiffness=self.stiffness, cells=self.cells)
+        mesh = partial(mesh, correction=self.correction, damping=self.damping, conservative=False)
+        mesh("teeth", *ends, axis=(0, 0, 1), entry=0.0, phase=0.0)
         now = instant(mech, 0.0)
         teeth = now.packed.elements[GEAR_MESHES_FAMILY]
         teeth.axes[0, 9:] *= -1.0  # turns of the gear count from zero, where numbers are finest

@@ -10,29 +10,35 @@ from rom.errors import ConfigError
 
 if TYPE_CHECKING:
     from rom.components.gear_mesh.gears.corrections import Correction
+    from rom.components.gear_mesh.gears.geometry import GearPair
+    from rom.components.gear_mesh.gears.racks import RackPair
     from rom.config.connections import Entry
 
+Values = dict[str, Any]  # of the keys of an entry
 GEARS_MODULE = "rom.components.gear_mesh.gears"
 TWO = ((2,),)
 GEAR_PAIR = Declared(
     f"{GEARS_MODULE}.geometry:GearPair", without="fillet", addendum=Positive(), dedendum=Positive()
 )
+LINES = "[m]: a line of numbers with commas per place of the profile, empty lines between teeth."
+MAPS = [
+    Key(f"{wheel}_{kind}", FilePath(), f"Of the {which} flanks of the {wheel} {LINES}")
+    for kind, which in (("map", "working"), ("back_map", "back"))
+    for wheel in ("pinion", "gear")
+]
 CORRECTION = Declared(
     f"{GEARS_MODULE}.corrections:Correction",
     Key("pinion_pitch", Quantity("m", ((None,),)), "Errors of its teeth; positive leaves a gap."),
     Key("gear_pitch", Quantity("m", ((None,),)), "Those of the gear."),
-    *(Key(f"{wheel}_{kind}", FilePath(), f"Of the {which} flanks of the {wheel} [m]: a line of "
-          "numbers with commas for each place of the profile, empty lines between teeth.")
-      for kind, which in (("map", "working"), ("back_map", "back"))
-      for wheel in ("pinion", "gear")),
+    *MAPS,
     Key("run_out", Quantity("m", TWO), "By which the teeth stand off the axes.", [0.0, 0.0]),
     Key("run_out_direction", Quantity("rad", TWO), "From where the wheels mesh.", [0.0, 0.0]),
     about="What is taken off the flanks, and what was measured on them.",
     without="pitch maps back_maps",
-)  # fmt: skip
+)
 
 
-def gear_pair(name: str, pair: dict[str, Any]) -> Any:
+def gear_pair(name: str, pair: Values) -> "GearPair | RackPair":
     """The wheels, or pinion and rack, of the gear mesh of that name.
 
     Raises:
@@ -41,20 +47,18 @@ def gear_pair(name: str, pair: dict[str, Any]) -> Any:
     from rom.components.gear_mesh.gears.geometry import GearPair
     from rom.components.gear_mesh.gears.racks import RackPair
 
-    given: Any = dict(pair)
+    given = dict(pair)
     given["teeth"] = tuple(int(z) if z.is_integer() else z for z in given["teeth"])
     if given["teeth"][1] != 0:
         return GearPair(**given)
     (pinion, _), (shift, of_rack) = given.pop("teeth"), given.pop("shift")
     if of_rack != 0.0:
-        raise ConfigError(
-            f"the rack of {name!r} has a profile shift of {of_rack:g}.",
-            hint="Write 0 and move its reference line by centre_distance.",
-        )
+        text = f"the rack of {name!r} has a profile shift of {of_rack:g}."
+        raise ConfigError(text, hint="Write 0 and move its reference line by centre_distance.")
     return RackPair(**given, pinion_teeth=pinion, shift=shift)
 
 
-def correction(values: dict[str, Any]) -> "Correction":
+def correction(values: Values) -> "Correction":
     """What is taken off the flanks, maps read from their files."""
     from rom.components.gear_mesh.gears.corrections import Correction, flank_map
 

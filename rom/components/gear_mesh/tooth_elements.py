@@ -5,12 +5,11 @@ its axis at the height of the load tells how far it gave way.
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.interpolate import interp1d
-from scipy.sparse import coo_matrix
-from scipy.sparse.linalg import splu
+from scipy.sparse import coo_matrix, csr_matrix
+from scipy.sparse.linalg import SuperLU, splu
 
 from rom.arguments import between
 from rom.components.gear_mesh.compliance import (
@@ -49,7 +48,7 @@ class ToothModel:
     axis: Index
     flank: Index
     free: Index
-    factor: Any
+    factor: SuperLU
 
     def compliance(self, radius: float) -> float:
         """E times the deflection of the axis along the line of action per force and width [1].
@@ -173,7 +172,7 @@ def _patches(grid: Index) -> Index:
     return np.stack(corner, axis=1)
 
 
-def _stiffness(points: Array, cells: Index, nu: float) -> Any:
+def _stiffness(points: Array, cells: Index, nu: float) -> csr_matrix:
     """Stiffness of plane strain, E = 1."""
     D = np.array([[1 - nu, nu, 0], [nu, 1 - nu, 0], [0, 0, 0.5 - nu]]) / ((1 + nu) * (1 - 2 * nu))
     X, Ke = points[cells], np.zeros((len(cells), 18, 18))

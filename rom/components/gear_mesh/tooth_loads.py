@@ -1,14 +1,13 @@
 """Where teeth bear, and how much, during a motion."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from rom.arguments import typed
 from rom.components.gear_mesh.gears.meshes import GEAR_MESHES_FAMILY
-from rom.components.gear_mesh.gears.table import HEIGHT, LENGTH, LOAD, PLACE, SIDE
+from rom.components.gear_mesh.gears.table import HEIGHT, LENGTH, LOAD, PLACE, SIDE, Meshes
 from rom.mbs.results.recomputed import at_instants
 from rom.mbs.results.solution import Solution
 from rom.model import Array
@@ -62,7 +61,7 @@ def tooth_loads(solution: Solution, name: str) -> tuple[ToothLoads, ...]:
     return tuple(_of_table(table, k) for _ in at_instants(solution))
 
 
-def _of_table(table: Any, k: int) -> ToothLoads:
+def _of_table(table: Meshes, k: int) -> ToothLoads:
     """The slices that the last residual found."""
     found = table.slices[k, : int(table.n_slices[k])].copy()
     place, height, length, force = found[:, [PLACE, HEIGHT, LENGTH, LOAD]].T

@@ -1,13 +1,13 @@
 """What a light hand weighs and bears: masses of its parts, stresses in wires, forces of motors."""
 
-from typing import Any
-
 import numpy as np
+import numpy.typing as npt
 
 from rom.components.cosserat.helical_spring import HelicalSpring
 from rom.components.hand.compliant_hand import Finger
 from rom.components.hand.winches import motor_force
 from rom.mbs.mechanism import Mechanism
+from rom.mbs.results.solution import Solution
 from rom.model import Array, Report, Row
 
 CABLE_MASS = 1.6e-3  # of a braided steel cable of 0.7 mm [kg/m]
@@ -35,10 +35,8 @@ def mass_budget(mechanism: Mechanism, *, most: float) -> Report:
         length = np.linalg.norm(np.diff(x, axis=0), axis=1).sum()
         rows.append(Row(f"{name} [kg]", CABLE_MASS * float(length), "", True))
     total = sum(row.value for row in rows)
-    return Report(
-        "mass of the hand",
-        (*rows, Row("all [kg]", total, f"<= {most:g}", total <= most)),
-    )
+    rows.append(Row("all [kg]", total, f"<= {most:g}", total <= most))
+    return Report("mass of the hand", tuple(rows))
 
 
 def wahl(spring: HelicalSpring) -> float:
@@ -53,7 +51,9 @@ def bending_factor(spring: HelicalSpring) -> float:
     return (4 * C * C - C - 1) / (4 * C * (C - 1))
 
 
-def wire_stress(spring: HelicalSpring, force: Any, moment: Any) -> tuple[Array, Array]:
+def wire_stress(
+    spring: HelicalSpring, force: npt.ArrayLike, moment: npt.ArrayLike
+) -> tuple[Array, Array]:
     """(...,) shear and bending stress [Pa] by forces along a spring [N] and moments across [N m].
 
     Source:
@@ -73,13 +73,13 @@ def wire_strength(spring: HelicalSpring) -> float:
     return WIRE_STRENGTH / (spring.wire * 1e3) ** WIRE_EXPONENT
 
 
-def spring_loads(solution: Any, name: str, k: int) -> tuple[Array, Array]:
+def spring_loads(solution: Solution, name: str, k: int) -> tuple[Array, Array]:
     """(n_t,) force along spring k of a finger [N], moment across [N m], the larger of its ends."""
     ends = [_load_at(solution, f"{name} {kind} {k}") for kind in ("joint", "plate")]
     return np.maximum(ends[0][0], ends[1][0]), np.maximum(ends[0][1], ends[1][1])
 
 
-def _load_at(solution: Any, joint: str) -> tuple[Array, Array]:
+def _load_at(solution: Solution, joint: str) -> tuple[Array, Array]:
     """(n_t,) force along a finger and (n_t,) moment across it at a joint, sizes [N, N m]."""
     load = solution.reaction(joint)
     marker = solution.mechanism.joints[joint].markers[1]
@@ -88,14 +88,14 @@ def _load_at(solution: Any, joint: str) -> tuple[Array, Array]:
     return along, np.linalg.norm(np.cross(axis, load[:, 3:]), axis=1)
 
 
-def phalanx_stress(solution: Any, name: str, k: int, thickness: float = 5e-3) -> float:
+def phalanx_stress(solution: Solution, name: str, k: int, thickness: float = 5e-3) -> float:
     """Largest bending stress of phalanx k of a finger as a bar of this radius, from its plate."""
     moment = _load_at(solution, f"{name} plate {k}")[1].max()
     return float(4 * moment / (np.pi * thickness**3))
 
 
 def stress_budget(
-    solution: Any,
+    solution: Solution,
     fingers: dict[str, Finger],
     *,
     motor: float,
@@ -124,8 +124,8 @@ def stress_budget(
             what = f"{name} spring {k}, {{}} of the wire [Pa]".format
             rows.append(_row(what("shear"), shear, TORSION_SHARE * strength))
             rows.append(_row(what("bending"), bending, BENDING_SHARE * strength))
-        worst = max(phalanx_stress(solution, name, k + 1, thickness)
-                    for k in range(len(finger.phalanges)))  # fmt: skip
+        bones = range(1, len(finger.phalanges) + 1)
+        worst = max(phalanx_stress(solution, name, k, thickness) for k in bones)
         rows.append(_row(f"{name} phalanges, bending [Pa]", worst, bone))
         if f"{name} cable" in solution.mechanism.tendons:
             rows.append(_row(f"{name} motor [N]", motor_force(solution, name).max(), motor))

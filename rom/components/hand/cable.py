@@ -107,8 +107,8 @@ class Tendon:
         pieces = zip(self.holes[:-1], self.holes[1:], self.tensions(shape, way), strict=True)
         for a, b, tension in pieces:
             if a.frame != b.frame:
-                rows = np.concatenate([np.arange(k, k + 3) for k in (
-                    6 * a.vertex + 3, 6 * a.frame, 6 * b.vertex + 3, 6 * b.frame)])  # fmt: skip
+                first = [6 * a.vertex + 3, 6 * a.frame, 6 * b.vertex + 3, 6 * b.frame]
+                rows = np.add.outer(first, np.arange(3)).ravel()
                 g, H = _piece(shape, a, b)
                 r[rows] += tension * g
                 K[np.ix_(rows, rows)] += tension * H

@@ -5,7 +5,8 @@ An object is free in space. Every phalanx is a round bar with round ends; the pa
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Annotated, Any
+from functools import partial
+from typing import Annotated
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from rom.mbs.elements.contact.impact import Impact
 from rom.mbs.elements.contact.points import distance
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import Marker, Part
+from rom.mbs.results.solution import Solution
 from rom.model import Array
 from rom.rotation import matrix
 
@@ -66,8 +68,9 @@ class Held:
         return np.array([-half, half])
 
 
-def hold(mech: Mechanism, name: str, held: Held, *, law: Impact = SKIN_CONTACT,
-         thickness: float = 5e-3) -> Part:  # fmt: skip
+def hold(
+    mech: Mechanism, name: str, held: Held, *, law: Impact = SKIN_CONTACT, thickness: float = 5e-3
+) -> Part:
     """Put an object into a hand, with contacts named "index phalanx 1 on bar" and "palm on bar 1".
 
     Args:
@@ -88,12 +91,12 @@ def hold(mech: Mechanism, name: str, held: Held, *, law: Impact = SKIN_CONTACT,
     phalanges = [part for part in mech.parts.values() if "distal" in part.points]
     if not phalanges:
         raise ConfigError(f"nothing holds {name!r}: the mechanism needs fingers of `moving_hand`.")
-    pieces = [(matrix(bone.p)[:, 2], float(np.linalg.norm(bone.points["distal"])))
-              for bone in phalanges]  # fmt: skip
+    axes = [matrix(bone.p)[:, 2] for bone in phalanges]
+    halves = [float(np.linalg.norm(bone.points["distal"])) for bone in phalanges]
+    pieces = list(zip(phalanges, axes, halves, strict=True))
     face, normal = _palm_face(mech)
     ends = np.asarray(held.centre) + held.ends
-    depths = {bone.name: thickness - _far(held, bone.at, *piece)
-              for bone, piece in zip(phalanges, pieces, strict=True)}  # fmt: skip
+    depths = {one.name: thickness - _far(held, one.at, axis, half) for one, axis, half in pieces}
     depths["palm"] = -((ends - mech.design_point(face)) @ normal).min()
     for other, depth in depths.items():
         inside = 1e3 * (depth + held.radius)
@@ -102,15 +105,14 @@ def hold(mech: Mechanism, name: str, held: Held, *, law: Impact = SKIN_CONTACT,
     _check_reach(mech, phalanges, name, held)
     made = mech.add_rigid(name, mass=held.mass, inertia=held.inertia, at=held.centre)
     middle = made.marker((0.0, 0.0, 0.0))
-    for bone, (axis, half) in zip(phalanges, pieces, strict=True):
-        mech.capsule_on_capsule(
-            f"{bone.name} on {name}", bone.marker((0.0, 0.0, 0.0)), middle, law,
-            radius1=thickness, axis1=axis, length1=2.0 * half, radius2=held.radius, axis2=held.axis,
-            length2=held.length,
-        )  # fmt: skip
+    meet = partial(mech.capsule_on_capsule, radius1=thickness, radius2=held.radius)
+    meet = partial(meet, axis2=held.axis, length2=held.length)
+    for bone, axis, half in pieces:
+        both = bone.marker((0.0, 0.0, 0.0)), middle
+        meet(f"{bone.name} on {name}", *both, law, axis1=axis, length1=2.0 * half)
+    press = partial(mech.sphere_on_plane, normal=normal, radius=held.radius)
     for k, end in enumerate(held.ends, start=1):
-        mech.sphere_on_plane(f"palm on {name} {k}", face, made.marker(end), law, normal=normal,
-                             radius=held.radius)  # fmt: skip
+        press(f"palm on {name} {k}", face, made.marker(end), law)
     return made
 
 
@@ -144,8 +146,15 @@ def _check_reach(mech: Mechanism, bones: list[Part], name: str, held: Held) -> N
         raise ConfigError(f"{name!r} is {min(over) * 1e3:.3g} mm beyond the reach; move it closer.")
 
 
-def table(mech: Mechanism, name: str, held: Held, *, leaves: float, speed: float = 0.1,
-          law: Impact = SKIN_CONTACT) -> Part:  # fmt: skip
+def table(
+    mech: Mechanism,
+    name: str,
+    held: Held,
+    *,
+    leaves: float,
+    speed: float = 0.1,
+    law: Impact = SKIN_CONTACT,
+) -> Part:
     """A table below an object, that goes down from a time on.
 
     Args:
@@ -167,25 +176,26 @@ def table(mech: Mechanism, name: str, held: Held, *, leaves: float, speed: float
     low = min(float(foot @ up) for foot in feet) - radius
     top = np.asarray(held.centre) + low * up
     made = mech.add_rigid("table", mass=TABLE_MASS, inertia=(1e-4,) * 3, at=top)
-    mech.prismatic("table guide", mech.ground.marker(top), made.marker((0.0, 0.0, 0.0)), axis=up)
-    mech.drive("table motor", "table guide", lambda t: -_descent(t - leaves, speed),
-               rate=lambda t: -_rate(t - leaves, speed))  # fmt: skip
+    middle = made.marker((0.0, 0.0, 0.0))
+    mech.prismatic("table guide", mech.ground.marker(top), middle, axis=up)
+    way, rate = (partial(one, leaves, speed) for one in (_way, _rate))
+    mech.drive("table motor", "table guide", way, rate=rate)
+    rest = partial(mech.sphere_on_plane, normal=up, radius=radius)
     for k, foot in enumerate(feet, start=1):
-        mech.sphere_on_plane(f"table on {name} {k}", made.marker((0.0, 0.0, 0.0)),
-                             mech.parts[name].marker(foot), law, normal=up,
-                             radius=radius)  # fmt: skip
+        rest(f"table on {name} {k}", middle, mech.parts[name].marker(foot), law)
     return made
 
 
-def _descent(t: float, speed: float) -> float:
-    """Length gone after a start at zero with a smooth ramp of the speed."""
-    s = min(max(t / RAMP_TIME, 0.0), 1.0)
-    return speed * (RAMP_TIME * (s**3 - 0.5 * s**4) + max(t - RAMP_TIME, 0.0))
+def _way(leaves: float, speed: float, t: float) -> float:
+    """Way of a table that goes down from a time on, with a smooth ramp of the speed; negative."""
+    gone = t - leaves
+    s = min(max(gone / RAMP_TIME, 0.0), 1.0)
+    return -speed * (RAMP_TIME * (s**3 - 0.5 * s**4) + max(gone - RAMP_TIME, 0.0))
 
 
-def _rate(t: float, speed: float) -> float:
-    s = min(max(t / RAMP_TIME, 0.0), 1.0)
-    return speed * s * s * (3.0 - 2.0 * s)
+def _rate(leaves: float, speed: float, t: float) -> float:
+    s = min(max((t - leaves) / RAMP_TIME, 0.0), 1.0)
+    return -speed * s * s * (3.0 - 2.0 * s)
 
 
 def _feet(held: Held, up: Array) -> tuple[list[Array], float]:
@@ -198,8 +208,8 @@ def _feet(held: Held, up: Array) -> tuple[list[Array], float]:
     x /= np.linalg.norm(x)
     turns = 2 * np.pi / 3 * np.arange(3)
     bottom = -(0.5 * held.length + held.radius - FOOT_RADIUS) * e
-    return [bottom + FEET_SHARE * held.radius * (np.cos(a) * x + np.sin(a) * np.cross(e, x))
-            for a in turns], FOOT_RADIUS  # fmt: skip
+    outwards = (np.cos(a) * x + np.sin(a) * np.cross(e, x) for a in turns)
+    return [bottom + FEET_SHARE * held.radius * one for one in outwards], FOOT_RADIUS
 
 
 def contacts_of(mech: Mechanism, name: str) -> list[str]:
@@ -207,12 +217,12 @@ def contacts_of(mech: Mechanism, name: str) -> list[str]:
     return [key for key, one in mech.contacts.items() if one.j.body == name]
 
 
-def contact_forces(solution: Any, name: str) -> dict[str, Array]:
+def contact_forces(solution: Solution, name: str) -> dict[str, Array]:
     """{contact: (n_t, 3) force on the object, world [N]}."""
     return {key: solution.element(key).force[:, 1] for key in contacts_of(solution.mechanism, name)}
 
 
-def grip(solution: Any, name: str, fingers: Iterable[str]) -> dict[str, Array]:
+def grip(solution: Solution, name: str, fingers: Iterable[str]) -> dict[str, Array]:
     """{finger: (n_t,) sizes of the forces of its phalanges on an object, added up [N]}."""
     forces = contact_forces(solution, name)
     sizes = {key: np.linalg.norm(f, axis=1) for key, f in forces.items()}

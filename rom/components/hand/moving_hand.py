@@ -10,13 +10,13 @@ first plate.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
 
 from rom.arguments import finite, not_negative, number, positive
-from rom.components.cosserat import body
+from rom.components.cosserat import RodBody, body
 from rom.components.cosserat.coils import with_coils
 from rom.components.cosserat.helical_spring import HelicalSpring
 from rom.components.hand.compliant_hand import STOP_STIFFNESS_RATIO, Finger, hand
@@ -29,7 +29,9 @@ from rom.mbs.parts.bodies import Marker, Part
 from rom.model import Array
 from rom.names import check_known
 
+Course = Callable[[float], float] | float  # over time, or a value that stays
 PULL_SHARE = 0.9  # of the springs of a finger that a winch may take in
+Load = npt.ArrayLike | Callable[[float], Array]
 TRANSITION_SPEED = 1e-3  # of cables in their holes [m/s], a fortieth of that of the winches
 
 
@@ -88,8 +90,8 @@ class Drive:
         transition_speed: of the cable in its holes, over which friction turns [m/s].
     """
 
-    tension: Any = None
-    pull: Any = None
+    tension: Course | None = None
+    pull: Course | None = None
     EA: float = 2e3
     damping: float = 0.0
     sleeve: float = 0.0
@@ -123,7 +125,7 @@ class _Winch:
     """A pull that a winch can do, as a function of time."""
 
     name: str
-    pull: Callable[[float], float] | float
+    pull: Course
     most: float
 
     def __call__(self, t: float) -> float:
@@ -163,8 +165,8 @@ def moving_hand(
     """
     fingers = hand(n=4) if fingers is None else fingers
     drives, seats = drives or {}, SEATS if seats is None else seats
-    joints = {f"{name} joint {k}" for name, one in fingers.items()
-              for k in range(1, len(one.springs) + 1)}  # fmt: skip
+    numbers = {name: range(1, len(one.springs) + 1) for name, one in fingers.items()}
+    joints = {f"{name} joint {k}" for name, each in numbers.items() for k in each}
     for kind, names, known in (("drive", drives, {*fingers, *joints}), ("seat", fingers, seats)):
         for name in names:
             check_known(name, known, f"{kind} of {name!r}: there are")
@@ -192,8 +194,8 @@ def _palm(mech: Mechanism, build: Build, seats: list[Seat]) -> Part:
 def _finger(mech: Mechanism, build: Build, name: str, finger: Finger, seat: Seat) -> list[Marker]:
     """Springs and phalanges in turn; the holes of the cable."""
     if finger.phalanges[-1] <= 0.0:
-        raise ModelError(f"finger {name!r} ends in a bare plate, which has no mass.",
-                         hint="Give its last phalanx a length.")  # fmt: skip
+        text = f"finger {name!r} ends in a bare plate, which has no mass."
+        raise ModelError(text, hint="Give its last phalanx a length.")
     A, palm = seat.axes, mech.parts["palm"]
     at, hole = np.asarray(seat.at, dtype=float), np.array([finger.offset, 0.0, 0.0])
     before = _on_palm(palm, at)
@@ -216,15 +218,14 @@ def _on_palm(palm: Part, point: Array) -> Marker:
     return palm.marker(point - palm.at)
 
 
-def spring_body(finger: Finger, spring: HelicalSpring, build: Build) -> Any:
+def spring_body(finger: Finger, spring: HelicalSpring, build: Build) -> RodBody:
     """One spring of a finger as a body of a mechanism: stiffeners, losses, coils that touch."""
     made = heavy_spring(spring, finger.n, build.wire_density)
     stretch, bend = made.stretch.copy(), made.bend.copy()
     stretch[:, 1] *= finger.stiffener
     bend[:, [0, 2]] *= finger.stiffener
-    loss = build.loss
-    made = made._replace(stretch=stretch, bend=bend, viscous_stretch=loss * stretch,
-                         viscous_bend=loss * bend)  # fmt: skip
+    loss, made = build.loss, made._replace(stretch=stretch, bend=bend)
+    made = made._replace(viscous_stretch=loss * stretch, viscous_bend=loss * bend)
     return with_coils(
         body(made),
         radius=0.5 * (spring.diameter + spring.wire),
@@ -238,11 +239,10 @@ def _phalanx(mech: Mechanism, build: Build, name: str, link: float, at: Array, A
     half = np.array([0.0, 0.0, 0.5 * link])
     r = positive("thickness", build.thickness)
     mass = positive("bone_density", build.bone_density) * np.pi * r**2 * link
-    across = mass * (link**2 / 12 + r**2 / 4)
-    return mech.add_rigid(
-        name, mass=mass, inertia=(across, across, 0.5 * mass * r**2), at=at + A @ half,
-        orientation=A, markers={"proximal": -half, "distal": half},
-    )  # fmt: skip
+    across, at = mass * (link**2 / 12 + r**2 / 4), at + A @ half
+    inertia = (across, across, 0.5 * mass * r**2)
+    ends: dict[str, npt.ArrayLike] = {"proximal": -half, "distal": half}
+    return mech.add_rigid(name, mass=mass, inertia=inertia, at=at, orientation=A, markers=ends)
 
 
 def _cables(
@@ -270,11 +270,10 @@ def _cable(
     if (drive.tension is None) == (drive.pull is None):
         raise ConfigError(f"the drive of {name!r} needs either a tension or a pull.")
     friction, springs = limits
-    how: dict[str, Any] = {"friction": friction}
-    if friction:
-        how["transition_speed"] = drive.transition_speed
+    sliding = drive.transition_speed if friction else None
+    cable = partial(mech.tendon, f"{name} cable", path, friction=friction, transition_speed=sliding)
     if drive.pull is None:
-        mech.tendon(f"{name} cable", path, tension=drive.tension, **how)
+        cable(tension=drive.tension)
         return
     pull = drive.pull if callable(drive.pull) else number("pull", drive.pull)
     pull = _Winch(name, pull, PULL_SHARE * springs)
@@ -283,11 +282,10 @@ def _cable(
     pull(0.0)
     not_negative(f"sleeve of {name!r}", drive.sleeve)
     EA = positive("EA", drive.EA) * length / (length + drive.sleeve)
-    mech.tendon(f"{name} cable", path, EA=EA, damping=drive.damping,
-                free_length=lambda t: length - pull(t), **how)  # fmt: skip
+    cable(EA=EA, damping=drive.damping, free_length=lambda t: length - pull(t))
 
 
-def one_finger(finger: Finger, tension: float = 0.0, load: Any = (0.0, 0.0, 0.0)) -> Mechanism:
+def one_finger(finger: Finger, tension: float = 0.0, load: Load = (0.0, 0.0, 0.0)) -> Mechanism:
     """A finger as a mechanism, its cable under a tension [N] and a force (3,) on its tip [N]."""
     drives = {"finger": Drive(tension=tension)}
     mech = moving_hand({"finger": finger}, seats={"finger": Seat()}, drives=drives)
@@ -295,7 +293,7 @@ def one_finger(finger: Finger, tension: float = 0.0, load: Any = (0.0, 0.0, 0.0)
     return mech
 
 
-def tip_marker(mech: Mechanism, finger: Finger, name: str = "finger") -> Any:
+def tip_marker(mech: Mechanism, finger: Finger, name: str = "finger") -> Marker:
     """Marker of the tip of a finger."""
     return mech.parts[f"{name} phalanx {len(finger.phalanges)}"].marker("distal")
 

@@ -6,12 +6,12 @@ rigidly at their plates. The third axis of the world points along the finger.
 """
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from rom import rotation
+from rom.body.flexible import FlexibleBody
 from rom.body.reference import marker_motion
 from rom.components.cosserat import Rod, body
 from rom.components.cosserat.helical_spring import HelicalSpring, plate_compliance, spring_rod
@@ -19,6 +19,8 @@ from rom.errors import ModelError
 from rom.mbs.analysis.equilibrium import equilibrium
 from rom.mbs.analysis.linearize import linearize
 from rom.mbs.mechanism import Mechanism
+from rom.mbs.parts.bodies import Marker
+from rom.mbs.results.state import State
 from rom.model import Array
 
 STEEL_DENSITY = 7850.0  # [kg/m^3]
@@ -44,7 +46,7 @@ def heavy_spring(spring: HelicalSpring, n: int = 16, density: float = STEEL_DENS
 
 
 def solid_finger(
-    bodies: Sequence[Any],
+    bodies: Sequence[FlexibleBody],
     springs: Sequence[HelicalSpring],
     *,
     ends: tuple[str, str] = ENDS,
@@ -86,7 +88,7 @@ def solid_finger(
     return mech
 
 
-def tip_compliance(mechanism: Mechanism, marker: Any, state: Any = None) -> Array:
+def tip_compliance(mechanism: Mechanism, marker: Marker, state: State | None = None) -> Array:
     """(6, 6) motion of a marker per load on it, world axes [m/N, rad/N m].
 
     Displacements, then rotations; forces, then moments.
@@ -101,7 +103,7 @@ def tip_compliance(mechanism: Mechanism, marker: Any, state: Any = None) -> Arra
     return J @ np.linalg.solve(around.K, J.T)
 
 
-def link_compliance(solid: Any, ends: tuple[str, str] = ENDS) -> Array:
+def link_compliance(solid: FlexibleBody, ends: tuple[str, str] = ENDS) -> Array:
     """(6, 6) motion of one marker per load on it, the other held, body axes [m/N, rad/N, rad/N/m].
 
     Args:
@@ -117,7 +119,7 @@ def link_compliance(solid: Any, ends: tuple[str, str] = ENDS) -> Array:
 
 
 def parts_of_compliance(
-    bodies: Sequence[Any],
+    bodies: Sequence[FlexibleBody],
     springs: Sequence[HelicalSpring],
     *,
     ends: tuple[str, str] = ENDS,
@@ -165,7 +167,7 @@ def _moved(arm: Array) -> Array:
     return X
 
 
-def _check(bodies: Sequence[Any], springs: Sequence[HelicalSpring]) -> None:
+def _check(bodies: Sequence[FlexibleBody], springs: Sequence[HelicalSpring]) -> None:
     if len(bodies) != len(springs) or not bodies:
-        raise ModelError(f"{len(springs)} springs and {len(bodies)} phalanges.",
-                         hint="Each spring carries one phalanx.")  # fmt: skip
+        text = f"{len(springs)} springs and {len(bodies)} phalanges."
+        raise ModelError(text, hint="Each spring carries one phalanx.")

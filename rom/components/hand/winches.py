@@ -6,7 +6,6 @@ Either each cable has a motor, or the drums of one shaft draw in several.
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +13,7 @@ from scipy.interpolate import PchipInterpolator
 
 from rom.arguments import finite, positive, whole
 from rom.components.hand.moving_hand import Drive
+from rom.mbs.results.solution import Solution
 from rom.model import Array
 
 FINGERS = ("thumb", "index", "middle", "ring", "little")  # columns of `Commands.fingers`
@@ -90,10 +90,7 @@ def winches(
 
 
 def shaft(
-    angle: Callable[[float], float],
-    radii: Mapping[str, float],
-    *,
-    drive: Drive | None = None,
+    angle: Callable[[float], float], radii: Mapping[str, float], *, drive: Drive | None = None
 ) -> Mapping[str, Drive]:
     """Drives of fingers whose cables run onto drums of one shaft.
 
@@ -110,18 +107,18 @@ def shaft(
     return _pulled(drive, {name: partial(_drawn, r, angle) for name, r in radii.items()})
 
 
-def shaft_moment(solution: Any, radii: Mapping[str, float]) -> Array:
+def shaft_moment(solution: Solution, radii: Mapping[str, float]) -> Array:
     """(n_t,) moment with which a motor holds the shaft of drums, sum of radius times tension [N m].
 
     Args:
         solution: motion of a moving hand with drives of `shaft`.
         radii: as there.
     """
-    return sum((r * motor_force(solution, name) for name, r in radii.items()),
-               np.zeros(solution.t.size))  # fmt: skip
+    none = np.zeros(solution.t.size)
+    return sum((r * motor_force(solution, name) for name, r in radii.items()), none)
 
 
-def motor_force(solution: Any, name: str) -> Array:
+def motor_force(solution: Solution, name: str) -> Array:
     """(n_t,) tension of a cable at its first end, where the motor is [N].
 
     Args:
@@ -132,7 +129,9 @@ def motor_force(solution: Any, name: str) -> Array:
     return np.linalg.norm(first, axis=1)
 
 
-def _pulled(drive: Drive | None, pulls: Mapping[str, Any]) -> Mapping[str, Drive]:
+def _pulled(
+    drive: Drive | None, pulls: Mapping[str, Callable[[float], float]]
+) -> Mapping[str, Drive]:
     base = replace(drive or Drive(), tension=None)
     return {name: replace(base, pull=pull) for name, pull in pulls.items()}
 

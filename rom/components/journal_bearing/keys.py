@@ -9,23 +9,24 @@ from rom.config.mechanism_keys import Markers, Section
 
 if TYPE_CHECKING:
     from rom.components.journal_bearing.films.bearing import JournalBearing
+    from rom.components.journal_bearing.films.oil import Oil
     from rom.config.connections import Entry
 
 FILMS_MODULE = "rom.components.journal_bearing.films"
+VISCOSITY = Key("viscosity", Positive("Pa s"), "Dynamic.", ...)
+GRADE = Key("grade", Whole(1), "ISO VG 32, 46 or 68.", ...)
+OIL_OF_KEY = {"viscosity": "constant", "grade": "grade", "nu_40": "oil"}
 OILS = {
-    "constant": Table("A viscosity that stays.", (
-        Key("viscosity", Positive("Pa s"), "Dynamic.", ...),
-    )),
-    "grade": Table("A usual mineral oil.", (
-        Key("grade", Whole(1), "ISO VG 32, 46 or 68.", ...),
-    )),
+    "constant": Table("A viscosity that stays.", (VISCOSITY,)),
+    "grade": Table("A usual mineral oil.", (GRADE,)),
     "oil": Declared(
         f"{FILMS_MODULE}.oil:Oil",
         about="Any mineral oil.",
         nu_40=Positive("m^2/s"),
         nu_100=Positive("m^2/s"),
     ),
-}  # fmt: skip
+}
+Values = dict[str, Any]  # of the keys of an entry
 GROOVE = Declared(f"{FILMS_MODULE}.bearing:Groove", share=Positive())
 JOURNAL_BEARING = Declared(
     f"{FILMS_MODULE}.bearing:JournalBearing",
@@ -39,7 +40,7 @@ JOURNAL_BEARING = Declared(
 )
 
 
-def journal_bearing(values: dict[str, Any]) -> "JournalBearing":
+def journal_bearing(values: Values) -> "JournalBearing":
     """The sizes of an oil film."""
     from rom.components.journal_bearing.films.bearing import Groove, JournalBearing, multilobe
 
@@ -51,13 +52,15 @@ def journal_bearing(values: dict[str, Any]) -> "JournalBearing":
     return JournalBearing(**sizes)
 
 
-def oil(values: dict[str, Any]) -> Any:
+def oil(values: Values) -> "Oil | float":
     """A viscosity [Pa s], or an oil."""
     from rom.components.journal_bearing.films.oil import Oil, iso_vg
 
     given = values | {key: 1e6 * values[key] for key in ("nu_40", "nu_100") if key in values}
-    makes: dict[str, Any] = {"constant": lambda viscosity: viscosity, "grade": iso_vg, "oil": Oil}
-    return makes[given.pop("kind")](**given)  # Oil takes [mm^2/s]
+    kind = given.pop("kind")
+    if kind == "constant":
+        return float(given["viscosity"])
+    return iso_vg(**given) if kind == "grade" else Oil(**given)  # which takes [mm^2/s]
 
 
 def add_film(entry: "Entry") -> None:
@@ -71,11 +74,9 @@ SECTION = Section(
     "journal bearings",
     Declared(
         "journal_bearing",
-        Key("between", Markers(two=True), "On the axis of the journal, and in the middle of the "
-            "bush.", ...),
+        Key("between", Markers(two=True), "On the axis of the journal, amid the bush.", ...),
         Key("bearing", JOURNAL_BEARING, "Its sizes.", ...),
-        Key("oil", Variants(OILS, {"viscosity": "constant", "grade": "grade", "nu_40": "oil"}),
-            "In it.", ...),
+        Key("oil", Variants(OILS, OIL_OF_KEY), "In it.", ...),
     ),
     add_film,
-)  # fmt: skip
+)

@@ -1,7 +1,6 @@
 """What the oil film of a journal bearing was like along a motion, and its pressure in cells."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -36,10 +35,8 @@ def film_pressures(solution: Solution, name: str) -> Array:
     check_known(name, names, f"no journal bearing {name!r}; there are")
     k, table = names.index(name), solution.packed.elements[JOURNAL_BEARINGS_FAMILY]
     if table.number[k] >= 0:
-        raise ConfigError(
-            f"the film of {name!r} is read from a table, which has no pressure in cells.",
-            hint="Leave out tabulated=True.",
-        )
+        text = f"the film of {name!r} is read from a table, which has no pressure in cells."
+        raise ConfigError(text, hint="Leave out tabulated=True.")
     films, (nt, nz) = table.films, table.films.shape[k]
     ratio2 = (films.size[k, RADIUS] / films.size[k, CLEARANCE]) ** 2
     pressure = [table.viscosity[k] * ratio2 * films.P[k] for _ in at_instants(solution)]
@@ -77,7 +74,7 @@ class BearingRecord:
         return None if self.bore is None else np.einsum("ijm,tm->tij", *self.bore)
 
 
-def journal_bearing(self: Any, name: str) -> BearingRecord:
+def journal_bearing(self: Solution, name: str) -> BearingRecord:
     """Film, pressure, temperature, losses and flow of one journal bearing over time.
 
     Raises:

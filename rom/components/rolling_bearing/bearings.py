@@ -17,7 +17,7 @@ included, so that momentum and energy are kept.
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 
@@ -252,12 +252,12 @@ def rolling_bearing(  # noqa: PLR0913  one keyword per property
     b, parts = bearing, (self.part(inner.body), self.part(outer.body))
     spins = [part.spin_about(name, axes[2 * k]) for k, part in enumerate(parts)]
     spin = spins[1] + b.cage * (spins[0] - spins[1])
-    race = (b.stiffness, b.exponent, b.curvature_distance, *b.offset, b.radius, b.cage,
-            damping, phase, spin)  # fmt: skip
+    grooves = b.stiffness, b.exponent, b.curvature_distance, *b.offset, b.radius, b.cage
+    race = (*grooves, damping, phase, spin)
     self.add(name, RollingBearing(inner, outer, bearing, axes, race), ROLLING_BEARINGS_FAMILY)
 
 
-def circles(_: Any, __: str, row: RollingBearing) -> list[Any]:
+def circles(_: object, __: str, row: RollingBearing) -> list[tuple[Marker, Array, float]]:
     """What is drawn: the circle of the middles of balls or rollers."""
     return [(row.j, row.axes[2], 0.5 * row.bearing.pitch_diameter)]
 
@@ -277,7 +277,7 @@ def pack(bearings: Mapping[str, RollingBearing], places: Places) -> Bearings:
     )
 
 
+FORCES = bearing_wrenches, bearing_tangents, bearing_energy
 ROLLING_BEARINGS_FAMILY = Family(
-    "rolling_bearings", RollingBearing, pack, bearing_wrenches, bearing_tangents, bearing_energy,
-    by_rate=lambda bearings: bearings.race[:, DAMPING].any(),
-)  # fmt: skip
+    "rolling_bearings", RollingBearing, pack, *FORCES, by_rate=lambda x: x.race[:, DAMPING].any()
+)

@@ -55,10 +55,9 @@ class BallBearing:
             text = f"conformity {self.conformity} must be above 0.5 and at most 1"
             raise ModelError(f"{text}: a groove is a little wider than its ball, by 0.52.")
         if not abs(self.contact_angle) < 1.4:
-            raise ModelError(
-                f"contact angle {self.contact_angle:g} rad is not below 80 degrees.",
-                hint="Angles are in radians; a thrust bearing is not one of these.",
-            )
+            text = f"contact angle {self.contact_angle:g} rad is not below 80 degrees."
+            hint = "Angles are in radians; a thrust bearing is not one of these."
+            raise ModelError(text, hint=hint)
 
     @property
     def count(self) -> int:
@@ -96,9 +95,8 @@ class BallBearing:
     def race_stiffness(self, race: int) -> float:
         """Force per depth^1.5 of a ball on the inner race, 0, or the outer one, 1 [N/m^1.5]."""
         side, g = (1.0, -1.0)[race], self._slenderness
-        curvatures = 2 / self.ball_diameter * np.array(
-            [1.0, 1.0, side * g / (1 - side * g), -0.5 / self.conformity[race]]
-        )  # fmt: skip
+        across, along = side * g / (1 - side * g), -0.5 / self.conformity[race]
+        curvatures = 2 / self.ball_diameter * np.array([1.0, 1.0, across, along])
         return elliptic_stiffness(curvatures, 0.5 * self.E / (1 - self.nu**2))
 
     @property

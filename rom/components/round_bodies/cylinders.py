@@ -16,11 +16,13 @@ Source:
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.polynomial.legendre import legvander
+from scipy.sparse import spmatrix
 
+from rom.body.records import Marker as Interface
+from rom.body.records import Patch
 from rom.errors import ConfigError, warn
 from rom.mbs.elements.family import integers, rows_of
 from rom.mbs.kernels.algebra import mtv, mv
@@ -69,10 +71,10 @@ class Cylinder:
         return (along[:, :, None] * around[:, None, :]).reshape(len(theta), -1)
 
 
-def deformable(part: Part, marker: Marker) -> Any:
-    """The interface behind a marker if it deforms; None of a rigid or averaged one."""
+def deformable(part: Part, marker: Marker) -> tuple[Interface, Patch] | None:
+    """The interface behind a marker and its surface, if it deforms; None of one that does not."""
     surface = part.moving.markers.get(marker.place) if part.flexible is not None else None
-    return surface if surface is not None and surface.patch is not None else None
+    return None if surface is None or surface.patch is None else (surface, surface.patch)
 
 
 def cylinder_of(part: Part, marker: Marker, axis: Array, across: Array) -> Cylinder | None:
@@ -86,10 +88,10 @@ def cylinder_of(part: Part, marker: Marker, axis: Array, across: Array) -> Cylin
     Warns:
         RomWarning: if harmonics and polynomials miss more than 2 % of the deformation of a shape.
     """
-    surface = deformable(part, marker)
-    if surface is None:
+    deforms = deformable(part, marker)
+    if deforms is None:
         return None
-    patch, axes = surface.patch, np.array([across, np.cross(axis, across), axis])
+    (surface, patch), axes = deforms, np.array([across, np.cross(axis, across), axis])
     local = (patch.points - surface.point) @ axes.T
     theta, z = np.arctan2(local[:, 1], local[:, 0]), local[:, 2]
     if not np.ptp(z) > 0.0:
@@ -98,7 +100,7 @@ def cylinder_of(part: Part, marker: Marker, axis: Array, across: Array) -> Cylin
     harmonics, order = _numbers(surface.kind)
     middle, half = 0.5 * (z.max() + z.min()), 0.5 * float(np.ptp(z))
     found = Cylinder(harmonics, order, middle, half, axes, np.zeros((0, 3, 0)), 0.0)
-    B, w = found.functions(theta, z), _deformation(surface)
+    B, w = found.functions(theta, z), _deformation(surface, patch)
     S = patch.surface_mass
     C = np.linalg.lstsq(B.T @ (S @ B), B.T @ (S @ w), rcond=1e-10)[0]
     missed = _share_missed(S, w, w - B @ C)
@@ -119,16 +121,16 @@ def _numbers(kind: str) -> tuple[int, int]:
     return numbers[0], max(numbers[-1], 1)
 
 
-def _deformation(surface: Any) -> Array:
+def _deformation(surface: Interface, patch: Patch) -> Array:
     """(k, 3 r) displacement of the nodes per elastic coordinate, less the motion of the marker."""
-    patch, r = surface.patch, surface.translation.shape[1]
+    r = surface.translation.shape[1]
     whole = surface.hold[:, 6:] if patch.shapes is None else patch.shapes @ surface.hold[:, 6:]
     turned = np.cross(surface.rotation.T[None], (patch.points - surface.point)[:, None], axis=2)
     mean = surface.translation.T[None] + turned
     return (np.asarray(whole).reshape(-1, 3, r) - mean.transpose(0, 2, 1)).reshape(-1, 3 * r)
 
 
-def _share_missed(S: Any, w: Array, left: Array) -> float:
+def _share_missed(S: spmatrix, w: Array, left: Array) -> float:
     """Largest root of the mean square of what is left of a shape over the largest of all shapes."""
     size, remainder = (
         np.einsum("ki,ki->i", x, S @ x).reshape(3, -1).sum(axis=0) for x in (w, left)

@@ -20,7 +20,7 @@ Source:
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import eigh
@@ -39,10 +39,15 @@ from rom.mbs.elements.family import (
 )
 from rom.mbs.kernels.element_calls import residuals, tangents
 from rom.mbs.kernels.markers import own_corner
+from rom.mbs.kernels.system import System
 from rom.mbs.kernels.tables import Array3, Index1, Table, table
+from rom.mbs.kernels.work import Work
 from rom.mbs.parts.bodies import MESHED_RTOL, Part
-from rom.model import Array
+from rom.model import Array, Index
 from rom.rotation import exp, matrix, skew
+
+if TYPE_CHECKING:
+    from rom.body.flexible import FlexibleBody
 
 TEST_TURN = 0.1  # by which fields are turned to see which modes go into which [rad]
 SAME_FREQUENCY_RTOL = 0.02  # of modes that a mesh, round but for its facets, leaves apart
@@ -50,7 +55,7 @@ ROUND_RTOL = 0.02  # of moments of inertia across the axis
 N_NEAREST = 12  # triangles whose middle is near a point: one of them holds it
 
 
-def spin_matrices(body: Any, axis: Array) -> tuple[Array, Array]:
+def spin_matrices(body: "FlexibleBody", axis: Array) -> tuple[Array, Array]:
     """Forces per speed of a body whose material turns through its frame.
 
     The material feels its damping as it passes through a bent shape that stands: this feeds whirl
@@ -97,7 +102,7 @@ def check_round(name: str, mass: float, first: Array, inertia: Array, axis: Arra
         )
 
 
-def _generator(body: Any, axis: Array, lam: Array, V: Array) -> Array:
+def _generator(body: "FlexibleBody", axis: Array, lam: Array, V: Array) -> Array:
     """(6 + r, 6 + r) change of modes as fields are turned, in multiples of modes."""
     found = np.zeros((lam.size, lam.size))
     found[:6, :6] = _rigid_generator(body, axis, V)
@@ -111,14 +116,14 @@ def _generator(body: Any, axis: Array, lam: Array, V: Array) -> Array:
     return found
 
 
-def _groups(lam: Array) -> list[Any]:
+def _groups(lam: Array) -> list[Index]:
     """Numbers of the modes that share a frequency."""
     omega = np.sqrt(np.maximum(lam, 0.0))
     ends = np.flatnonzero(np.diff(omega) > SAME_FREQUENCY_RTOL * omega[1:]) + 1
     return np.split(np.arange(lam.size), ends)
 
 
-def _rigid_generator(body: Any, axis: Array, V: Array) -> Array:
+def _rigid_generator(body: "FlexibleBody", axis: Array, V: Array) -> Array:
     """(6, 6) the same of the rigid modes, whose translations and rotations turn as vectors."""
     centre = body.first_moment / body.mass
     rigid = V[:6, :6].copy()  # translation and rotation about the origin
@@ -126,7 +131,7 @@ def _rigid_generator(body: Any, axis: Array, V: Array) -> Array:
     return np.linalg.solve(rigid, np.kron(np.eye(2), skew(axis)) @ rigid)
 
 
-def _turned_modes(body: Any, axis: Array, V: Array) -> Array:
+def _turned_modes(body: "FlexibleBody", axis: Array, V: Array) -> Array:
     """(m, m) the elastic modes of V (6 + r, m) turned by the test angle, in multiples of them."""
     surface = body.surface
     if surface is None:
@@ -150,7 +155,7 @@ def _fields(X: Array, shape: Array, V: Array) -> Array:
     return rigid + (shape @ V[6:]).reshape(len(X), 3, -1)
 
 
-def _places(X: Array, triangles: Any, points: Array) -> tuple[Any, Array]:
+def _places(X: Array, triangles: Index, points: Array) -> tuple[Index, Array]:
     """(s, 3) corners of the triangles that hold points (s, 3), and (s, 3) their shares."""
     corners = X[triangles]
     near = cKDTree(corners.mean(axis=1)).query(points, min(N_NEAREST, len(triangles)))[1]
@@ -170,7 +175,7 @@ def _places(X: Array, triangles: Any, points: Array) -> tuple[Any, Array]:
     return triangles[near[rows, best]], kept / kept.sum(axis=1, keepdims=True)
 
 
-def directed_mass(body: Any, E: Array) -> Array:
+def directed_mass(body: "FlexibleBody", E: Array) -> Array:
     """(6 + r, 6 + r) integrals of rho phi_a . E phi_b, rigid motions first.
 
     Args:
@@ -243,7 +248,7 @@ def pack(spins: Mapping[str, Spin], places: Places) -> Spins:
 
 
 @residuals.of(Spins)
-def spin_forces(s: Any, W: Any, spins: Any, q: Any, v: Any, _lam: Any) -> None:
+def spin_forces(s: System, W: Work, spins: Spins, q: Array, v: Array, _lam: Array) -> None:
     """Subtract the forces from W.residual; what turns the body drives those of damping."""
     for k in range(spins.body.size):
         b = spins.body[k]
@@ -260,7 +265,7 @@ def spin_forces(s: Any, W: Any, spins: Any, q: Any, v: Any, _lam: Any) -> None:
 
 
 @tangents.of(Spins)
-def spin_tangents(s: Any, W: Any, spins: Any, _lam: Any, ck: Any, cc: Any) -> None:
+def spin_tangents(s: System, W: Work, spins: Spins, _lam: Array, ck: float, cc: float) -> None:
     """Subtract ck times the derivative by coordinates from W.Kt, cc times that by velocities."""
     for k in range(spins.body.size):
         b = spins.body[k]
@@ -273,7 +278,8 @@ def spin_tangents(s: Any, W: Any, spins: Any, _lam: Any, ck: Any, cc: Any) -> No
                 W.Kt[x + 6 + i, y + 6 + j] -= ck * spins.circulatory[k, i, j]
 
 
+FORCES = spin_forces, spin_tangents
+WHERE = {"ends": on_joint, "outside": from_outside, "couples": apart}
 SPINS_FAMILY = Family(
-    "spins", Spin, pack, spin_forces, spin_tangents, ends=on_joint, outside=from_outside,
-    couples=apart, by_rate=never, hooks=Hooks(potential=False),
-)  # fmt: skip
+    "spins", Spin, pack, *FORCES, **WHERE, by_rate=never, hooks=Hooks(potential=False)
+)

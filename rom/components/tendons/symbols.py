@@ -1,17 +1,21 @@
 """How tendons are drawn."""
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
 from rom.components.tendons.paths import Place, path_through, points_along
+from rom.components.tendons.tendons import Tendon
+from rom.mbs.parts.bodies import Marker
+from rom.model import Array
 from rom.view.canvas.scene import Actor
 from rom.view.scenes.connections import DAMPER_COLOUR, LINE_WIDTH
 from rom.view.scenes.ground import Scenery
 
+Drawn = Actor | tuple[Marker, Array, float]  # or axis and radius of a circle at a marker
 
-def draw(scenery: Scenery, name: str, tendon: Any) -> Iterator[Any]:
+
+def draw(scenery: Scenery, name: str, tendon: Tendon) -> Iterator[Drawn]:
     """The line of a cable, and the circles of its pulleys."""
     places, stations = scenery.places, tendon.stations
     x = [places.point(one.marker) for one in stations]

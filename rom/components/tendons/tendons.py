@@ -143,17 +143,13 @@ def tendon(  # noqa: PLR0913  one keyword per property
     stations = tuple(_station(self, name, place, friction) for place in path)
     length = _design_length(self, name, stations)
     if any(one.friction for one in stations[1:-1]) and transition_speed is None:
-        raise ConfigError(
-            f"tendon {name!r} has friction, but no transition_speed.",
-            hint="Take a hundredth of the speed with which it slides.",
-        )
+        text = f"tendon {name!r} has friction, but no transition_speed."
+        raise ConfigError(text, hint="Take a hundredth of the speed with which it slides.")
     if (EA is None) == (tension is None):
         raise ConfigError(f"tendon {name!r} needs either EA or tension.")
     if EA is None and (damping or pretension or free_length is not None):
-        raise ConfigError(
-            f"tendon {name!r} is pulled by a given tension and does not stretch; leave damping, "
-            "free_length and pretension out."
-        )
+        text = f"tendon {name!r} is pulled by a given tension and does not stretch"
+        raise ConfigError(f"{text}; leave damping, free_length and pretension out.")
     if pretension and free_length is not None:
         raise ConfigError(f"tendon {name!r} has pretension and free_length; give only one.")
     given = free_length if EA else tension
@@ -168,7 +164,7 @@ def tendon(  # noqa: PLR0913  one keyword per property
     self.add(name, Tendon(stations, numbers, EA is None, function), TENDONS_FAMILY)
 
 
-def _station(mechanism: Whole, name: str, place: Any, friction: float) -> Station:
+def _station(mechanism: Whole, name: str, place: Marker | Pulley, friction: float) -> Station:
     """A place of the path in the axes of its marker."""
     if isinstance(place, Marker):
         mechanism.check_markers(name, place)
@@ -193,8 +189,8 @@ def _design_length(whole: Whole, name: str, stations: Sequence[Station]) -> floa
         text = f"tendon {name!r} ends at a pulley."
         raise ConfigError(text, hint="It is fixed at a marker at both ends.")
     path = path_through(name, [_placed(whole, one) for one in stations])
-    arcs = (one.radius * (wrap + 2 * np.pi * one.turns)
-            for one, wrap in zip(stations, path.wrap, strict=True))  # fmt: skip
+    wraps = zip(stations, path.wrap, strict=True)
+    arcs = (one.radius * (wrap + 2 * np.pi * one.turns) for one, wrap in wraps)
     return float(path.straight.sum() + sum(arcs))
 
 
@@ -264,8 +260,8 @@ class Tendons(Table):
 
 def pack(tendons: Mapping[str, Tendon], places: Places) -> Tendons:
     """The tendons as arrays."""
-    named = [(f"place {k} of {name}", one) for name, tendon in tendons.items()
-             for k, one in enumerate(tendon.stations)]  # fmt: skip
+    each = ((name, k, one) for name, x in tendons.items() for k, one in enumerate(x.stations))
+    named = [(f"place {k} of {name}", one) for name, k, one in each]
     stations = [one for _, one in named]
     sizes = [len(tendon.stations) for tendon in tendons.values()]
     p, m = len(stations), max(sizes)
@@ -400,12 +396,9 @@ def tensions(tendons: Tendons) -> list[Array]:
     return [tendons.tension[a : b - 1] for a, b in pairwise(tendons.first.tolist())]
 
 
+FORCES = tendon_wrenches, tendon_tangents, tendon_energy
+LOST = "the path of {} is lost: it has left a pulley, its places meet, or a winch took it all"
+WHERE = {"ends": ends, "couples": coupled, "hooks": Hooks(answers=tensions, lost=LOST)}
 TENDONS_FAMILY = Family(
-    "tendons", Tendon, pack, tendon_wrenches, tendon_tangents, tendon_energy, ends=ends,
-    couples=coupled, by_rate=lambda tendons: tendons.rated.any(),
-    hooks=Hooks(
-        answers=tensions,
-        lost="the path of {} is lost: it has left a pulley, its places meet, or a winch took it "
-        "all",
-    ),
-)  # fmt: skip
+    "tendons", Tendon, pack, *FORCES, **WHERE, by_rate=lambda tendons: tendons.rated.any()
+)

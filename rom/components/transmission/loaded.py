@@ -1,12 +1,15 @@
 """Gears on oil films as they bear: toothed shafts, and walls as high as the loads on them."""
 
 from collections.abc import Iterator
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
 
 from rom.arguments import AnyMechanism, AnySolution, Positive, typed, unit_vector
+from rom.components.gear_mesh.gears.geometry import GearPair
+from rom.components.gear_mesh.gears.meshes import GearMesh, middle_of_tooth
+from rom.components.gear_mesh.gears.racks import RackPair
 from rom.components.gear_mesh.tooth_loads import ToothLoads, tooth_loads
 from rom.components.journal_bearing.record import film_pressures
 from rom.errors import ConfigError
@@ -63,28 +66,15 @@ def _wheels(places: Places, body: str) -> Iterator[Mesh]:
             if getattr(pair, "helix", 0.0) or min(pair.teeth) < 0:
                 raise ConfigError(f"the wheels of {name!r} must be spur wheels with teeth outside.")
             axes = _axes(places, mesh)
-            points, triangles = gear(pair.teeth[side], pair.module, pair.width,
-                                     pressure_angle=pair.pressure_angle)  # fmt: skip
-            turn = _tooth(pair, side, mesh.phase) - np.pi / pair.teeth[side]
+            cut, alpha = (pair.teeth[side], pair.module, pair.width), pair.pressure_angle
+            points, triangles = gear(*cut, pressure_angle=alpha)
+            turn = side * np.pi + middle_of_tooth(pair, side, mesh.phase) - np.pi / cut[0]
             c, s = np.cos(turn), np.sin(turn)
             rows = np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]) @ np.array(axes)
             yield points @ rows + places.point(marker)[0], triangles
 
 
-def _tooth(pair: Any, side: int, phase: float) -> float:
-    """Angle of the middle of a tooth of the pinion, 0, or the gear, 1, from the line of centres.
-
-    The working flank of the tooth of the pinion begins in the point of tangency when its phase is
-    zero; that of the gear touches it.
-    """
-    half = pair.base_thickness[side] / (2 * pair.rb[side])
-    if side == 0:
-        return float(phase - pair.alpha - half)
-    left = (pair.tangents - pair.rb[0] * phase) / pair.rb[1]
-    return float(np.pi - pair.alpha + left - half)
-
-
-def _axes(places: Places, mesh: Any) -> Axes:
+def _axes(places: Places, mesh: GearMesh) -> Axes:
     """From the pinion to the gear, across, and along the pinion, in the world."""
     z = places.direction(mesh.i.body, mesh.axes[0])[0]
     D = places.point(mesh.j)[0] - places.point(mesh.i)[0]
@@ -129,7 +119,9 @@ def tooth_walls(
     return points + middle, triangles
 
 
-def _lines(pair: Any, loads: ToothLoads, axes: Axes) -> Iterator[tuple[Array, Array]]:
+def _lines(
+    pair: GearPair | RackPair, loads: ToothLoads, axes: Axes
+) -> Iterator[tuple[Array, Array]]:
     """Places (k, 3) from the middle of the pinion and load per length (k,) of each line."""
     right, across, z = axes
     c, s = np.cos(pair.alpha), np.sin(pair.alpha)

@@ -7,6 +7,7 @@ bearing, q = V y. Films and teeth lie between such bodies as between any others.
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from scipy.linalg import eigh
@@ -117,6 +118,7 @@ def mechanism_of(unit: Transmission, q: Array, v: Array) -> Mechanism:
 def _add_contacts(mech: Mechanism, unit: Transmission) -> None:
     """Films and teeth."""
     mesh, wheels = unit.mesh, []
+    film = partial(mech.journal_bearing, reference=(1, 0, 0), oil=unit.viscosity)
     for name, rotor, turn in (("pinion", unit.pinion, 1.0), ("gear", unit.gear, -1.0)):
         wheels.append(mech.part(name).marker(f"node {rotor.wheel}"))
         for node, bearing in rotor.bearings.items():
@@ -124,12 +126,10 @@ def _add_contacts(mech: Mechanism, unit: Transmission) -> None:
             bush = mech.ground.marker(mech.design_point(seat))
             if unit.housing is not None:
                 bush = mech.part("housing").marker(f"{name} {node}")
-            mech.journal_bearing(f"{name} {node}", seat, bush, axis=turn * Z_AXIS,
-                                 reference=(1, 0, 0), bearing=bearing,
-                                 oil=unit.viscosity)  # fmt: skip
-    mech.gear_mesh("teeth", *wheels, axis=Z_AXIS, pair=mesh.pair, stiffness=mesh.stiffness,
-                   correction=mesh.correction, damping=mesh.damping, entry=0.0,
-                   conservative=False, cells=mesh.cells)  # fmt: skip
+            film(f"{name} {node}", seat, bush, axis=turn * Z_AXIS, bearing=bearing)
+    teeth = partial(mech.gear_mesh, pair=mesh.pair, stiffness=mesh.stiffness, cells=mesh.cells)
+    teeth = partial(teeth, correction=mesh.correction, damping=mesh.damping, conservative=False)
+    teeth("teeth", *wheels, axis=Z_AXIS, entry=0.0)
 
 
 def coordinates_of(unit: Transmission, solution: Solution) -> tuple[Array, Array]:
@@ -161,10 +161,9 @@ def places_of(unit: Transmission) -> tuple[list[Rows], list[Array]]:
     origins = [np.zeros(3), np.array([unit.mesh.pair.distance, 0.0, beside])]
     if unit.housing is not None:
         origins.append(np.zeros(3))
-        places.append({
-            f"{NAMES[k]} {node}": (origins[k] + along[k][node] * Z_AXIS, rows)
-            for k, bushes in enumerate(unit.housing.bushes) for node, rows in bushes.items()
-        })  # fmt: skip
+        bushes = ((k, n, rows) for k in (0, 1) for n, rows in unit.housing.bushes[k].items())
+        at = {f"{NAMES[k]} {n}": (origins[k] + along[k][n] * Z_AXIS, rows) for k, n, rows in bushes}
+        places.append(at)
     return places, origins
 
 
@@ -183,10 +182,10 @@ def _held(name: str, M: Array, K: Array, loss: float, places: Rows) -> tuple[Fle
         markers[key] = Marker(key, point, shift, turn, "rbe2", hold)
     mass = 1.0 / max(np.abs(marker.translation).max() for marker in markers.values()) ** 2
     reach = max(float(np.linalg.norm(marker.point)) for marker in markers.values())
+    J, K, omega = mass * reach**2 * np.eye(3), np.diag(squares), np.sqrt(squares)
+    I, S_kl = np.zeros((3, 3, r)), np.einsum("ab,kl->abkl", np.eye(3) / 3, np.eye(r))
+    labels = tuple(f"mode {k + 1}" for k in range(r))
     body = FlexibleBody(
-        name=name, mass=mass, first_moment=np.zeros(3), inertia=mass * reach**2 * np.eye(3),
-        S=still, Ibar_kl=np.zeros((3, 3, r)), K=np.diag(squares), D=loss * np.diag(squares),
-        S_kl=np.einsum("ab,kl->abkl", np.eye(3) / 3, np.eye(r)), markers=markers,
-        omega=np.sqrt(squares), labels=tuple(f"mode {k + 1}" for k in range(r)),
-    )  # fmt: skip
+        name, mass, np.zeros(3), J, still, I, S_kl, K, loss * K, markers, omega, labels
+    )
     return body, V

@@ -150,14 +150,9 @@ def simulate(state: Rest, *, periods: float, steps: int = 100, whirling: bool = 
         ModelError: if the speed is above the threshold of whirl.
         SolverError: if a step fails; ``error.solution`` is the motion before.
     """
+    if not whirling:
+        _refuse_whirl(state, "Lower the speed, load the bearings more, or give whirling=True.")
     unit = state.unit
-    fastest = 0.0 if whirling else whirl(state).values[0]
-    if fastest.real >= 0 and not whirling:
-        raise ModelError(
-            f"the speed of {unit.speed:.1f} rad/s is above the threshold: the journals whirl with "
-            f"{abs(fastest.imag):.1f} rad/s and grow by {fastest.real:.3g} per second.",
-            hint="Lower the speed, load the bearings more, or let it whirl with whirling=True.",
-        )
     n_t, t = round(periods * steps), state.theta / unit.speed
     mech, dt = mechanism_of(unit, state.q, np.zeros(state.q.size)), unit.mesh_period / steps
     try:
@@ -166,6 +161,16 @@ def simulate(state: Rest, *, periods: float, steps: int = 100, whirling: bool = 
         error.solution = error.solution and _run(unit, error.solution)
         raise
     return _run(unit, found)
+
+
+def _refuse_whirl(state: Rest, hint: str) -> None:
+    """Refuse an equilibrium that does not last."""
+    found, speed = whirl(state), state.unit.speed
+    growth, omega = found.values[0].real, abs(found.values[0].imag)
+    if not found.stable:
+        words = f"whirl with {omega:.1f} rad/s and grow by {growth:.3g} per second."
+        text = f"the speed of {speed:.1f} rad/s is above the threshold: the journals {words}"
+        raise ModelError(text, hint=hint)
 
 
 def _run(unit: Transmission, found: Solution) -> Run:
@@ -186,9 +191,9 @@ def _run(unit: Transmission, found: Solution) -> Run:
         for name, f in forces.items()
     }
     kinetic = 0.5 * np.sum(w @ M * w, axis=1)
-    return Run(unit, found.t - found.t[0], q, v, *teeth_and_heat(unit, found, q),
-               work | {"kinetic": kinetic - kinetic[0]},
-               int(found.statistics["iterations"]))  # fmt: skip
+    work["kinetic"] = kinetic - kinetic[0]
+    told = *teeth_and_heat(unit, found, q), work, int(found.statistics["iterations"])
+    return Run(unit, found.t - found.t[0], q, v, *told)
 
 
 def teeth_and_heat(unit: Transmission, found: Solution, q: Array) -> tuple[Array, Array, Array]:
@@ -250,10 +255,7 @@ def mesh_response(state: Rest, *, harmonics: int = 6, positions: int = 96) -> Re
         ModelError: if the unit whirls at that speed.
     """
     unit, W = state.unit, state.unit.wheels
-    if not whirl(state).stable:
-        text = f"{unit.speed:.1f} rad/s are above the threshold: journals whirl, and no periodic"
-        hint = "Lower the speed, or load the bearings more."
-        raise ModelError(f"{text} motion with the mesh is left.", hint=hint)
+    _refuse_whirl(state, "Lower the speed, or load the bearings more.")
     M, C, K = linearised(state)
     excitation, k = _excitation(state, positions)
     K += W.T @ (k - state.forces.mesh.stiffness) @ W

@@ -84,11 +84,14 @@ class Shaft:
         z = np.asarray(self.z, dtype=float)
         d, hole = (np.asarray(x, dtype=float) for x in (self.diameter, self.bore))
         if z.size < 2 or np.any(np.diff(z) <= 0) or np.any(d <= 0):
-            raise ModelError(f"z = {z.tolist()} must ascend, diameter = {d.tolist()} be positive.")
-        if np.any(hole < 0) or np.any(hole >= d):
-            raise ModelError(f"bores of {hole.tolist()} m must be smaller than {d.tolist()} m.")
-        if any(not 0 <= disc.node < z.size for disc in self.discs):
-            raise ModelError(f"each disc must sit at a node from 0 to {z.size - 1}.")
+            fault = f"z = {z.tolist()} must ascend, diameter = {d.tolist()} be positive."
+        elif np.any(hole < 0) or np.any(hole >= d):
+            fault = f"bores of {hole.tolist()} m must be smaller than {d.tolist()} m."
+        elif any(not 0 <= disc.node < z.size for disc in self.discs):
+            fault = f"each disc must sit at a node from 0 to {z.size - 1}."
+        else:
+            return
+        raise ModelError(fault)
 
     @property
     def n(self) -> int:
@@ -164,10 +167,10 @@ def _beam(
 def _shapes(x: float, l: float, phi: float) -> tuple[Array, Array, Array, Array]:
     """Deflection and turn of the section per (u, turn) of both ends, and their slopes."""
     h, m = phi / 2, 1 / (1 + phi)  # rows of coefficients belong to powers of x
-    N = m * np.array([[1 + phi, 0, 0, 0], [-phi, l * (1 + h), phi, -l * h],
-                      [-3, -l * (2 + h), 3, l * (h - 1)], [2, l, -2, l]])  # fmt: skip
-    T = m * np.array([[0, 1 + phi, 0, 0], [-6 / l, -4 - phi, 6 / l, phi - 2],
-                      [6 / l, 3, -6 / l, 3]])  # fmt: skip
+    linear, square = [-phi, l * (1 + h), phi, -l * h], [-3, -l * (2 + h), 3, l * (h - 1)]
+    N = m * np.array([[1 + phi, 0, 0, 0], linear, square, [2, l, -2, l]])
+    linear, square = [-6 / l, -4 - phi, 6 / l, phi - 2], [6 / l, 3, -6 / l, 3]
+    T = m * np.array([[0, 1 + phi, 0, 0], linear, square])
     return polyval(x, N), polyval(x, T), polyval(x, polyder(N)) / l, polyval(x, polyder(T)) / l
 
 

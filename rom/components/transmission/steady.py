@@ -6,6 +6,7 @@ Source:
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -100,17 +101,15 @@ def steady(start: Rest | Steady, *, steps: int = 60) -> Steady:
         both = ([part.moving for part in m.parts.values()] for m in (mech, near.solution.mechanism))
         if not all(np.array_equal(a.K, b.K) for a, b in zip(*both, strict=True)):
             near = None  # the coordinates of both do not mean the same
-    found = periodic_motion(
-        mech, period=unit.mesh_period, start=near, steps=steps,
-        rho_inf=RHO_INF, t_start=start.theta / unit.speed, tolerance=GAP_TOL,
-    )  # fmt: skip
-    q, v = coordinates_of(unit, found.solution)
+    repeated = partial(periodic_motion, rho_inf=RHO_INF, tolerance=GAP_TOL, steps=steps)
+    t = start.theta / unit.speed
+    found = repeated(mech, period=unit.mesh_period, start=near, t_start=t)
+    moved = found.solution
+    q, v = coordinates_of(unit, moved)
     ends = np.abs([q[-1] - q[0], unit.mesh_period * (v[-1] - v[0])])
-    return Steady(
-        unit, start.theta, found.solution.t - found.solution.t[0], q, v,
-        *teeth_and_heat(unit, found.solution, q), found.multipliers, found.passes,
-        float(ends.max() / np.abs(q).max()), found,
-    )  # fmt: skip
+    told = *teeth_and_heat(unit, moved, q), found.multipliers, found.passes
+    gap = float(ends.max() / np.abs(q).max())
+    return Steady(unit, start.theta, moved.t - moved.t[0], q, v, *told, gap, found)
 
 
 def sweep(unit: Transmission, speeds: Iterable[float], *, steps: int = 60) -> list[Steady]:

@@ -120,34 +120,23 @@ def _matrices(
     shaft: Shaft, supports: Mapping[int, Support]
 ) -> tuple[Array, Array, Array, Array, npt.NDArray[np.int64]]:
     """Mass, damping, stiffness, gyroscopic matrix of bending, and its coordinates."""
-    M, K, G = shaft.matrices()
-    C = np.zeros_like(K)
+    (M, K, G), z = shaft.matrices(), np.asarray(shaft.z, dtype=float)
+    C, against, arms = np.zeros_like(K), np.zeros((4, 4)), (z - z.mean()) / np.ptp(z)
     for node, support in supports.items():
-        if not 0 <= node < shaft.n // 6:
-            raise ModelError(f"the node {node} of a bearing must be 0 to {shaft.n // 6 - 1}.")
-        at = slice(6 * node, 6 * node + 2)
-        K[at, at] += _square(support.stiffness)
+        if not 0 <= node < z.size:
+            raise ModelError(f"the node {node} of a bearing must be 0 to {z.size - 1}.")
+        at, R = slice(6 * node, 6 * node + 2), np.kron([1.0, arms[node]], np.eye(2))
+        k = _square(support.stiffness)
+        K[at, at] += k
         C[at, at] += _square(support.damping)
-    _refuse_loose(shaft, supports)
-    rows = (6 * np.arange(shaft.n // 6)[:, None] + LATERAL_DOFS).ravel()
+        against += R.T @ k @ R  # both translations and both tilts
+    size = np.linalg.svd(against, compute_uv=False)
+    if not size[-1] > SUPPORT_STIFFNESS_RTOL * size[0]:
+        text = f"bearings at the nodes {sorted(supports)} leave a rigid motion of the shaft free."
+        raise ModelError(text, hint="Give it two bearings that push back in both directions.")
+    rows = (6 * np.arange(z.size)[:, None] + LATERAL_DOFS).ravel()
     M, C, K, G = (A[np.ix_(rows, rows)] for A in (M, C, K, G))
     return M, C, K, G, rows
-
-
-def _refuse_loose(shaft: Shaft, supports: Mapping[int, Support]) -> None:
-    """Bearings must push back against both translations and both tilts."""
-    z = np.asarray(shaft.z, dtype=float)
-    arms = (z - z.mean()) / np.ptp(z)
-    S = np.zeros((4, 4))
-    for node, support in supports.items():
-        R = np.kron([1.0, arms[node]], np.eye(2))
-        S += R.T @ _square(support.stiffness) @ R
-    size = np.linalg.svd(S, compute_uv=False)
-    if not size[-1] > SUPPORT_STIFFNESS_RTOL * size[0]:
-        raise ModelError(
-            f"bearings at the nodes {sorted(supports)} leave a rigid motion of the shaft free.",
-            hint="Give it two bearings that push back in both directions.",
-        )
 
 
 def _square(value: npt.ArrayLike) -> Array:

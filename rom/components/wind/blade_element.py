@@ -12,15 +12,13 @@ Source:
 
 import math
 from dataclasses import replace
-from functools import cache
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from numba import carray
 
 from rom.arguments import finite, positive, unit_vector
-from rom.components.cosserat.bodies import RodBody
+from rom.components.cosserat.bodies import RodBody, law_of
 from rom.components.wind.blading import (
     AIR_DENSITY,
     CHORD,
@@ -45,7 +43,7 @@ from rom.components.wind.wind_turbine import (
     stations,
 )
 from rom.errors import ConfigError
-from rom.mbs.elements.nonlinear import Elements, compiled_law
+from rom.mbs.elements.nonlinear import Elements
 from rom.mbs.kernels.algebra import rotation, unit
 from rom.mbs.kernels.compiled import inner
 from rom.model import Array
@@ -125,8 +123,8 @@ def turns_of_section(J, u, m, lean, force, out):
     for i in range(2):
         out[i, 0] = J[4 * i + 1] * u[2] + J[4 * i + 3] * m[2] - J[8 + i] * lean[1]
         out[i, 1] = -J[4 * i] * u[2] - J[4 * i + 2] * m[2] + J[8 + i] * lean[0]
-        out[i, 2] = (J[4 * i] * u[1] - J[4 * i + 1] * u[0]
-                     + J[4 * i + 2] * m[1] - J[4 * i + 3] * m[0])  # fmt: skip
+        out[i, 2] = J[4 * i] * u[1] - J[4 * i + 1] * u[0] + J[4 * i + 2] * m[1]
+        out[i, 2] -= J[4 * i + 3] * m[0]
         out[2, i] = 0.0
     out[2, 2] = 0.0
     out[0, 2] -= force[1]
@@ -218,12 +216,6 @@ def strip(numbers, pose, wanted, answer, space):
     spread(R, J, L, W, out)
 
 
-@cache
-def compiled_strip() -> Any:
-    """The compiled law of a strip."""
-    return compiled_law(strip)
-
-
 def in_wind(
     blade: RodBody,
     wind: npt.ArrayLike,
@@ -250,8 +242,8 @@ def in_wind(
         ConfigError: for a wind that is no vector or comes from behind, or a density that cannot be.
     """
     far = far_away(wind, axis, tower=tower, density=density)
-    groups = [Elements.of(compiled_strip(), np.array([[k]]), numbers[None, :])
-              for k, numbers in enumerate(strip_rows(blade, far, cone))]  # fmt: skip
+    rows = enumerate(strip_rows(blade, far, cone))
+    groups = [Elements.of(law_of(strip), np.array([[k]]), row[None, :]) for k, row in rows]
     return replace(blade, elements=(*blade.elements, *groups))
 
 
@@ -262,8 +254,8 @@ def far_away(
     wind = finite("wind", wind, (3,))
     axis = unit_vector("axis", axis)
     if wind @ axis < 0.0:
-        raise ConfigError(f"the wind {wind.tolist()} comes from behind the rotor.",
-                          hint="The axis of the shaft points downwind.")  # fmt: skip
+        text = f"the wind {wind.tolist()} comes from behind the rotor."
+        raise ConfigError(text, hint="The axis of the shaft points downwind.")
     positive("density", density)
     return [0.5 * density, *wind, *axis, *(TOWER_TUBE if tower else NO_TOWER)]
 

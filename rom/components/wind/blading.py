@@ -9,9 +9,11 @@ Source:
     Hansen, Aerodynamics of Wind Turbines, 2008, chapters 6, 8 and 9: elements of a blade, tower.
 """
 
+import csv
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -77,15 +79,9 @@ def slope_of_wind(tower, place, wind, out):
 
 # table 3-1: middle of an element from the axis [m], its length along the blade [m], its chord [m],
 # its twist [deg]
-RADIUS = (2.8667, 5.6, 8.3333, 11.75, 15.85, 19.95, 24.05, 28.15, 32.25, 36.35, 40.45, 44.55, 48.65,
-          52.75, 56.1667, 58.9, 61.6333)  # fmt: skip
-ELEMENT_LENGTH = (*(2.7333,) * 3, *(4.1,) * 11, *(2.7333,) * 3)
-CHORD = (3.542, 3.854, 4.167, 4.557, 4.652, 4.458, 4.249, 4.007, 3.748, 3.502, 3.256, 3.010, 2.764,
-         2.518, 2.313, 2.086, 1.419)  # fmt: skip
-ELEMENT_TWIST = (*(13.308,) * 4, 11.480, 10.162, 9.011, 7.795, 6.544, 5.361, 4.188, 3.125, 2.319,
-                 1.526, 0.863, 0.370, 0.106)  # fmt: skip
-ELEMENT_PROFILE = (*("Cylinder1",) * 2, "Cylinder2", "DU40", *("DU35",) * 2, "DU30",
-                   *("DU25",) * 2, *("DU21",) * 2, *("NACA64",) * 6)  # fmt: skip
+with (Path(__file__).parent / "nrel5mw_elements.csv").open(encoding="utf-8") as lines:
+    *_COLUMNS, ELEMENT_PROFILE = zip(*list(csv.reader(lines))[1:], strict=True)
+RADIUS, ELEMENT_LENGTH, CHORD, ELEMENT_TWIST = (tuple(map(float, x)) for x in _COLUMNS)
 ROTOR_RADIUS = 63.0  # m
 AIR_DENSITY = 1.225  # [kg/m^3]
 BETZ_LIMIT = 16 / 27  # of the power in the wind
@@ -131,11 +127,11 @@ class Blading:
         size = len(self.profile)
         for name in ("radius", "length", "chord", "twist"):
             one_each(f"of {name}", getattr(self, name).shape, "profiles", (size,))
-        if not (self.hub_radius > 0.0 and (self.radius > self.hub_radius).all()
-                and (self.radius < self.rotor_radius).all()):  # fmt: skip
-            raise ConfigError(f"strips lie from {self.radius.min():g} to {self.radius.max():g} m, "
-                              f"blades from {self.hub_radius:g} to {self.rotor_radius:g} m.",
-                              hint="Radii are those of the middles of strips.")  # fmt: skip
+        low, high = self.radius.min(initial=np.inf), self.radius.max(initial=0.0)
+        if not 0.0 < self.hub_radius < low <= high < self.rotor_radius:
+            span = f"blades from {self.hub_radius:g} to {self.rotor_radius:g} m"
+            text = f"strips lie from {low:g} to {high:g} m, {span}."
+            raise ConfigError(text, hint="Radii are those of the middles of strips.")
 
     @property
     def area(self) -> float:
@@ -251,9 +247,9 @@ def turn(strips, tables, counts, shape, angles, wind, motion, tower, out):  # no
             ahead = -c * v[1] - s * v[0] * st  # with the motion of the blade
             theta, far = axial[j] + pitch, cc * n + sc * e
             far_off = far, speed * r - ahead
-            flow = slowed(strips[j], tables[j], counts[j], theta, far_off, (lean, toward))
-            normal, tangential, attack = strip_load(
-                strips[j], tables[j], counts[j], theta, flow, half_density)  # fmt: skip
+            strip, table, k = strips[j], tables[j], counts[j]
+            flow = slowed(strip, table, k, theta, far_off, (lean, toward))
+            normal, tangential, attack = strip_load(strip, table, k, theta, flow, half_density)
             row = out[i, j]
             row[0], row[1], row[2], row[3], row[4] = normal, tangential, flow[0], flow[1], attack
             row[5] = 1.0 - flow[0] / far if far != 0.0 else 0.0
@@ -294,11 +290,11 @@ def rotor_load(  # noqa: PLR0913  one keyword per choice, all with defaults
             a yaw beyond the model, or no azimuths.
     """
     out = np.zeros((n_azimuths, len(blades.profile), 6))
-    turn(blades.strips, *blades.tables, (blades.twist, blades.radius),
-         (blades.tilt, blades.cone, HUB_OVERHANG, TOWER_HEIGHT + SHAFT_HEIGHT),
-         (wind * math.cos(yaw), wind * math.sin(yaw), float(skew)),
-         (float(speed), float(pitch), 0.5 * blades.density),
-         TOWER_TUBE if tower else NO_TOWER, out)  # fmt: skip
+    shape, tube = (blades.twist, blades.radius), TOWER_TUBE if tower else NO_TOWER
+    angles = blades.tilt, blades.cone, HUB_OVERHANG, TOWER_HEIGHT + SHAFT_HEIGHT
+    far = wind * math.cos(yaw), wind * math.sin(yaw), float(skew)
+    motion = float(speed), float(pitch), 0.5 * blades.density
+    turn(blades.strips, *blades.tables, shape, angles, far, motion, tube, out)
     c = math.cos(blades.cone)
     thrust = c * out[:, :, 0] @ blades.length
     torque = c * out[:, :, 1] @ (blades.radius * blades.length)

@@ -45,9 +45,8 @@ MAX_RADIUS_CHANGE = 0.1  # of a rotor that the published speeds and gains still 
 Held = Callable[[float], tuple[float, float]]  # speed of the rotor and pitch [rad/s, rad]
 SPEED_RTOL = 1e-12  # of steady speeds and pitches: digits that repeat
 # steady pitch above the rated wind: table 7-1 (wind [m/s], pitch [deg])
-PUBLISHED_PITCH = ((12.0, 3.83), (13.0, 6.60), (14.0, 8.70), (15.0, 10.45), (16.0, 12.06),
-                   (17.0, 13.54), (18.0, 14.92), (19.0, 16.23), (20.0, 17.47), (21.0, 18.70),
-                   (22.0, 19.94), (23.0, 21.18), (24.0, 22.35), (25.0, 23.47))  # fmt: skip
+_PITCHES = "3.83 6.60 8.70 10.45 12.06 13.54 14.92 16.23 17.47 18.70 19.94 21.18 22.35 23.47"
+PUBLISHED_PITCH = tuple(zip(map(float, range(12, 26)), map(float, _PITCHES.split()), strict=True))
 
 
 @inner
@@ -163,8 +162,8 @@ def check_rotor(blades: Blading) -> None:
 def working(wind: float, when: str = "") -> float:
     """The wind, if the turbine works in it [m/s]."""
     if not CUT_IN_WIND <= wind <= CUT_OUT_WIND:
-        raise ConfigError(f"the turbine is parked in a wind of {wind:g} m/s{when}.",
-                          hint="It works from 3 to 25 m/s.")  # fmt: skip
+        text = f"the turbine is parked in a wind of {wind:g} m/s{when}."
+        raise ConfigError(text, hint="It works from 3 to 25 m/s.")
     return wind
 
 
@@ -191,19 +190,18 @@ def steady(
     blades = blading() if blades is None else blades
     check_rotor(blades)
     load = partial(rotor_load, blades, float(wind), tower=tower)
+    rated = partial(load, RATED_SPEED)
 
     def excess(speed: float) -> float:
         turned = load(speed).torque
         return turned - GEAR_RATIO * generator_torque(GEAR_RATIO * speed)
 
-    if load(RATED_SPEED).power <= RATED_POWER:
-        rated = RATED_GENERATOR / GEAR_RATIO
-        slowest = CUT_IN_GENERATOR / GEAR_RATIO
-        top = RATED_SPEED if excess(rated) > 0.0 else rated
+    if rated().power <= RATED_POWER:
+        slowest, top = CUT_IN_GENERATOR / GEAR_RATIO, RATED_GENERATOR / GEAR_RATIO
+        top = RATED_SPEED if excess(top) > 0.0 else top
         return load(float(brentq(excess, slowest, top, rtol=SPEED_RTOL)))
-    pitch = brentq(lambda p: load(RATED_SPEED, p).power - RATED_POWER, 0.0, np.pi / 4,
-                   rtol=SPEED_RTOL)  # fmt: skip
-    return load(RATED_SPEED, float(pitch))
+    pitch = brentq(lambda p: rated(p).power - RATED_POWER, 0.0, np.pi / 4, rtol=SPEED_RTOL)
+    return rated(float(pitch))
 
 
 @typed
@@ -233,7 +231,6 @@ def power_curve(
     """
     winds = vector("winds", winds)
     points = [steady(float(wind), blades, tower=tower, held=held) for wind in winds]
-    names = ("wind", "speed", "pitch", "thrust", "torque", "power_coefficient",
-             "thrust_coefficient")  # fmt: skip
+    names = "wind speed pitch thrust torque power_coefficient thrust_coefficient".split()
     found = {name: np.array([getattr(p, name) for p in points]) for name in names}
     return found | {"power": GENERATOR_EFFICIENCY * np.array([p.power for p in points])}

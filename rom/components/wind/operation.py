@@ -62,12 +62,12 @@ def wake_step(blades, flow, state, dt, out):
     strips, tables, counts, twist = blades
     axial, speed, pitch, half_density = flow
     for j in range(out.shape[0]):
-        theta, across = twist[j] + pitch, speed * strips[j, RADIUS_COLUMN]
-        met = induced(strips[j], tables[j], counts[j], theta, axial, across)
-        follow(strips[j], axial, across, met, state[j], dt)
+        strip, table, k = strips[j], tables[j], counts[j]
+        theta, across = twist[j] + pitch, speed * strip[RADIUS_COLUMN]
+        met = induced(strip, table, k, theta, axial, across)
+        follow(strip, axial, across, met, state[j], dt)
         met = axial - state[j, 2], across + state[j, 5], 0.0
-        out[j, 0], out[j, 1], _ = strip_load(
-            strips[j], tables[j], counts[j], theta, met, half_density)  # fmt: skip
+        out[j, 0], out[j, 1], _ = strip_load(strip, table, k, theta, met, half_density)
 
 
 @typed
@@ -104,8 +104,8 @@ def operate(
     t = dt * np.arange(round(t_end / dt) + 1)
     blows = np.array([working(float(wind(s)), f", at {s:g} s") for s in t])
     run = _Run(blades, blows[0], dynamic, held)
-    rows = np.array([run.step(s, v, dt if k else 0.0)
-                     for k, (s, v) in enumerate(zip(t, blows, strict=True))])  # fmt: skip
+    steps = zip(t, blows, [0.0, *[dt] * (len(t) - 1)], strict=True)
+    rows = np.array([run.step(*step) for step in steps])
     speed, pitch, power, torque, thrust = rows[:, :5].T
     return Operation(t, blows, speed, pitch, power, torque, thrust, rows[:, 5:])
 

@@ -99,8 +99,8 @@ def profiles() -> dict[str, Profile]:
     with PROFILE_TABLE.open(encoding="utf-8") as lines:
         for name, *numbers in list(csv.reader(lines))[1:]:
             rows.setdefault(name, []).append(tuple(map(float, numbers)))
-    return {name: Profile(name, np.radians(a), lift, drag)
-            for name, (a, lift, drag) in ((n, np.array(r).T) for n, r in rows.items())}  # fmt: skip
+    tables = {name: np.array(numbers).T for name, numbers in rows.items()}
+    return {n: Profile(n, np.radians(a), lift, drag) for n, (a, lift, drag) in tables.items()}
 
 
 @typed
@@ -133,8 +133,8 @@ def profile(
     Raises:
         ConfigError: naming the profile, for a table that cannot be.
     """
-    a, cl, cd = (vector(f"{what} of profile {name!r}", x) for what, x in
-                 (("angle", angle), ("lift", lift), ("drag", drag)))  # fmt: skip
+    given = {"angle": angle, "lift": lift, "drag": drag}
+    a, cl, cd = (vector(f"{what} of profile {name!r}", x) for what, x in given.items())
     _check(name, a, cl, cd)
     if a[0] <= ROUND_ATOL - np.pi and a[-1] >= np.pi - ROUND_ATOL:
         return Profile(name, a, cl, cd)
@@ -144,15 +144,18 @@ def profile(
 def _check(name: str, a: Array, cl: Array, cd: Array) -> None:
     """Refuse a table that is none."""
     if a.size < 2 or a.shape != cl.shape or a.shape != cd.shape:
-        raise ConfigError(f"profile {name!r} has {a.size} angles, {cl.size} lifts and {cd.size} "
-                          "drags; as many of each, two or more.")  # fmt: skip
-    if (np.diff(a) <= 0.0).any() or a[0] < -np.pi - ROUND_ATOL or a[-1] > np.pi + ROUND_ATOL:
-        raise ConfigError(f"angles of profile {name!r} do not ascend within -pi to pi [rad].")
-    if (cd < 0.0).any():
-        raise ConfigError(f"profile {name!r} has a drag of {cd.min():g}; it must not be negative.")
-    if not 0.0 < a[-1] < np.pi / 2 and a[-1] < np.pi - ROUND_ATOL:
-        raise ConfigError(f"the table of profile {name!r} ends at {np.degrees(a[-1]):g} degrees; "
-                          "stall lies between 0 and 90, or it goes once round.")  # fmt: skip
+        sizes = f"{a.size} angles, {cl.size} lifts and {cd.size} drags"
+        why = f"has {sizes}; as many of each, two or more."
+    elif (np.diff(a) <= 0.0).any() or a[0] < -np.pi - ROUND_ATOL or a[-1] > np.pi + ROUND_ATOL:
+        why = "has angles that do not ascend within -pi to pi [rad]."
+    elif (cd < 0.0).any():
+        why = f"has a drag of {cd.min():g}; it must not be negative."
+    elif not 0.0 < a[-1] < np.pi / 2 and a[-1] < np.pi - ROUND_ATOL:
+        end = np.degrees(a[-1])
+        why = f"ends at {end:g} degrees; stall lies between 0 and 90, or it goes once round."
+    else:
+        return
+    raise ConfigError(f"profile {name!r} {why}")
 
 
 def _carried_on(name: str, table: tuple[Array, Array, Array], D: float) -> Profile:
@@ -165,12 +168,10 @@ def _carried_on(name: str, table: tuple[Array, Array, Array], D: float) -> Profi
     lift = D / 2 * np.sin(2 * beyond) + A * np.cos(beyond) ** 2 / np.sin(beyond)
     drag = D * np.sin(beyond) ** 2 + B * np.cos(beyond)
     back = slice(-2, None, -1)  # mirrored at a right angle, flow from behind
-    positive = (np.concatenate([beyond, np.pi - beyond[back], [np.pi]]),
-                np.concatenate([lift, -CAMBER_SHARE * lift[back], [0.0]]),
-                np.concatenate([drag, drag[back], cd[:1]]))  # fmt: skip
-    below = positive[0] > max(-a[0], a[-1]) + 1e-6
-    share = np.where(positive[0] > np.pi / 2, 1.0, CAMBER_SHARE)
-    mirrored = (-positive[0][below][::-1], -(share * positive[1])[below][::-1],
-                positive[2][below][::-1])  # fmt: skip
-    return Profile(name, *(np.concatenate([m, t, p])
-                           for m, t, p in zip(mirrored, table, positive, strict=True)))  # fmt: skip
+    angle = np.concatenate([beyond, np.pi - beyond[back], [np.pi]])
+    lift = np.concatenate([lift, -CAMBER_SHARE * lift[back], [0.0]])
+    drag = np.concatenate([drag, drag[back], cd[:1]])
+    below = np.flatnonzero(angle > max(-a[0], a[-1]) + 1e-6)[::-1]
+    share = np.where(angle > np.pi / 2, 1.0, CAMBER_SHARE)
+    mirrored = zip((-angle, -(share * lift), drag), table, (angle, lift, drag), strict=True)
+    return Profile(name, *(np.concatenate([m[below], t, p]) for m, t, p in mirrored))

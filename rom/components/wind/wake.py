@@ -10,7 +10,7 @@ Source:
 
 import math
 from functools import cache
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 import numpy.typing as npt
@@ -49,6 +49,7 @@ NEVER_BEFORE = -1e9  # s: the instant that a wake remembers at the start
 WAKE_SIZE = 7
 LARGEST_INDUCTION = 0.5  # beyond which a wake takes no more time
 SMALLEST_WIND = 1e-3  # whose wake takes its time, more than days [m/s]
+entry_of = cache(compiled_entry)
 
 
 @inner
@@ -130,12 +131,6 @@ def late_strip(t, parameters, motion, memory, out):
         answer[i] = R[i, 0] * force[0] + R[i, 1] * force[1]
 
 
-@cache
-def compiled_late_strip() -> Any:
-    """The compiled law of a strip behind its own wake."""
-    return compiled_entry(late_strip, LAW_TYPES)
-
-
 def in_late_wind(
     mechanism: Mechanism,
     blade: Assembly,
@@ -171,7 +166,7 @@ def in_late_wind(
         sizes = len(winds), numbers[PROFILE_START]
         mechanism.law(
             f"{blade.name} strip {k}",
-            compiled_late_strip(),
+            entry_of(late_strip, LAW_TYPES),
             blade.marker(k),
             parameters=np.concatenate([sizes, winds.T.ravel(), numbers]),
             memory=[0.0] * (WAKE_SIZE - 1) + [NEVER_BEFORE],

@@ -12,7 +12,6 @@ Source:
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
 from typing import Annotated, Any
 
 import numpy as np
@@ -22,11 +21,11 @@ from numba import carray
 from rom import rotation
 from rom.arguments import Count, typed
 from rom.body import FlexibleBody
-from rom.components.cosserat import body
+from rom.components.cosserat import RodBody, body
 from rom.components.wind.blade_element import in_wind
 from rom.components.wind.blading import Pitch
 from rom.components.wind.control import CUT_OUT_WIND, Controller, advance
-from rom.components.wind.wake import NEVER_BEFORE, in_late_wind, over_time
+from rom.components.wind.wake import NEVER_BEFORE, entry_of, in_late_wind, over_time
 from rom.components.wind.wind_turbine import (
     CONE_ANGLE,
     GEAR_RATIO,
@@ -44,7 +43,7 @@ from rom.components.wind.wind_turbine import (
 )
 from rom.errors import ConfigError
 from rom.mbs.analysis.equilibrium import equilibrium
-from rom.mbs.elements.law_calls import LAW_TYPES, compiled_entry
+from rom.mbs.elements.law_calls import LAW_TYPES
 from rom.mbs.elements.nonlinear import Assembly
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.mechanism import Mechanism
@@ -60,6 +59,7 @@ NACELLE_YAW = 2_607_890.0  # kg m^2 about the axis of the tower
 WHEEL_MASS, GENERATOR_MASS = 1000.0, 1000.0
 WHEEL_INERTIA = 500.0  # kg m^2: of no weight beside the generator's 5e6 on the slow side
 NO_VELOCITY = (0.0, 0.0, 0.0)
+Pose = tuple[Array, Array, float, float, float]  # of all blades: lean, hub, cone, pitch, speed
 # natural frequencies at standstill, gear locked, of two programs [Hz]: table 9-1 of the definition
 PUBLISHED_FREQUENCIES = {
     "tower sideways": (0.3120, 0.3164),
@@ -110,8 +110,8 @@ class Turbine:
             ConfigError: if gravity pulls at the blades: no motion is steady then.
         """
         if np.any(self.mechanism.gravity):
-            raise ConfigError("blades that turn under gravity have no steady motion.",
-                              hint="turbine(gravity=0.0, ...)")  # fmt: skip
+            text = "blades that turn under gravity have no steady motion."
+            raise ConfigError(text, hint="turbine(gravity=0.0, ...)")
         self.turn_by(lambda t: speed * t, lambda t: speed)
         return equilibrium(self.mechanism, spin={"slow": speed, "fast": GEAR_RATIO * speed})
 
@@ -186,8 +186,8 @@ def turbine(  # noqa: PLR0913  one keyword per choice, all with defaults
         ModelError: if a rod is none, see `cosserat.rod`.
     """
     if controlled and wind is not None and (most := over_time(wind)[:, 1].max()) > CUT_OUT_WIND:
-        raise ConfigError(f"no controller works in a wind of {most:g} m/s, above 25 m/s.",
-                          hint="Stand in it without: controlled=False.")  # fmt: skip
+        text = f"no controller works in a wind of {most:g} m/s, above 25 m/s."
+        raise ConfigError(text, hint="Stand in it without: controlled=False.")
     mech = Mechanism(gravity=(0.0, 0.0, -gravity))
     factors = {"shear": shear, "torsion": torsion}
     top, standing = _tower(mech, tower_segments, factors)
@@ -250,8 +250,8 @@ def _hub(mech: Mechanism, solid: FlexibleBody | None, at: Array, lean: Array, sp
     part = mech.add_flexible("hub", solid, **pose)
     own = float(part.second[1, 1] + part.second[2, 2])
     if not (part.mass < HUB_MASS and own < HUB_INERTIA):
-        raise ConfigError(f"the hub {solid.name!r} has {part.mass:g} kg and {own:g} kg m^2; all of "
-                          f"the hub has {HUB_MASS:g} and {HUB_INERTIA:g}.")  # fmt: skip
+        has, whole = f"{part.mass:g} kg and {own:g} kg m^2", f"{HUB_MASS:g} and {HUB_INERTIA:g}"
+        raise ConfigError(f"the hub {solid.name!r} has {has}; all of the hub has {whole}.")
     inside = mech.add_rigid(
         "in the hub", mass=HUB_MASS - part.mass, inertia=(HUB_INERTIA - own,) * 3, **pose
     )
@@ -290,7 +290,7 @@ def _train(
     mech.rotational_spring("twist", "shaft", stiffness=shaft[0], damping=shaft[1])
 
 
-def _blade(mech: Mechanism, k: int, one: Any, place: Any) -> Assembly:
+def _blade(mech: Mechanism, k: int, one: RodBody, place: Pose) -> Assembly:
     """Blade k where the hub carries it."""
     lean, centre, cone, pitch, speed = place
     round_ = rotation.matrix(rotation.exp([2 * np.pi / N_BLADES * k, 0.0, 0.0]))
@@ -375,17 +375,8 @@ def control(t, parameters, motion, memory, out):
             moment[3 * a + i] = held * axis[i]
 
 
-@cache
-def compiled_control() -> Any:
-    """The compiled law."""
-    return compiled_entry(control, LAW_TYPES)
-
-
 def add_control(
-    mechanism: Mechanism,
-    markers: tuple[Marker, ...],
-    axis: Array,
-    start: tuple[float, float],
+    mechanism: Mechanism, markers: tuple[Marker, ...], axis: Array, start: tuple[float, float]
 ) -> None:
     """Let the published controller work as the law "control".
 
@@ -400,7 +391,7 @@ def add_control(
     turned = [(A.T @ B)[:, :2].T.ravel() for A, B in zip(axes[2::2], axes[3::2], strict=True)]
     mechanism.law(
         "control",
-        compiled_control(),
+        entry_of(control, LAW_TYPES),
         *markers,
         parameters=np.concatenate([axes[0].T @ axis, [pitch], *turned]),
         memory=[one.filtered, one.integral, one.pitch, one.torque, NEVER_BEFORE],

@@ -23,10 +23,7 @@ from rom.mbs.parts import signals
 from rom.model import Array
 
 STATIONS = Path(__file__).parent / "nrel5mw_blade.csv"
-COLUMNS = (
-    "eta", "twist_deg", "mass", "EI_flap", "EI_edge", "GJ", "EA", "kGA", "inertia_edge",
-    "inertia_flap",
-)  # fmt: skip
+COLUMNS = "eta twist_deg mass EI_flap EI_edge GJ EA kGA inertia_edge inertia_flap".split()
 BLADE_LENGTH, HUB_RADIUS = 61.5, 1.5  # m
 MASS_FACTOR = 1.04536  # brings the mass to that of the definition; inertias stay as they are
 VISCOSITY_TIMES = (1e-3, 1e-3, 1e-3, 1.4e-3, 2.2e-3, 2.2e-3)  # s, as in the files of BeamDyn
@@ -207,8 +204,8 @@ def run_up(
     basis = np.array([[1.0, 0, 0], np.cross(outward, [1.0, 0, 0]), outward])
     back = [rotation.matrix(rotation.exp([-a, 0, 0])) for a in angles]
     ends = [A @ x - rod.x[-1] for A, x in zip(back, motion.x[:, -1], strict=True)]
-    about = [np.cross(x[0], r[:3]) + rotation.matrix(p[0]) @ r[3:]
-             for x, p, r in zip(motion.x, motion.p, motion.root, strict=True)]  # fmt: skip
+    held = zip(motion.x[:, 0], motion.p[:, 0], motion.root, strict=True)
+    about = [np.cross(x, r[:3]) + rotation.matrix(p) @ r[3:] for x, p, r in held]
     speeds = np.array([speed(t) for t in motion.t])
     return RunUp(motion, angles, speeds, np.array(ends) @ basis.T, np.array(about)[:, 0])
 
@@ -240,8 +237,8 @@ class Rotor:
 
     def speeds(self, motion: Motion) -> Array:
         """(k, 2) angular velocity of generator and hub about the axis [rad/s]."""
-        hub = [rotation.matrix(p)[0] @ w for p, w in zip(motion.p[:, 3], motion.v[:, 18:21],
-                                                        strict=True)]  # fmt: skip
+        turning = zip(motion.p[:, 3], motion.v[:, 18:21], strict=True)
+        hub = [rotation.matrix(p)[0] @ w for p, w in turning]
         return np.column_stack([motion.v[:, 2], hub])
 
     def momentum(self, motion: Motion) -> Array:
@@ -273,21 +270,17 @@ def rotor(n: int = 24, *, blade_rod: Rod | None = None) -> Rotor:
     # of the half and the whole segment that twist
     twist = 0.75 * HUB_OVERHANG * SHAFT_STIFFNESS / N_BLADES
     stiff = [RIGID_STIFFNESS] * 3
-    whole = rod(
-        x, p, stretch=np.concatenate([[stiff] * 3, one.stretch]),
-        bend=np.concatenate([[[RIGID_STIFFNESS, RIGID_STIFFNESS, twist]] * 2, [stiff], one.bend]),
-        bends=[True, True, False] + [True] * n,
-    )  # fmt: skip
+    stretch = np.concatenate([[stiff] * 3, one.stretch])
+    bend = np.concatenate([[[RIGID_STIFFNESS, RIGID_STIFFNESS, twist]] * 2, [stiff], one.bend])
+    whole = rod(x, p, stretch=stretch, bend=bend, bends=[True, True, False] + [True] * n)
     inertia = np.concatenate([np.zeros((4, 3)), one.inertia[1:]])
     inertia[0, 2] = SLOW_GENERATOR_INERTIA / N_BLADES
     inertia[3, :2] = HUB_INERTIA / N_BLADES  # both, since the sections of the root are turned
     viscous = np.concatenate([np.zeros((3, 3)), one.viscous_bend])
     viscous[:2, 2] = twist * SHAFT_DAMPING / SHAFT_STIFFNESS
     stretched = np.concatenate([np.zeros((3, 3)), one.viscous_stretch])
-    whole = whole._replace(
-        mass=np.concatenate([np.zeros(3), one.mass]), inertia=inertia,
-        viscous_bend=viscous, viscous_stretch=stretched,
-    )  # fmt: skip
+    whole = whole._replace(mass=np.concatenate([np.zeros(3), one.mass]), inertia=inertia)
+    whole = whole._replace(viscous_bend=viscous, viscous_stretch=stretched)
     free = np.ones(6 * (n + 3) + 9, dtype=bool)
     free[[0, 1]] = free[3:6] = free[15:18] = False  # generator and hub centre
     return Rotor(whole, free)

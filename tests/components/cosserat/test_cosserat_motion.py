@@ -8,14 +8,13 @@ from numpy.polynomial import Polynomial
 from numpy.testing import assert_allclose
 from scipy.linalg import eigh
 
+from cases.components.rods import ALONG_X
 from cases.refusals import refuses
 from rom import rotation
 from rom.components import cosserat
 from rom.components.cosserat import loads, simulate, straight
 from rom.components.cosserat.vibration import gyroscopic
 from rom.errors import ConfigError, SolverError
-
-ALONG_X = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])  # section axes: y, z, x
 
 
 def elbow(n):

@@ -10,6 +10,7 @@ from scipy.linalg import eigh
 from scipy.optimize import fsolve
 
 import rom
+from cases.components.rods import moved, slopes
 from cases.long import few
 from cases.refusals import refuses
 from rom import rotation
@@ -29,20 +30,6 @@ def crooked(rng, n=4):
     return rod(x, p, stretch=rng.uniform(1, 2, (n, 3)), bend=rng.uniform(1, 2, (n + 1, 3)))
 
 
-def moved(shape, d):
-    """A shape after increments, ordered plate, x_0, segment, x_1, ..."""
-    d = np.append(d, np.zeros(3)).reshape(-1, 6)
-    turned = [rotation.multiply(p, rotation.exp(phi)) for p, phi in zip(shape.p, d[:, :3],
-                                                                      strict=True)]  # fmt: skip
-    return cosserat.Shape(shape.x + d[:-1, 3:], np.array(turned))
-
-
-def slopes(function, n, step=1e-5):
-    """Central differences along every increment, last axis."""
-    unit = step * np.eye(n)
-    return np.stack([(function(d) - function(-d)) / (2 * step) for d in unit], axis=-1)
-
-
 def test_forces_and_tangent_are_derivatives_of_the_energy():
     rng = np.random.default_rng(0)
     one = crooked(rng)
@@ -50,12 +37,10 @@ def test_forces_and_tangent_are_derivatives_of_the_energy():
     shape = moved(reference(one), 0.3 * rng.normal(size=n))
     load = rng.normal(size=one.x.shape), rng.normal(size=(len(one.p), 3))
     r, _ = linearised(one, shape)
-    assert_allclose(
-        r, slopes(lambda d: cosserat.elastic_energy(one, moved(shape, d)), n), atol=1e-8
-    )
-    loaded = linearised(one, shape, load)[1]
-    assert_allclose(loaded, slopes(lambda d: linearised(one, moved(shape, d), load)[0], n),
-                    atol=1e-8)  # fmt: skip
+    by_shape = slopes(lambda d: cosserat.elastic_energy(one, moved(shape, d)), n)
+    assert_allclose(r, by_shape, atol=1e-8)
+    by_shape = slopes(lambda d: linearised(one, moved(shape, d), load)[0], n)
+    assert_allclose(linearised(one, shape, load)[1], by_shape, atol=1e-8)
 
 
 def test_reference_has_no_stress_whatever_its_corners():

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from cases.components.rods import moved, slopes
 from cases.refusals import refuses
 from rom import rotation
 from rom.components.cosserat import Shape, elastic_energy, linearised, reference, straight
@@ -113,9 +114,8 @@ def test_compliance_of_the_tip():
         total[:3, :3] += link / (PHALANX_RIGIDITY_RATIO * finger.springs[0].axial) * np.eye(3)
         away += 8 * MM
     # between the last phalanx and the plate at the tip lies half of it, as stiff as phalanges are
-    total[3:, 3:] += (
-        finger.phalanges[-1] / 2 / (PHALANX_RIGIDITY_RATIO * finger.springs[-1].bending) * np.eye(3)
-    )
+    rigidity = PHALANX_RIGIDITY_RATIO * finger.springs[-1].bending
+    total[3:, 3:] += finger.phalanges[-1] / 2 / rigidity * np.eye(3)
     size = np.sqrt(np.outer(total.diagonal(), total.diagonal()))
     assert_allclose(C / size, total / size, atol=1e-8)
 
@@ -178,24 +178,15 @@ def test_capstan():
 def test_forces_of_a_cable_are_derivatives_of_its_length():
     rng = np.random.default_rng(7)
     rod = straight(1.0, 3, stretch=1.0, bend=1.0)
-    tendon = Tendon((Hole(0, 0, (0.2, 0.1, 0)), Hole(2, 3, (0.1, -0.2, 0.1)),
-                     Hole(3, 4, (0.3, 0.1, 0.2))))  # fmt: skip
+    holes = Hole(0, 0, (0.2, 0.1, 0)), Hole(2, 3, (0.1, -0.2, 0.1)), Hole(3, 4, (0.3, 0.1, 0.2))
+    tendon = Tendon(holes)
     start = reference(rod)
     p = [rotation.multiply(q, rotation.exp(0.4 * rng.normal(size=3))) for q in start.p]
     shape = Shape(start.x + 0.1 * rng.normal(size=start.x.shape), np.array(p))
     r, K = tendon.forces(rod, shape)
-
-    def at(d):
-        rows = np.append(d, np.zeros(3)).reshape(-1, 6)
-        q = [rotation.multiply(a, rotation.exp(b)) for a, b in zip(shape.p, rows[:, :3],
-                                                                  strict=True)]  # fmt: skip
-        return Shape(shape.x + rows[:-1, 3:], np.array(q))
-
-    unit = 1e-5 * np.eye(len(r))
-    slope = [(tendon.length(at(d)) - tendon.length(at(-d))) / 2e-5 for d in unit]
-    assert_allclose(r, slope, atol=1e-9)
-    slope = [(tendon.forces(rod, at(d))[0] - tendon.forces(rod, at(-d))[0]) / 2e-5 for d in unit]
-    assert_allclose(K, np.array(slope).T, atol=1e-8)
+    assert_allclose(r, slopes(lambda d: tendon.length(moved(shape, d)), r.size), atol=1e-9)
+    by_shape = slopes(lambda d: tendon.forces(rod, moved(shape, d))[0], r.size)
+    assert_allclose(K, by_shape, atol=1e-8)
 
 
 def test_the_hand_has_fifteen_joints():
@@ -252,7 +243,6 @@ def test_contact_with_a_bar_has_its_tangent_and_balances():
     change = (contact(there)[0] - contact(back)[0]) / 2
     assert_allclose(K @ d.ravel()[:-3], change, rtol=1e-4, atol=1e-9 * np.abs(r).max())
     close_by = compliant_hand.Bar((20 * MM, 34 * MM), 20 * MM)
-    refuses(
-        ConfigError, r"the bar reaches 0\.005 m into", compliant_hand.grasp, finger, close_by, [1.0]
-    )
+    words = r"the bar reaches 0\.005 m into"
+    refuses(ConfigError, words, compliant_hand.grasp, finger, close_by, [1.0])
     assert bar.pressure(held)[0].max() == 0.0

@@ -7,6 +7,7 @@ from scipy.integrate import quad, solve_ivp
 
 from cases.components import bearings
 from cases.components.bearings import RUN, bearing
+from cases.refusals import refused, refuses
 from rom.components import journal_bearing
 from rom.components.journal_bearing import (
     Groove,
@@ -324,8 +325,7 @@ def test_heat_closes_and_opens_the_clearance():
     b = bearing()
     assert warm_bearing(b, bush=20, shaft=20).clearance == pytest.approx(b.clearance)
     assert warm_bearing(b, bush=0, shaft=20).clearance == pytest.approx(1e-4 - 0.05 * 11.7e-6 * 20)
-    with pytest.raises(ModelError, match="the shaft seizes"):
-        warm_bearing(b, bush=0, shaft=200)
+    refuses(ModelError, "the shaft seizes", warm_bearing, b, bush=0, shaft=200)
 
 
 # --- what cannot be ---
@@ -333,11 +333,11 @@ def test_heat_closes_and_opens_the_clearance():
 
 def test_a_groove_in_the_loaded_arc_leaves_no_film():
     b = bearing(0.5, [Groove(np.radians(20), np.radians(20))], cavitation="jfo")
-    with pytest.raises(SolverError, match=r"no film carries .* N with oil from grooves at 20 deg"):
-        equilibrium(b, bearings.load(b, 0.05), **RUN)
+    words = "no film carries .* N with oil from grooves at 20 deg"
+    refuses(SolverError, words, equilibrium, b, bearings.load(b, 0.05), **RUN)
 
 
-@pytest.mark.parametrize(("make", "said"), [
+test_what_cannot_be_is_said = refused(
     (lambda: JournalBearing(0.1, 0.1, 0.1), "a film is thin"),
     (lambda: JournalBearing(0.1, np.nan, 1e-4), "length = nan must be"),
     (lambda: bearing(preload=1.0), "preload = 1"),
@@ -353,7 +353,5 @@ def test_a_groove_in_the_loaded_arc_leaves_no_film():
     (lambda: stability(np.eye(2), -np.eye(2), 1.0), "feeds the whirl"),
     (lambda: journal_bearing.Oil(5.0, 40.0), "hot oil is thinner"),
     (lambda: iso_vg(10), "ISO VG 10"),
-])  # fmt: skip
-def test_what_cannot_be_is_said(make, said):
-    with pytest.raises((ConfigError, ModelError), match=said):
-        make()
+    error=(ConfigError, ModelError),
+)

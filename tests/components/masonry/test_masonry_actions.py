@@ -467,7 +467,7 @@ test_histories_with_gaps_are_named = refused(
     (lambda: masonry.recorded([0.0, 0.1, 0.2, 0.5, 0.6], np.zeros(5)), "gap from 0.2 s to 0.5 s"),
     (lambda: sine(1.0, 0.0), "period = "),
     (lambda: masonry.rectangle(1.0, -1.0), "duration = "),
-    (lambda: ramp(0.0), "no ramp takes"),
+    (lambda: ramp(0.0), "duration = 0 must be positive"),
     (lambda: masonry.minimum_thickness(half_angle=np.radians(140)), "nor so far round"),
     (lambda: arch(10, 5.0, 0.5, half_angle=3.2), "must be"),
     error=ConfigError,

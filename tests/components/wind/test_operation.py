@@ -340,8 +340,7 @@ def test_the_filter_loses_three_decibels_at_a_quarter_hertz():
 @pytest.mark.parametrize("wind", [2.9, 25.1, -8.0])
 def test_wind_beyond_the_curve_is_named(wind):
     refuses(ConfigError, "parked in a wind of", steady, wind)
-    with pytest.raises(ConfigError):
-        control.power_curve([8.0, wind])
+    refuses(ConfigError, "parked in a wind of", control.power_curve, [8.0, wind])
 
 
 def test_other_blades_and_the_tower_change_the_curve_a_little():

@@ -1,5 +1,7 @@
 """The NREL 5 MW turbine as one mechanism, against its definition and other programs."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -7,11 +9,19 @@ from numpy.testing import assert_allclose
 import rom
 from cases.refusals import refuses
 from rom.components.wind import whole_turbine
-from rom.components.wind.whole_turbine import GEAR_RATIO, turbine
-from rom.components.wind.wind_turbine import RATED_SPEED, blade, ramp, run_up
+from rom.components.wind.whole_turbine import GEAR_RATIO, WHEEL_INERTIA, turbine
+from rom.components.wind.wind_turbine import (
+    GENERATOR_INERTIA,
+    HUB_INERTIA,
+    RATED_SPEED,
+    blade,
+    ramp,
+    run_up,
+)
 from rom.errors import ConfigError
 
 SPEED, ANGLE = ramp(RATED_SPEED, 20.0)
+on_a_stiff_tower = partial(turbine, tower_segments=0, gravity=0.0, tilt=0.0, cone=0.0)
 
 
 def test_masses_are_those_of_the_definition():
@@ -49,8 +59,7 @@ def test_geometry_and_yaw_are_those_of_the_definition():
 @pytest.mark.once
 def test_driven_rotor_on_a_stiff_tower_runs_up_like_its_blades_alone():
     """Largest lag 0.25181 m at 10.07 s, flapping -0.0492 m, stretch 14.02 mm at speed."""
-    whole = turbine(48, tower_segments=0, gravity=0.0, tilt=0.0, cone=0.0, damped=False,
-                    shaft=(1e14, 1e11))  # fmt: skip
+    whole = on_a_stiff_tower(48, damped=False, shaft=(1e14, 1e11))
     whole.turn_by(ANGLE, SPEED)
     sol = rom.simulate(whole.mechanism, t_end=22.0, dt=0.02, rho_inf=0.9)
     tips = [whole.tip(sol, k) for k in range(whole_turbine.N_BLADES)]
@@ -106,8 +115,7 @@ def test_shear_weight_and_twist_explain_the_rest():
 
 def test_blades_whirl_on_a_stiff_tower_as_one_of_them_swings():
     """Backward and forward a turn less and more than a blade alone: 0.7229 and 1.0655 Hz."""
-    whole = turbine(48, tower_segments=0, gravity=0.0, tilt=0.0, cone=0.0, damped=False,
-                    shaft=(1e14, 0.0))  # fmt: skip
+    whole = on_a_stiff_tower(48, damped=False, shaft=(1e14, 0.0))
     state = whole.turning(RATED_SPEED)
     small = rom.linearize(whole.mechanism, state, n=6, frame="world", blades=whole.blades)
     f, turn = small.frequencies, RATED_SPEED / (2 * np.pi)
@@ -124,7 +132,7 @@ def test_weight_leaves_no_steady_motion():
 @pytest.fixture(scope="module")
 def driven():
     """Two meganewton metres, from rest, without weight."""
-    whole = turbine(16, tower_segments=0, gravity=0.0, tilt=0.0, cone=0.0)
+    whole = on_a_stiff_tower(16)
     whole.turn_with(lambda t, x, v: 2e6 * min(t / 2.0, 1.0))
     return whole, rom.simulate(whole.mechanism, t_end=12.0, dt=0.01, rho_inf=0.9)
 
@@ -135,11 +143,7 @@ def test_momentum_is_the_impulse_of_the_torque(driven):
     _, sol = driven
     one = blade(16)
     blades = whole_turbine.N_BLADES * (one.mass @ one.x[:, 2] ** 2 + one.inertia[:, :2].sum() / 2)
-    still = (
-        whole_turbine.HUB_INERTIA
-        + whole_turbine.WHEEL_INERTIA
-        + GEAR_RATIO**2 * whole_turbine.GENERATOR_INERTIA
-    )
+    still = HUB_INERTIA + WHEEL_INERTIA + GEAR_RATIO**2 * GENERATOR_INERTIA
     speed = sol.omega("wheel")[:, 0]
     assert_allclose(sol.omega("generator")[:, 0], GEAR_RATIO * speed, rtol=1e-7, atol=1e-7)
     late = sol.t > 6.0

@@ -5,10 +5,13 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
+import numpy.typing as npt
 
 from rom.arguments import Number, Positive, typed
 from rom.errors import ModelError
 from rom.model import Array
+
+Each = tuple[Any, Any]  # arrays or sequences, of pinion and gear
 
 
 @typed
@@ -40,10 +43,10 @@ class Correction:
     power: Annotated[float, Positive()] = 1.0
     crowning: Annotated[float, Number("m")] = 0.0
     slope: Annotated[float, Number("m")] = 0.0
-    pitch: tuple[Any, Any] = ((), ())
-    maps: tuple[Any, Any] = (None, None)
-    back_maps: tuple[Any, Any] = (None, None)
-    run_out: tuple[Any, Any] = ((0.0, 0.0), (0.0, 0.0))
+    pitch: Each = ((), ())
+    maps: Each = (None, None)
+    back_maps: Each = (None, None)
+    run_out: Each = ((0.0, 0.0), (0.0, 0.0))
 
     @property
     def measured(self) -> bool:
@@ -67,15 +70,14 @@ def flank_map(path: str | Path) -> Array:
     text = Path(path).read_text(encoding="utf-8").strip()
     blocks = [block for block in text.replace("\r", "").split("\n\n") if block.strip()]
     try:
-        found = [[[float(x) for x in line.split(",")] for line in block.strip().split("\n")]
-                 for block in blocks]  # fmt: skip
-        return np.array(found, dtype=float)
+        teeth = ([line.split(",") for line in block.strip().split("\n")] for block in blocks)
+        return np.array([[list(map(float, line)) for line in one] for one in teeth], dtype=float)
     except ValueError as error:
         hint = "Lines have numbers with commas; all teeth, with empty lines between, have as many."
         raise ModelError(f"{path} is no map of flanks: {error}.", hint=hint) from error
 
 
-def checked_map(given: Any, teeth: int, what: str) -> Array:
+def checked_map(given: npt.ArrayLike | None, teeth: int, what: str) -> Array:
     """(teeth or 1, n_profile, n_lead) map, empty for none [m], of what a user gave for a wheel.
 
     Raises:
@@ -83,12 +85,14 @@ def checked_map(given: Any, teeth: int, what: str) -> Array:
     """
     if given is None:
         return np.zeros((0, 0, 0))
-    found = np.asarray(given, dtype=float)
+    found, wheel = np.asarray(given, dtype=float), abs(teeth)
     found = found[None] if found.ndim == 2 else found
-    if found.ndim != 3 or not found.size or found.shape[0] not in (1, abs(teeth)):
-        needed = f"(n_profile, n_lead) or ({abs(teeth)}, n_profile, n_lead)"
-        raise ModelError(f"{what} has shape {np.shape(given)}, needed is {needed}.")
-    if n := int((~np.isfinite(found)).sum()):
+    if found.ndim != 3 or not found.size or found.shape[0] not in (1, wheel):
+        hint = f"Needed is (n_profile, n_lead) or ({wheel}, n_profile, n_lead)."
+        fault = f"shape {np.shape(given)}"
+    elif n := int((~np.isfinite(found)).sum()):
         hint = "Fill places that were not measured from their neighbours."
-        raise ModelError(f"{what} has {n} values that are no finite numbers.", hint=hint)
-    return found
+        fault = f"{n} values that are no finite numbers"
+    else:
+        return found
+    raise ModelError(f"{what} has {fault}.", hint=hint)

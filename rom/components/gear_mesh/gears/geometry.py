@@ -7,6 +7,7 @@ An internal gear has a negative number of teeth, and with it negative radii and 
 distance, as in ISO 21771: then all formulas are those of external gears.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated
@@ -62,84 +63,74 @@ class GearPair:
     gear_helix: Angle | None = None
 
     def __post_init__(self) -> None:
+        for fault, hint in self._faults():
+            raise ModelError(fault, hint=hint)
+
+    def _faults(self) -> Iterator[tuple[str, str]]:
+        """Why the wheels do not mesh, the first first, and what to do."""
         if min(map(abs, self.teeth)) < 4:
-            raise ModelError(f"no gears have {self.teeth} teeth; needed are at least 4.")
+            yield f"no gears have {self.teeth} teeth; needed are at least 4.", ""
         if not abs(self.helix) < 0.9 or not 0.1 < self.pressure_angle < 0.7:
             text = f"helix {self.helix} and pressure angle {self.pressure_angle}"
-            raise ModelError(f"{text} must be in radians, below 0.9 and between 0.1 and 0.7.")
+            yield f"{text} must be in radians, below 0.9 and between 0.1 and 0.7.", ""
         fits = self.helix if self.internal else -self.helix
         if self.gear_helix is not None and not abs(self.gear_helix - fits) < 1e-9:
-            raise ModelError(
-                f"a gear of helix {np.degrees(self.gear_helix):.4g} degrees does not mesh with a "
-                f"pinion of {np.degrees(self.helix):.4g} degrees.",
-                hint="Outside, hands are opposite; in a ring gear they are the same. The gear here "
-                f"needs {np.degrees(fits):.4g} degrees.",
-            )
+            gear, pinion, needed = np.degrees([self.gear_helix, self.helix, fits])
+            hint = "Outside, hands are opposite; in a ring gear they are the same. The gear here"
+            text = f"a gear of helix {gear:.4g} degrees does not mesh with a pinion of {pinion:.4g}"
+            yield f"{text} degrees.", f"{hint} needs {needed:.4g} degrees."
         if self.teeth[0] < 0 or (self.internal and sum(self.teeth) >= 0):
-            raise ModelError(
-                f"no pinion of {self.teeth[0]} teeth turns in a gear of {self.teeth[1]}.",
-                hint="Of an internal gear the number is negative, and larger than the pinion's.",
-            )
-        self._check_teeth()
+            hint = "Of an internal gear the number is negative, and larger than the pinion's."
+            yield f"no pinion of {self.teeth[0]} teeth turns in a gear of {self.teeth[1]}.", hint
+        yield from self._faults_of_teeth()
         if not self.cos_working < 1 or self.backlash < -1e-12:
             why = "the base circles of the wheels have no common tangent"
             if self.cos_working < 1:
                 why = f"the teeth would need {-self.backlash * 1e6:.4g} micrometres more"
             here, limit = abs(self.distance) * 1e3, "Up to" if self.internal else "From"
-            raise ModelError(
-                f"the backlash is closed: at a centre distance of {here:.4f} mm {why}.",
-                hint=f"{limit} {abs(self.tight_distance) * 1e3:.4f} mm there is backlash.",
-            )
-        self._check_contact()
-        if self.internal and self.tip_clearance < 0:
-            raise ModelError(
-                f"the teeth interfere: away from the path of contact tips of the pinion of "
-                f"{self.teeth[0]} teeth pass through those of the gear of {-self.teeth[1]}.",
-                hint="Let their numbers differ by more, or lower the addendum.",
-            )
+            hint = f"{limit} {abs(self.tight_distance) * 1e3:.4f} mm there is backlash."
+            yield f"the backlash is closed: at a centre distance of {here:.4f} mm {why}.", hint
+        yield from self._faults_of_contact()
 
-    def _check_teeth(self) -> None:
-        """Refuse teeth that lose their involutes to the tool, and that end in a point."""
+    def _faults_of_teeth(self) -> Iterator[tuple[str, str]]:
+        """Teeth that lose their involutes to the tool, and that end in a point."""
         if self.internal and not self.ra[1] <= self.rb[1]:
-            raise ModelError(
-                f"the teeth of the gear reach below its base circle, where no involute is: tips at "
-                f"{-self.ra[1] * 1e3:.4g} mm, a base circle of {-self.rb[1] * 1e3:.4g} mm.",
-                hint="Lower the addendum, or take more teeth for the gear.",
-            )
+            tips, base = -1e3 * self.ra[1], -1e3 * self.rb[1]
+            text = "the teeth of the gear reach below its base circle, where no involute is: tips"
+            hint = "Lower the addendum, or take more teeth for the gear."
+            yield f"{text} at {tips:.4g} mm, a base circle of {base:.4g} mm.", hint
         names = ("pinion",) if self.internal else ("pinion", "gear")
         for z, x, name in zip(self.teeth, self.shift, names, strict=False):
             least = self.addendum - z * np.sin(self.alpha_t) ** 2 / (2 * np.cos(self.helix))
             if x < least - 1e-9:
-                raise ModelError(
-                    f"the teeth of the {name} are undercut: {z} teeth with profile shift {x} lose "
-                    "part of their involute to the tool.",
-                    hint=f"Shift the profile by at least {least:.3f} modules, or take more teeth.",
-                )
+                text = f"the teeth of the {name} are undercut: {z} teeth with profile shift {x}"
+                hint = f"Shift the profile by at least {least:.3f} modules, or take more teeth."
+                yield f"{text} lose part of their involute to the tool.", hint
         for tip, name in zip(self.tip_thickness, names, strict=False):
             if not tip > 0:
-                raise ModelError(
-                    f"the teeth of the {name} are pointed: their flanks meet below the tip.",
-                    hint="Lower the addendum or the profile shift, or take more teeth.",
-                )
+                hint = "Lower the addendum or the profile shift, or take more teeth."
+                yield f"the teeth of the {name} are pointed: their flanks meet below the tip.", hint
 
-    def _check_contact(self) -> None:
-        """Refuse tips that reach below the involutes, and pairs that part before the next touch."""
+    def _faults_of_contact(self) -> Iterator[tuple[str, str]]:
+        """Tips that reach below the involutes, and pairs that part before the next touch."""
+        span = f"from {self.path[0] * 1e3:.3f} to {self.path[1] * 1e3:.3f} mm"
         beyond = not self.internal and self.path[1] > self.tangents
         if self.path[0] < 0 or beyond:
             tip, flank = ("gear", "pinion") if self.path[0] < 0 else ("pinion", "gear")
-            raise ModelError(
-                f"the teeth interfere: tips of the {tip} reach below the base circle of the "
-                f"{flank}; they would touch from {self.path[0] * 1e3:.3f} to "
-                f"{self.path[1] * 1e3:.3f} mm on a base tangent of {self.tangents * 1e3:.3f} mm.",
-                hint=f"Lower the addendum of the {tip}, or take more teeth for the {flank}.",
-            )
+            text = f"tips of the {tip} reach below the base circle of the {flank}; they would touch"
+            where = f"{span} on a base tangent of {self.tangents * 1e3:.3f} mm"
+            hint = f"Lower the addendum of the {tip}, or take more teeth for the {flank}."
+            yield f"the teeth interfere: {text} {where}.", hint
         if self.contact_ratio < 1:
-            raise ModelError(
-                f"contact is lost: a transverse contact ratio of {self.contact_ratio:.3f}, from "
-                f"{self.path[0] * 1e3:.3f} to {self.path[1] * 1e3:.3f} mm at a base pitch of "
-                f"{self.base_pitch * 1e3:.3f} mm.",
-                hint="Lower the centre distance or the profile shift, or take more teeth.",
-            )
+            ratio = f"a transverse contact ratio of {self.contact_ratio:.3f}, {span}"
+            hint = "Lower the centre distance or the profile shift, or take more teeth."
+            pitch = f"at a base pitch of {self.base_pitch * 1e3:.3f} mm"
+            yield f"contact is lost: {ratio} {pitch}.", hint
+        if self.internal and self.tip_clearance < 0:
+            text = "the teeth interfere: away from the path of contact tips of the pinion of"
+            hint = "Let their numbers differ by more, or lower the addendum."
+            pinion, gear = self.teeth[0], -self.teeth[1]
+            yield f"{text} {pinion} teeth pass through those of the gear of {gear}.", hint
 
     @property
     def internal(self) -> bool:

@@ -16,7 +16,7 @@ Source:
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
@@ -43,6 +43,7 @@ from rom.components.gear_mesh.gears.teeth import mesh_energy, mesh_tangents, mes
 from rom.components.round_bodies.cylinders import Cylinder, cylinder_of, pack_cylinders
 from rom.errors import ConfigError, ModelError
 from rom.mbs.elements.family import Family, Hooks, Places, integers, rows_of
+from rom.mbs.kernels.work import Work
 from rom.mbs.parts.bodies import Marker, Part
 from rom.mbs.parts.joints import Whole
 from rom.model import Array
@@ -156,15 +157,15 @@ def gear_mesh(  # noqa: PLR0913  one keyword per property
     D = self.design_point(wheel_b) - self.design_point(wheel_a)
     _check_place(name, pair, D, z)
     c = np.sign(pair.distance) * (D - (D @ z) * z) / np.linalg.norm(D - (D @ z) * z)
-    turned = [matrix(self.part(wheel.body).p) for wheel in (wheel_a, wheel_b)]
+    wheels, start = (wheel_a, wheel_b), np.array([0.0, np.pi])
+    parts = self.part(wheel_a.body), self.part(wheel_b.body)
+    turned = [matrix(part.p) for part in parts]
     along = np.cross(z, c) if isinstance(pair, RackPair) else -c
     axes = np.array([z @ turned[0], c @ turned[0], z @ turned[1], along @ turned[1]])
     follows = _follows_energy(name, pair, entry, conservative)
     if friction and transition_speed is None:
-        raise ConfigError(
-            f"mesh {name!r} has friction, but no transition_speed.",
-            hint="Take a hundredth of the speed with which its flanks slide.",
-        )
+        text = f"mesh {name!r} has friction, but no transition_speed."
+        raise ConfigError(text, hint="Take a hundredth of the speed with which its flanks slide.")
     between(f"coupling [m] of mesh {name!r} and its width", coupling, 0, pair.width)
     soft = hertz.compliance if hertz else 0.0
     numbers = (damping, friction, transition_speed or 1.0, follows, coupling, soft)
@@ -173,12 +174,9 @@ def gear_mesh(  # noqa: PLR0913  one keyword per property
     _check_correction(name, pair, flanks)
     if hertz:
         hertz.constants(pair)
-    parts = self.part(wheel_a.body), self.part(wheel_b.body)
-    mesh = GearMesh(
-        wheel_a, wheel_b, pair, stiffness, flanks, numbers, cells, axes, np.array([0.0, np.pi]),
-        float(D @ z), phase or 0.0, entry * pair.base_pitch,
-        _rims(parts, (wheel_a, wheel_b), axes, pair), hertz, _spins(name, parts, axes, pair),
-    )  # fmt: skip
+    place = axes, start, float(D @ z), phase or 0.0, entry * pair.base_pitch
+    seen = _rims(parts, wheels, axes, pair), hertz, _spins(name, parts, axes, pair)
+    mesh = GearMesh(*wheels, pair, stiffness, flanks, numbers, cells, *place, *seen)
     if phase is None:
         others = [(n, x) for n, (_, x) in self.elements.items() if isinstance(x, GearMesh)]
         mesh = replace(mesh, phase=phase_from(name, mesh, others))
@@ -216,7 +214,7 @@ def phase_from(name: str, mesh: GearMesh, others: Iterable[tuple[str, GearMesh]]
     return phases[min(phases)][0]
 
 
-def _phase(pair: Any, side: int, middle: float) -> float:
+def _phase(pair: GearPair | RackPair, side: int, middle: float) -> float:
     """Of the mesh whose wheel has the middle of a tooth at an angle from the line of centres."""
     origin = middle + pair.base_thickness[side] / (2 * pair.rb[side]) + pair.alpha
     return float(origin if side == 0 else (pair.tangents - pair.rb[1] * origin) / pair.rb[0])
@@ -230,20 +228,24 @@ def _middle(mesh: GearMesh, side: int, known: GearMesh) -> float | None:
         turned = float(z @ known.axes[2 * other])
         same = place == marker and known.pair.teeth[other] == teeth
         if same and abs(turned) > 1 - SAME_AXIS:
-            pair, at = known.pair, known.phase
-            at = at if other == 0 else (pair.tangents - pair.rb[0] * at) / pair.rb[1]
-            middle = at - pair.alpha - pair.base_thickness[other] / (2 * pair.rb[other])
+            middle = middle_of_tooth(known.pair, other, known.phase)
             between = np.arctan2(z @ np.cross(e, towards), e @ towards)
             return float(between + np.sign(turned) * middle)
     return None
+
+
+def middle_of_tooth(pair: GearPair | RackPair, side: int, phase: float) -> float:
+    """Angle of one of the pinion, 0, or gear, 1, from the line of centres to the other wheel."""
+    at = phase if side == 0 else (pair.tangents - pair.rb[0] * phase) / pair.rb[1]
+    return float(at - pair.alpha - pair.base_thickness[side] / (2 * pair.rb[side]))
 
 
 def _rims(
     parts: tuple[Part, Part], wheels: tuple[Marker, Marker], axes: Array, pair: GearPair
 ) -> tuple[tuple[Cylinder, float] | None, ...]:
     """How the rims of flexible wheels deform, and the angle that a tooth takes on each [rad]."""
-    rims = [cylinder_of(parts[k], wheels[k], *axes[2 * k : 2 * k + 2]) if z else None
-            for k, z in enumerate(pair.teeth)]  # fmt: skip
+    sides = zip(parts, wheels, np.split(axes, 2), pair.teeth, strict=True)
+    rims = [cylinder_of(part, wheel, *two) if z else None for part, wheel, two, z in sides]
     both = zip(rims, pair.teeth, strict=True)
     return tuple(None if rim is None else (rim, np.pi / abs(z)) for rim, z in both)
 
@@ -264,7 +266,7 @@ def _spins(
 
 
 def _follows_energy(
-    name: str, pair: GearPair | RackPair, entry: Any, conservative: bool | None
+    name: str, pair: GearPair | RackPair, entry: float, conservative: bool | None
 ) -> float:
     """1 for forces that follow the energy along the path, 0 for those along involutes."""
     jumps = entry == 0.0 and pair.helix == 0.0
@@ -301,10 +303,9 @@ def _check_correction(name: str, pair: GearPair | RackPair, correction: Correcti
         raise ConfigError(f"the rack of {name!r} does not turn; give it no run-out.")
     for amount, _ in finite("run_out", correction.run_out, (2, 2)):
         if not abs(amount) <= MAX_RUN_OUT * pair.module:
-            raise ConfigError(
-                f"run-out {amount:g} m of {name!r} is more than {MAX_RUN_OUT} modules.",
-                hint="Flanks with so much are no involutes about their axis: move the marker.",
-            )
+            text = f"run-out {amount:g} m of {name!r} is more than {MAX_RUN_OUT} modules."
+            hint = "Flanks with so much are no involutes about their axis: move the marker."
+            raise ConfigError(text, hint=hint)
     _maps(pair, correction, name)
 
 
@@ -362,7 +363,7 @@ def _most_slices(mesh: GearMesh) -> int:
     return 2 * mesh.cells * int(np.ceil(lines))
 
 
-def _from_lowest(errors: Any) -> Array:
+def _from_lowest(errors: npt.ArrayLike) -> Array:
     """Pitch errors as gaps, the tooth that touches first without one."""
     found = np.asarray(errors, dtype=float)
     return found - found.min() if found.size else found
@@ -372,10 +373,8 @@ def _sizes(mesh: GearMesh) -> list[float]:
     pair = mesh.pair
     rack = (pair.distance, pair.tip) if isinstance(pair, RackPair) else (0.0, 0.0)
     tips = (pair.wheel.ra[0], 0.0) if isinstance(pair, RackPair) else pair.ra
-    return [
-        *pair.rb, *tips, pair.base_helix, pair.base_pitch, pair.base_thickness[0], pair.backlash,
-        pair.alpha, pair.width, mesh.offset, mesh.phase, mesh.entry, *rack,
-    ]  # fmt: skip
+    flanks = pair.base_helix, pair.base_pitch, pair.base_thickness[0], pair.backlash, pair.alpha
+    return [*pair.rb, *tips, *flanks, pair.width, mesh.offset, mesh.phase, mesh.entry, *rack]
 
 
 def _flanks(mesh: GearMesh, maps: list[Array]) -> list[float]:
@@ -396,18 +395,20 @@ def _room(meshes: Meshes) -> Array:
     return 1.0 - np.asarray(meshes.approach / (MAX_APPROACH * meshes.size[:, col.PITCH]))
 
 
-def _passed(meshes: Meshes, W: Any) -> Array:
+def _passed(meshes: Meshes, W: Work) -> Array:
     """(k,) teeth of the pinions that have gone by."""
     turned = W.fresh[meshes.remembered] + meshes.spin[:, 0] * W.signal[meshes.clock[0], 0]
     teeth: Array = meshes.size[:, col.RB_1] / meshes.size[:, col.PITCH] * turned
     return teeth
 
 
+FORCES = mesh_wrenches, mesh_tangents, mesh_energy
+LOST = "the wheels of {} are so close that they have no common tangent"
 GEAR_MESHES_FAMILY = Family(
-    "gear_meshes", GearMesh, pack, mesh_wrenches, mesh_tangents, mesh_energy,
+    "gear_meshes",
+    GearMesh,
+    pack,
+    *FORCES,
     by_rate=lambda meshes: meshes.law[:, col.DAMPING : col.SPEED].any(),
-    hooks=Hooks(
-        answers=lambda meshes: meshes.load, room=_room, phases=_passed,
-        lost="the wheels of {} are so close that they have no common tangent",
-    ),
-)  # fmt: skip
+    hooks=Hooks(answers=lambda meshes: meshes.load, room=_room, phases=_passed, lost=LOST),
+)

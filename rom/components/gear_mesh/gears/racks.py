@@ -1,5 +1,6 @@
 """A pinion on a straight rack: as a gear without end, whose line of action does not turn."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
@@ -49,45 +50,41 @@ class RackPair:
     gear_helix: float | None = None
 
     def __post_init__(self) -> None:
+        for fault, hint in self._faults():
+            raise ModelError(fault, hint=hint)
+
+    def _faults(self) -> Iterator[tuple[str, str]]:
+        """Why the wheels do not mesh, the first first, and what to do."""
         if not (self.pinion_teeth >= 4 and self.module > 0 and self.width > 0):
-            raise ModelError(
-                f"no pinion of {self.pinion_teeth} teeth of module {self.module} m, {self.width} m "
-                "wide, turns on a rack.",
-                hint="The rack is outside: its pinion has at least 4 teeth.",
-            )
+            size = f"module {self.module} m, {self.width} m wide,"
+            hint = "The rack is outside: its pinion has at least 4 teeth."
+            yield f"no pinion of {self.pinion_teeth} teeth of {size} turns on a rack.", hint
         if self.gear_helix is not None and not abs(self.gear_helix + self.helix) < 1e-9:
             of_rack, fits = np.degrees([self.gear_helix, -self.helix])
-            raise ModelError(
-                f"a rack of helix {of_rack:.4g} degrees does not mesh with a pinion of "
-                f"{-fits:.4g} degrees.",
-                hint=f"Their hands are opposite: {fits:.4g} degrees.",
-            )
+            other = f"does not mesh with a pinion of {-fits:.4g} degrees."
+            hint = f"Their hands are opposite: {fits:.4g} degrees."
+            yield f"a rack of helix {of_rack:.4g} degrees {other}", hint
         if not self.tip_thickness > 0:
-            raise ModelError(
-                "the teeth of the rack are pointed: their flanks meet below the tip.",
-                hint="Lower the addendum or the pressure angle.",
-            )
+            hint = "Lower the addendum or the pressure angle."
+            yield "the teeth of the rack are pointed: their flanks meet below the tip.", hint
         if self.backlash < -1e-12:
-            raise ModelError(
-                f"the backlash is closed: {self.distance * 1e3:.4f} mm from the axis to the rack "
-                f"the teeth would need {-self.backlash * 1e6:.4g} micrometres more.",
-                hint=f"From {self.tight_distance * 1e3:.4f} mm there is backlash.",
-            )
+            here = f"{self.distance * 1e3:.4f} mm from the axis to the rack"
+            more = f"the teeth would need {-self.backlash * 1e6:.4g} micrometres more."
+            hint = f"From {self.tight_distance * 1e3:.4f} mm there is backlash."
+            yield f"the backlash is closed: {here} {more}", hint
         if self.path[0] < 0 or self.contact_ratio < 1:
-            raise ModelError(
-                f"contact is lost: a transverse contact ratio of {self.contact_ratio:.3f}, from "
-                f"{self.path[0] * 1e3:.3f} to {self.path[1] * 1e3:.3f} mm.",
-                hint="Lower the distance of the rack or the addendum, or take more teeth.",
-            )
+            span = f"from {self.path[0] * 1e3:.3f} to {self.path[1] * 1e3:.3f} mm"
+            ratio = f"a transverse contact ratio of {self.contact_ratio:.3f}"
+            hint = "Lower the distance of the rack or the addendum, or take more teeth."
+            yield f"contact is lost: {ratio}, {span}.", hint
 
     @cached_property
     def wheel(self) -> GearPair:
         """The pinion, with a wheel that is so large that nothing of it is refused."""
-        return GearPair(
-            (self.pinion_teeth, 1000 * self.pinion_teeth), self.module, self.width, self.helix,
-            self.pressure_angle, (self.shift, 0.0), addendum=self.addendum,
-            dedendum=self.dedendum, fillet=self.fillet,
-        )  # fmt: skip
+        teeth = self.pinion_teeth, 1000 * self.pinion_teeth
+        sizes = self.module, self.width, self.helix, self.pressure_angle, (self.shift, 0.0)
+        heights = {"addendum": self.addendum, "dedendum": self.dedendum, "fillet": self.fillet}
+        return GearPair(teeth, *sizes, **heights)
 
     @property
     def teeth(self) -> tuple[int, int]:

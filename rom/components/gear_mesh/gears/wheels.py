@@ -150,10 +150,10 @@ def set_rack_rates(W, meshes, k):
     put_rate(rates, col.TURN_2, t, add(scale(a, one), scale(o, c)), scale(a, two))
     put_rate(rates, col.DISTANCE, c, sub(scale(-y, one), scale(o, t)), scale(-y, two))
     put_rate(rates, col.SHIFT, z, sub(scale(a, t), scale(y, c)), none)
-    put_rate(rates, col.TILT_C, none, sub(scale(-n_c, one), scale(n_z, c)),
-             sub(scale(-n_c, two), cross(n, t)))  # fmt: skip
-    put_rate(rates, col.TILT_T, none, sub(scale(-n_t, one), scale(n_z, t)),
-             sub(cross(n, c), scale(n_t, two)))  # fmt: skip
+    one_c, two_c = sub(scale(-n_c, one), scale(n_z, c)), sub(scale(-n_c, two), cross(n, t))
+    one_t, two_t = sub(scale(-n_t, one), scale(n_z, t)), sub(cross(n, c), scale(n_t, two))
+    put_rate(rates, col.TILT_C, none, one_c, two_c)
+    put_rate(rates, col.TILT_T, none, one_t, two_t)
 
 
 @inner

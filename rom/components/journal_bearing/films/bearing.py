@@ -5,7 +5,7 @@ ex, ey [m] and the tilt phi_x, phi_y [rad]; the film is
 h = c bore - (ex + z phi_y) cos theta - (ey - z phi_x) sin theta.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Annotated, Literal, NamedTuple
 
@@ -100,22 +100,25 @@ class JournalBearing:
     grid: Grid = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
+        for fault, hint in self._faults():
+            raise ModelError(fault, hint=hint)
+
+    def _faults(self) -> Iterator[tuple[str, str]]:
+        """Why it is no bearing, the first first, and what to do; divides the film into cells."""
         if self.clearance > 0.05 * self.diameter:
-            raise ModelError(
-                f"no bearing has diameter {self.diameter} m, length {self.length} m and clearance "
-                f"{self.clearance} m: a film is thin against the journal.",
-                hint="Give all three in metres; the clearance is about 0.001 of the diameter.",
-            )
+            size = f"diameter {self.diameter} m, length {self.length} m"
+            text = f"no bearing has {size} and clearance {self.clearance} m: a film is thin against"
+            hint = "Give all three in metres; the clearance is about 0.001 of the diameter."
+            yield f"{text} the journal.", hint
         if self.bore is not None and self.preload:
-            raise ModelError("a bearing takes a preload of lobes or a bore of its own, not both.")
+            yield "a bearing takes a preload of lobes or a bore of its own, not both.", ""
         if self.cavitation == "jfo" and not self.grooves:
-            text = "a mass-conserving film without a groove has no oil."
-            raise ModelError(text, hint="Add a Groove.")
+            yield "a mass-conserving film without a groove has no oil.", "Add a Groove."
         if min(self.cells) < 2 or self.cells[0] < 12:
-            raise ModelError(f"{self.cells} cells are too few; at least 12 around and 2 along.")
+            yield f"{self.cells} cells are too few; at least 12 around and 2 along.", ""
         object.__setattr__(self, "grid", _grid(self))
         if not (np.isfinite(self.grid.bore).all() and self.grid.bore.min() > 0.0):
-            raise ModelError("the bore must be > 0 all around, to leave a centred journal room.")
+            yield "the bore must be > 0 all around, to leave a centred journal room.", ""
 
     @property
     def radius(self) -> float:

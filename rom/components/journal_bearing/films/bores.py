@@ -45,20 +45,16 @@ def bore_of(
         ConfigError: for a bush that has no such functions, or is not the bore of this bearing.
     """
     where = f"the bush of bearing {name!r}, {bush.place!r} of body {bush.body!r},"
-    surface = deformable(part, bush)
-    if surface is None:
-        raise ConfigError(
-            f"{where} has no functions by which it could deform.",
-            hint="Reduce that interface with rom.FourierLegendre(4, 2), or leave out elastic_bush.",
-        )
+    (axis, across), found = axes, deformable(part, bush)
+    if found is None:
+        hint = "Reduce that interface with rom.FourierLegendre(4, 2), or leave out elastic_bush."
+        raise ConfigError(f"{where} has no functions by which it could deform.", hint=hint)
     if bearing.aligned:
-        raise ConfigError(
-            f"{where} deforms, and the film of an aligned bearing is half of one that does not.",
-            hint="Give the bearing aligned=False.",
-        )
-    axis, across = axes
+        text = f"{where} deforms, and the film of an aligned bearing is half of one that does not."
+        raise ConfigError(text, hint="Give the bearing aligned=False.")
+    surface, patch = found
     frame = np.array([across, np.cross(axis, across), axis])
-    _check_bore(where, (surface.patch.points - surface.point) @ frame.T, bearing)
+    _check_bore(where, (patch.points - surface.point) @ frame.T, bearing)
     bore = cylinder_of(part, bush, axis, across)
     assert bore is not None  # it deforms
     grid = bearing.grid

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -19,7 +18,7 @@ from rom.mbs.kernels.tables import (
     Table,
     table,
 )
-from rom.model import Array
+from rom.model import Array, Numbers
 
 N_MOTIONS = 4  # journal centre x, y and tilt about x, y
 N_ANSWERS = 5  # what works on them, and the friction torque
@@ -129,12 +128,9 @@ def cells_of(
     opens = np.zeros((k, n, most))
     for row, one in zip(opens, given, strict=True):
         row[: one.shape[0], : one.shape[1]] = one
-    widths = {"side": sides, "leaks": sides}
-    scratch = {
-        name: np.zeros((k, widths.get(name, n)))
-        for name in ("opening", "opening_rate", "supply", "behind", "side", "middle", "conducts",
-                     "leaks", "store", "gain", "content", "unknown", "P", "fill")
-    }  # fmt: skip
+    names = "opening opening_rate supply behind middle conducts store gain content unknown"
+    scratch = {name: np.zeros((k, n)) for name in f"{names} P fill".split()}
+    scratch |= {name: np.zeros((k, sides)) for name in ("side", "leaks")}
     return Cells(
         shape=shapes,
         law=np.array([LAWS[one.cavitation] for one in bearings], dtype=np.int64),
@@ -156,9 +152,9 @@ def cells_of(
     )
 
 
-def _padded(rows: Sequence[Any], n: int) -> Any:
+def _padded(rows: Sequence[Numbers], n: int) -> Numbers:
     """Rows of one length, zeros behind."""
-    padded: Any = np.zeros((len(rows), n, *rows[0].shape[1:]), dtype=rows[0].dtype)
+    padded: Numbers = np.zeros((len(rows), n, *rows[0].shape[1:]), dtype=rows[0].dtype)
     for row, values in zip(padded, rows, strict=True):
         row[: len(values)] = values
     return padded

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
@@ -153,21 +153,21 @@ def _check_gap(name: str, bearing: JournalBearing, place: Array, roughness: floa
 
 def _oil(name: str, oil: Oil | float, inlet: float | None) -> tuple[float, ...]:
     """Viscosity if it stays, law, density, specific heat and inlet temperature."""
-    if isinstance(oil, Oil):
+    if not isinstance(oil, Oil):
+        viscosity = positive(f"oil of bearing {name!r} [Pa s]", oil)
         if inlet is None:
-            raise ConfigError(f"bearing {name!r} has an oil; give its inlet temperature.")
-        if not float(oil.viscosity(inlet)) > 0.0:
-            text = f"inlet = {inlet} of {name!r}: the oil boils before; give degrees Celsius."
-            raise ConfigError(text)
+            return (viscosity, 0.0, 0.0, 1.0, 1.0, 0.0)
+        fault = "has an inlet temperature, but a viscosity that stays; give an rom.mbs.Oil."
+    elif inlet is None:
+        fault = "has an oil; give its inlet temperature."
+    elif float(oil.viscosity(inlet)) > 0.0:
         return (0.0, *oil.law(), oil.density, oil.heat, float(inlet))
-    if inlet is not None:
-        text = f"bearing {name!r} has an inlet temperature, but a viscosity that stays."
-        raise ConfigError(text, hint="Give an rom.mbs.Oil instead.")
-    positive(f"oil of bearing {name!r} [Pa s]", oil)
-    return (float(oil), 0.0, 0.0, 1.0, 1.0, 0.0)
+    else:
+        fault = f"has the inlet = {inlet}: the oil boils before; give degrees Celsius."
+    raise ConfigError(f"bearing {name!r} {fault}")
 
 
-def circles(_: Any, __: str, film: OilFilm) -> list[Any]:
+def circles(_: object, __: str, film: OilFilm) -> list[tuple[Marker, Array, float]]:
     """What is drawn: the journal and the bush."""
     pair = zip((film.i, film.j), film.axes[:2], strict=True)
     return [(marker, axis, film.bearing.radius) for marker, axis in pair]
@@ -230,13 +230,15 @@ def oil_everywhere(journals: Journals) -> Iterator[bool]:
         journals.films.law[:] = law
 
 
+KERNELS = film_wrenches, film_tangents, None, None, film_pair_tangents  # no energy is stored
+HOOKS = Hooks(
+    answers=lambda journals: journals.largest,
+    potential=False,
+    eased=oil_everywhere,
+    room=lambda journals: journals.thinnest / journals.films.size[:, CLEARANCE],
+    lost="the journal touches its bush in {}, its film finds no pressure or leaves its table",
+    remembers=lambda rows: (rows.films.law == JFO) | (rows.oil[:, col.CONSTANT] == 0.0),
+)
 JOURNAL_BEARINGS_FAMILY = Family(
-    "journal_bearings", OilFilm, pack, film_wrenches, film_tangents,
-    pair_tangents=film_pair_tangents, by_rate=never,
-    hooks=Hooks(
-        answers=lambda journals: journals.largest, potential=False, eased=oil_everywhere,
-        room=lambda journals: journals.thinnest / journals.films.size[:, CLEARANCE],
-        lost="the journal touches its bush in {}, its film finds no pressure or leaves its table",
-        remembers=lambda rows: (rows.films.law == JFO) | (rows.oil[:, col.CONSTANT] == 0.0),
-    ),
-)  # fmt: skip
+    "journal_bearings", OilFilm, pack, *KERNELS, by_rate=never, hooks=HOOKS
+)

@@ -90,8 +90,8 @@ def stepped_place(p, by_position, place):
     if by_position:
         x, y = stepped(x, cross(wj, x)), stepped(y, cross(wj, y))
         axes = x, y, stepped(z, cross(wj, z)), stepped(n, cross(wi, n))
-        return axes, (stepped(D, sub(vi, vj)), stepped(slide, ZERO), stepped(Oi, ZERO),
-                      stepped(Oj, ZERO))  # fmt: skip
+        moved, sliding = stepped(D, sub(vi, vj)), stepped(slide, ZERO)
+        return axes, (moved, sliding, stepped(Oi, ZERO), stepped(Oj, ZERO))
     axes = stepped(x, ZERO), stepped(y, ZERO), stepped(z, ZERO), stepped(n, ZERO)
     return axes, (stepped(D, ZERO), stepped(slide, sub(vi, vj)), stepped(Oi, wi), stepped(Oj, wj))
 
