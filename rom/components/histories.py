@@ -44,25 +44,10 @@ class Table:
     values: npt.ArrayLike
 
     def __post_init__(self) -> None:
-        try:
-            t, values = (np.asarray(x, dtype=float) for x in (self.t, self.values))
-        except (TypeError, ValueError) as error:
-            raise ConfigError("times and values of the history must be made of numbers.") from error
-        if t.ndim != 1 or t.shape != values.shape or len(t) < 2:
-            raise ConfigError(
-                f"a history of {t.shape} times and {values.shape} values: two or more of each are "
-                "needed, as many times as values."
-            )
-        for name, x in (("time", t), ("value", values)):
-            if not np.isfinite(x).all():
-                k = int(np.argmin(np.isfinite(x)))
-                raise ConfigError(
-                    f"{name} {k} of the history is {x[k]}.",
-                    hint="Records with gaps are not mended; fill them, or cut the record there.",
-                )
-        if not (np.diff(t) > 0).all():
-            k = int(np.argmin(np.diff(t) > 0))
-            raise ConfigError(f"times of a history must grow: {t[k]} s comes before {t[k + 1]} s.")
+        t, _ = corners_of("the history", (self.t, self.values))
+        if len(t) < 2 or np.ndim(self.values) > 1:
+            shapes = f"{t.shape} times and {np.shape(self.values)} values"
+            raise ConfigError(f"the history has {shapes}; two or more of each are needed.")
 
     def __call__(self, t: Array) -> Array:
         """Values at times.
@@ -195,16 +180,27 @@ def corners_of(name: str, pair: Pair, n: int = 1, *, rows: bool = False) -> tupl
         t, y = (np.asarray(x, dtype=float) for x in pair)
     except (TypeError, ValueError) as error:
         raise ConfigError(
-            f"{name}: its history must be a number, a function, or a pair of times and values."
+            f"{name}: its history must be a number, a function, or a pair of times and values, "
+            "made of numbers."
         ) from error
-    if t.ndim != 1 or not t.size or y.shape[:1] != t.shape or not np.all(np.diff(t) > 0):
+    if t.ndim != 1 or not t.size or y.shape[:1] != t.shape:
         raise ConfigError(
             f"{name}: times of the shape {t.shape} with values {y.shape}.",
-            hint="Times that grow, and one value, or row of values, for each.",
+            hint="One value, or row of values, for each; functions are written for arrays.",
         )
     y = np.repeat(y[:, None], n, axis=1) if y.ndim == 1 and not rows else y
-    if y.shape != (len(t), n) or not (np.isfinite(t).all() and np.isfinite(y).all()):
-        raise ConfigError(f"{name}: values {y.shape}, needed are {(len(t), n)} finite ones.")
+    if y.shape != (len(t), n):
+        raise ConfigError(f"{name}: values {y.shape}, needed are {(len(t), n)}.")
+    finite_rows = np.isfinite(t) & np.isfinite(y).all(axis=1)
+    if not finite_rows.all():
+        k = int(finite_rows.argmin())
+        raise ConfigError(
+            f"{name}: value {k} is {y[k].tolist()} at t = {t[k]:g} s, needed are finite numbers.",
+            hint="Records with gaps are not mended; fill them, or cut the record there.",
+        )
+    if not (np.diff(t) > 0).all():
+        k = int(np.argmin(np.diff(t) > 0))
+        raise ConfigError(f"{name}: times must grow: {t[k]} s comes before {t[k + 1]} s.")
     return t, y
 
 
@@ -258,15 +254,4 @@ def values_at(name: str, history: History, t: Array) -> Array:
         times, values = corners_of(name, history)
         return np.interp(t, times, values[:, 0])
     given = history(t) if callable(history) else np.full(len(t), history)
-    found = np.asarray(given, dtype=float)
-    if found.shape != t.shape:
-        raise ConfigError(
-            f"the history of {name} gives the shape {found.shape} for {len(t)} times.",
-            hint="Write it for arrays, with np.where for cases.",
-        )
-    if not np.isfinite(found).all():
-        raise ConfigError(
-            f"the history of {name} is {found[~np.isfinite(found)][0]} at "
-            f"t = {t[np.argmin(np.isfinite(found))]:g} s, needed are finite values."
-        )
-    return found
+    return corners_of(name, (t, given))[1][:, 0]
