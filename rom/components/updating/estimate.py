@@ -7,7 +7,7 @@ Source:
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -18,6 +18,7 @@ from rom.components.updating.family_model import (
     Attached,
     Family,
     FamilyModel,
+    Held,
     Parts,
     check_prior,
     check_units,
@@ -70,7 +71,7 @@ def update(  # noqa: PLR0913  keywords of one call
     test: Responses,
     *,
     free: tuple[str, ...] | None = None,
-    fixed: Any = (),
+    fixed: Held = (),
     attached: Attached | None = None,
     candidates: Attached | None = None,
     damping: Annotated[float, Between(*DAMPING_RANGE)] = 0.01,
@@ -213,7 +214,7 @@ class _Search:
     n_known: int
     sums: Sums = field(init=False)
     settled: bool = False
-    count: Any = 1.0  # by which lines count less
+    count: Array | float = 1.0  # by which lines count less
 
     @staticmethod
     def begun(

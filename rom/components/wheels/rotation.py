@@ -93,8 +93,8 @@ def centrifugal_displacement(sector: CyclicSector) -> Array:
     """
     T = sector.harmonic(0)
     load = sector.M @ arms(sector, sector.points).ravel()
-    return T @ held_solution(sector.workers, (T.T @ sector.K @ T, T.T @ sector.M @ T),
-                             axial_pins(sector), T.T @ load)  # fmt: skip
+    waves = T.T @ sector.K @ T, T.T @ sector.M @ T
+    return T @ held_solution(sector.workers, waves, axial_pins(sector), T.T @ load)
 
 
 def arms(sector: CyclicSector, points: Array) -> Array:

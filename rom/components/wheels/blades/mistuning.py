@@ -178,8 +178,8 @@ class MistunedWheel:
         if not tuned > 0.0:
             raise ConfigError("the force does not move the tuned wheel at the dofs wanted.")
         batch = max(1, AT_ONCE // (sweep.size * N * max(rows.shape[0], self.omega.size // N + 1)))
-        peaks = [self._peaks(many[first : first + batch], drive, sweep, damping, rows)
-                 for first in range(0, len(many), batch)]  # fmt: skip
+        batches = (many[first : first + batch] for first in range(0, len(many), batch))
+        peaks = [self._peaks(some, drive, sweep, damping, rows) for some in batches]
         return np.concatenate(peaks) / tuned
 
     def _drive(self, force: npt.ArrayLike | Complex, engine_order: int) -> Complex:
