@@ -25,7 +25,7 @@ from rom.eigen.attachments import added_mass
 from rom.eigen.verbs import Operators, orthonormal_in, own_points, rigid_motions
 from rom.errors import ModelError, ParameterError
 from rom.model import Array, FEModel, Interface, Layered, Region
-from rom.names import offered
+from rom.names import check_known
 from rom.reduction.full_model import mesh_operators
 from rom.reduction.interfaces.characteristic import GivenFunctions
 
@@ -55,11 +55,8 @@ class AffineModel:
         self.added = added_mass(model, self.ops.first, self.ops.n_local)
         names = dict.fromkeys(p.region for p in parameters.values() if p.region is not None)
         for name in names:
-            if name not in model.regions:
-                raise ParameterError(
-                    f"there is no region {name!r}; the model has {offered(model.regions, name)}.",
-                    hint="Regions are the named physical volumes of the geometry.",
-                )
+            text = f"there is no region {name!r}, a named physical volume; the model has"
+            check_known(name, model.regions, text, ParameterError)
         self.regions = {name: model.regions[name] for name in names}
 
     @property

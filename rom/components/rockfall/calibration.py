@@ -15,6 +15,7 @@ from rom.components.histories import Table
 from rom.components.rockfall.impact import Gallery, Impact, scaled, strike
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.model import Array
+from rom.names import check_known
 
 CHANNELS: dict[str, Callable[[Gallery, Impact], Array]] = {
     "acceleration of the boulder": lambda g, i: i.forces[:, 0] / g.boulder,  # as a sensor reads it
@@ -160,8 +161,7 @@ def _pieces(measured: Measured, t_end: float | None) -> list[tuple[str, History]
     """Channels and histories one by one, cut at the end."""
     pieces: list[tuple[str, History]] = []
     for channel, histories in measured.items():
-        if channel not in CHANNELS:
-            raise ConfigError(f"{channel!r} is no channel; known are {', '.join(CHANNELS)}.")
+        check_known(channel, CHANNELS, f"{channel!r} is no channel; known are")
         for h in [histories] if isinstance(histories, History) else histories:
             t, x = np.asarray(h.t, dtype=float), np.asarray(h.values, dtype=float)
             kept = t <= (np.inf if t_end is None else t_end)

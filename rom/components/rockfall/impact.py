@@ -19,6 +19,7 @@ from rom.components.rockfall.laws import GRAVITY, Cushion, Mass, Shear
 from rom.components.rockfall.layer import Layer
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.model import Array
+from rom.names import check_known
 from rom.rotation import skew
 
 Time = Annotated[float, Positive("s")]
@@ -350,8 +351,7 @@ def scaled(g: Gallery, factors: dict[str, float]) -> Gallery:
         ConfigError: for a name that is none of them.
     """
     for name, factor in factors.items():
-        if name not in FITTED_NUMBERS:
-            raise ConfigError(f"{name!r} cannot be varied; known are {', '.join(FITTED_NUMBERS)}.")
+        check_known(name, FITTED_NUMBERS, f"{name!r} cannot be varied; known are")
         path, power = FITTED_NUMBERS[name]
         if name == STRENGTH_NAME and not isinstance(g.cushion, Layer):
             raise ConfigError(f"{name} needs a cushion of type Layer.")

@@ -48,7 +48,7 @@ from rom.components.updating.verdict import (
 )
 from rom.errors import ConfigError, ParameterError, SolverError, warn
 from rom.model import Array, Mask, Row
-from rom.names import named
+from rom.names import check_known, named
 from rom.plausible import check_damping_ratio
 from rom.rows import row
 
@@ -162,8 +162,8 @@ def _unknown(
 ) -> Mask:
     """(n_p,) which parameters are unknown."""
     chosen = set(model.names) - set(candidates) if free is None else {*free, *attached}
-    if wrong := chosen - set(model.names):
-        raise ParameterError(f"there is no parameter {named(wrong)}; known are {model.names}.")
+    for name in sorted(chosen):
+        check_known(name, model.names, f"no parameter {name!r}; there are", ParameterError)
     return np.array([name in chosen for name in model.names])
 
 

@@ -80,8 +80,7 @@ class Parts:
         if "" in self.bodies:
             return "", self.bodies[""].marker(str(place))
         body, interface = place if isinstance(place, tuple) and len(place) == 2 else ("", "")
-        if body not in self.bodies:
-            raise ConfigError(f"{place!r} must be (body, interface) of {named(self.bodies)}.")
+        check_known(body, self.bodies, f"{place!r} must be (body, interface) of")
         return body, self.bodies[body].marker(interface)
 
     def motion(self, place: Place) -> Array:

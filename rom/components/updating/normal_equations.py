@@ -8,7 +8,7 @@ condensed, says how much.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.linalg import null_space, qr
@@ -102,7 +102,7 @@ class Sums:
     normal: Array
     gradient: Array
     squares: Array
-    varied: Array
+    varied: Array = field(default_factory=lambda: np.zeros((0, 0)))
 
     @property
     def chi_square(self) -> float:

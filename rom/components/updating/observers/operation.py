@@ -36,7 +36,7 @@ from rom.components.updating.family_model import (
 from rom.components.updating.measured import POINT_RTOL, Channels
 from rom.errors import ConfigError, ModelError
 from rom.model import Array, Index
-from rom.names import named
+from rom.names import check_known, named
 
 UNITS = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s2"}
 UNITS |= {"strain": "1", "stress": "Pa"}
@@ -190,11 +190,8 @@ def operation(
     parts = Parts.of(structure)
     nothing = np.eye(parts.n), np.zeros((0, parts.n))
     model = family_model(structure, nothing, attached, {}, fixed)
-    if wrong := set(names) - set(model.names):
-        raise ConfigError(
-            f"there is no parameter {named(sorted(wrong))}.",
-            hint=f"The family and what is attached have {named(model.names)}.",
-        )
+    for name in names:
+        check_known(name, model.names, f"no parameter {name!r} of family or attached; there are")
     if not model.K.shape[1]:
         what = named(body.name for body in parts.bodies.values())
         raise ConfigError(f"body {what} cannot move with {fixed!r} held; leave one of them free.")

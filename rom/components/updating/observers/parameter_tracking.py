@@ -44,7 +44,7 @@ from rom.components.updating.observers.tracking import (
 )
 from rom.errors import ConfigError, ParameterError, SolverError
 from rom.model import Array
-from rom.names import named
+from rom.names import check_known
 from rom.plausible import check_damping_ratio
 
 LINEAR_REACH = 5e-3  # of a logarithm, within which transitions are linear in it
@@ -139,8 +139,8 @@ class ParameterTracker:
         Raises:
             ParameterError: for a name that is not tracked, or a factor that is not positive.
         """
-        if wrong := set(factors) - set(self.names):
-            raise ParameterError(f"{named(sorted(wrong))} must be of {named(self.names)}.")
+        for name in factors:
+            check_known(name, self.names, f"{name!r} must be one of", ParameterError)
         x = np.log([positive(name, factors.get(name, 1.0)) for name in self.names])
         return linear_tracker(self.operation, x, self.assumed, self.sensors, self.wanted)
 

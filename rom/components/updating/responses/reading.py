@@ -31,6 +31,7 @@ from rom.errors import ConfigError, FileFormatError, UnsafeFileError
 from rom.io.files import check_readable, write_whole
 from rom.io.hdf5 import h5py
 from rom.model import Array
+from rom.names import check_ending
 
 if TYPE_CHECKING:
     import h5py as h5
@@ -90,8 +91,7 @@ def read_responses(
                     return _test(file)
             except (OSError, RuntimeError, KeyError, TypeError, ValueError) as error:
                 raise FileFormatError(f"this is no whole HDF5 file: {error}.") from error
-    if ending not in UNIVERSAL_ENDINGS + TABLE_ENDINGS:
-        raise _unknown(path, UNIVERSAL_ENDINGS + TABLE_ENDINGS + ARRAY_ENDINGS)
+    check_ending(path, "a test", *UNIVERSAL_ENDINGS, *TABLE_ENDINGS, *ARRAY_ENDINGS)
     if averages is None:
         raise ConfigError(
             "averages is missing: how many are behind the functions?",
@@ -137,9 +137,7 @@ def write_responses(test: Responses, path: str | Path) -> Path:
         ConfigError: for another ending, or if the folder is missing or not writable.
         ResourceError: if the disk is full, or h5py is missing.
     """
-    path = Path(path)
-    if path.suffix.lower() not in ARRAY_ENDINGS:
-        raise _unknown(path, ARRAY_ENDINGS)
+    path = check_ending(path, "a test", *ARRAY_ENDINGS)
     sides = list(zip(SIDES, (test.sensors, test.inputs), strict=True))
     places = (x for _, channels in sides for x in (channels.points, channels.directions))
     values = (test.frequencies, test.H, test.coherence, *places)
@@ -184,10 +182,6 @@ def _points(path: str | Path | None) -> tuple[dict[int, Array], dict[int, str]]:
         if path.suffix.lower() in TABLE_ENDINGS:
             return points_of(path)
         return functions_and_points(path)[1], {}
-
-
-def _unknown(path: Path, known: tuple[str, ...]) -> ConfigError:
-    return ConfigError(f"{path}: the ending must be one of {', '.join(known)}.")
 
 
 def _test(file: "h5.File") -> Responses:
