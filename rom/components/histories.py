@@ -12,19 +12,18 @@ Source:
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import Positive, is_number, typed
+from rom.arguments import finite, is_number, number, positive, typed
 from rom.errors import ConfigError, FileFormatError
 from rom.model import Array
 
 MAX_GAP_RATIO = 1.5  # longest interval of a record over its usual one; more is a gap
 MAX_HALVINGS = 20  # of 256 intervals: jumps of functions become as steep as 4e-9 of the span
 STRAIGHT_RTOL = 1e-5  # of the largest value: how far lines stray from a function
-Duration = Annotated[float, Positive("s")]
 Pair = tuple[npt.ArrayLike, npt.ArrayLike]
 History = float | Callable[[Array], Array] | Pair
 
@@ -45,23 +44,10 @@ class Table:
     values: npt.ArrayLike
 
     def __post_init__(self) -> None:
-        try:
-            t, values = (np.asarray(x, dtype=float) for x in (self.t, self.values))
-        except (TypeError, ValueError) as error:
-            raise ConfigError("times and values of the history must be made of numbers.") from error
-        if t.ndim != 1 or t.shape != values.shape or len(t) < 2:
-            raise ConfigError(
-                f"a history of {t.shape} times and {values.shape} values: two or more of each are "
-                "needed, as many times as values."
-            )
-        for name, x in (("time", t), ("value", values)):
-            if not np.isfinite(x).all():
-                k = int(np.argmin(np.isfinite(x)))
-                hint = "Records with gaps are not mended; fill them, or cut the record there."
-                raise ConfigError(f"{name} {k} of the history is {x[k]}.", hint=hint)
-        if not (np.diff(t) > 0).all():
-            k = int(np.argmin(np.diff(t) > 0))
-            raise ConfigError(f"times of a history must grow: {t[k]} s comes before {t[k + 1]} s.")
+        t, _ = corners_of("the history", (self.t, self.values))
+        if len(t) < 2 or np.ndim(self.values) > 1:
+            shapes = f"{t.shape} times and {np.shape(self.values)} values"
+            raise ConfigError(f"the history has {shapes}; two or more of each are needed.")
 
     def __call__(self, t: Array) -> Array:
         """Values at times.
@@ -130,9 +116,7 @@ def read_record(path: str | Path, *, scale: float = 1.0) -> Table:
 
 
 @typed
-def sine(
-    amplitude: float, period: Duration, *, cycles: float = np.inf, phase: float = 0.0
-) -> History:
+def sine(amplitude: float, period: float, *, cycles: float = np.inf, phase: float = 0.0) -> History:
     """Harmonic motion, or a pulse of some cycles of it: half a one, one, ten.
 
     Args:
@@ -144,6 +128,8 @@ def sine(
     Raises:
         ConfigError: if there is no such motion.
     """
+    finite("amplitude and phase", [amplitude, phase], (2,))
+    positive("period", period)
     if not cycles > 0:
         raise ConfigError(f"cycles = {cycles} must be positive.")
 
@@ -155,22 +141,26 @@ def sine(
 
 
 @typed
-def rectangle(amplitude: float, duration: Duration) -> History:
+def rectangle(amplitude: float, duration: float) -> History:
     """A value that stays for a time [s] and ends.
 
     Raises:
         ConfigError: if there is no such pulse.
     """
+    number("amplitude", amplitude)
+    positive("duration", duration)
     return lambda t: np.where(np.asarray(t) < duration, amplitude, 0.0)
 
 
 @typed
-def ramp(duration: Duration) -> History:
+def ramp(duration: float) -> History:
     """From 0 to 1 along half a cosine in a time [s], and 1 from there on.
 
     Raises:
         ConfigError: if the time is not positive.
     """
+    if not 0 < duration < np.inf:
+        raise ConfigError(f"no ramp takes {duration} s.")
     return lambda t: (1 - np.cos(np.pi * np.clip(np.asarray(t) / duration, 0.0, 1.0))) / 2
 
 
@@ -190,14 +180,27 @@ def corners_of(name: str, pair: Pair, n: int = 1, *, rows: bool = False) -> tupl
         t, y = (np.asarray(x, dtype=float) for x in pair)
     except (TypeError, ValueError) as error:
         raise ConfigError(
-            f"{name}: its history must be a number, a function, or a pair of times and values."
+            f"{name}: its history must be a number, a function, or a pair of times and values, "
+            "made of numbers."
         ) from error
-    if t.ndim != 1 or not t.size or y.shape[:1] != t.shape or not np.all(np.diff(t) > 0):
-        text = f"{name}: times of the shape {t.shape} with values {y.shape}."
-        raise ConfigError(text, hint="Times that grow, and one value, or row of values, for each.")
+    if t.ndim != 1 or not t.size or y.shape[:1] != t.shape:
+        raise ConfigError(
+            f"{name}: times of the shape {t.shape} with values {y.shape}.",
+            hint="One value, or row of values, for each; functions are written for arrays.",
+        )
     y = np.repeat(y[:, None], n, axis=1) if y.ndim == 1 and not rows else y
-    if y.shape != (len(t), n) or not (np.isfinite(t).all() and np.isfinite(y).all()):
-        raise ConfigError(f"{name}: values {y.shape}, needed are {(len(t), n)} finite ones.")
+    if y.shape != (len(t), n):
+        raise ConfigError(f"{name}: values {y.shape}, needed are {(len(t), n)}.")
+    finite_rows = np.isfinite(t) & np.isfinite(y).all(axis=1)
+    if not finite_rows.all():
+        k = int(finite_rows.argmin())
+        raise ConfigError(
+            f"{name}: value {k} is {y[k].tolist()} at t = {t[k]:g} s, needed are finite numbers.",
+            hint="Records with gaps are not mended; fill them, or cut the record there.",
+        )
+    if not (np.diff(t) > 0).all():
+        k = int(np.argmin(np.diff(t) > 0))
+        raise ConfigError(f"{name}: times must grow: {t[k]} s comes before {t[k + 1]} s.")
     return t, y
 
 
@@ -251,13 +254,4 @@ def values_at(name: str, history: History, t: Array) -> Array:
         times, values = corners_of(name, history)
         return np.interp(t, times, values[:, 0])
     given = history(t) if callable(history) else np.full(len(t), history)
-    found = np.asarray(given, dtype=float)
-    if found.shape != t.shape:
-        text = f"the history of {name} gives the shape {found.shape} for {len(t)} times."
-        raise ConfigError(text, hint="Write it for arrays, with np.where for cases.")
-    if not np.isfinite(found).all():
-        raise ConfigError(
-            f"the history of {name} is {found[~np.isfinite(found)][0]} at "
-            f"t = {t[np.argmin(np.isfinite(found))]:g} s, needed are finite values."
-        )
-    return found
+    return corners_of(name, (t, given))[1][:, 0]

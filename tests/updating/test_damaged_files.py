@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose
 import rom
 from cases.components.updating import family_of
 from cases.paths import TESTS
+from cases.refusals import refuses
 from rom.errors import FileFormatError, RomError, RomWarning
 from rom.updating import Channels
 
@@ -182,8 +183,7 @@ def test_a_table_that_is_cut_is_named_at_each_place(responses, tmp_path):
     read = {"averages": 50, "coherence": 0.9, "points": tmp_path / "points.csv"}
     for end in range(start + 3, len(text) - 12, 7):
         (tmp_path / "test.csv").write_text(text[:end])
-        with pytest.raises(FileFormatError, match=r"line 61"):
-            rom.io.read_responses(tmp_path / "test.csv", **read)
+        refuses(FileFormatError, r"line 61", rom.io.read_responses, tmp_path / "test.csv", **read)
     (tmp_path / "test.csv").write_text(text[:start])
     assert len(rom.io.read_responses(tmp_path / "test.csv", **read).frequencies) == len(F) - 1
 
@@ -245,8 +245,7 @@ def test_a_byte_that_is_wrong_anywhere_in_hdf5_is_named(whole, tmp_path):
         assert (found.averages, found.quantity) == (test.averages, test.quantity)
     for k in range(0, len(whole), 97):
         path.write_bytes(whole[:k])
-        with pytest.raises(FileFormatError, match=r"x\.h5"):
-            rom.io.read_responses(path)
+        refuses(FileFormatError, r"x\.h5", rom.io.read_responses, path)
 
 
 CHANGES = {
@@ -281,8 +280,7 @@ def test_what_is_wrong_in_hdf5_is_named(words, whole, tmp_path):
     path.write_bytes(whole)
     with rom.io.hdf5.h5py("").File(path, "r+") as file:
         CHANGES[words](file)
-    with pytest.raises(FileFormatError, match=words):
-        rom.io.read_responses(path)
+    refuses(FileFormatError, words, rom.io.read_responses, path)
 
 
 @pytest.mark.once

@@ -8,6 +8,7 @@ import pytest
 import rom
 from cases.components.updating import assert_right, crossed, family_of
 from cases.long import ROM_LONG
+from cases.refusals import refuses
 from rom.components.updating.family_model import family_model
 from rom.components.updating.frf_data import noisy
 from rom.components.updating.normal_equations import responses_at
@@ -220,5 +221,4 @@ def test_lines_beside_poles_that_are_wrong_can_count_less(family):
     right = rom.update(family, test, fixed=HELD, damping=0.02, beside_poles=60.0)
     assert_right(right, {"inner": 1.15})
     assert right.deviations["inner"] > rom.update(family, test, fixed=HELD).deviations["inner"]
-    with pytest.raises(ConfigError, match="beside_poles"):
-        rom.update(family, test, fixed=HELD, beside_poles=-1.0)
+    refuses(ConfigError, "beside_poles", rom.update, family, test, fixed=HELD, beside_poles=-1.0)

@@ -10,6 +10,7 @@ from scipy.stats import chi2
 import rom
 from cases.components.updating import assert_alike, family_of, refuse
 from cases.mbs.fmu_instance import Instance, fmpy
+from cases.refusals import refuses
 from rom import updating
 from rom.body.recovery import StressRecovery
 from rom.components.updating.observers import parameter_tracking
@@ -264,8 +265,7 @@ def test_the_fmu_names_the_parameter_that_leaves_its_range(family, tmp_path):
     narrow = {"clamp": replace(SPRING["clamp"], low=0.97, high=1.03)}
     t = made(family, attached=narrow)
     _, _, y = walked(made(family), np.random.default_rng(2), 400)
-    with pytest.raises(SolverError, match="'clamp' has reached"):
-        t.run(y)
+    refuses(SolverError, "'clamp' has reached", t.run, y)
     one = Instance(rom.io.write_observer_fmu(t, tmp_path / "joint.fmu"), tmp_path).begin()
     sensors = ("strain[1]", "acceleration[1]", "acceleration[2]")
     with pytest.raises(fmpy.fmi1.FMICallException):
@@ -288,7 +288,7 @@ def test_what_cannot_be_followed_is_named(family, filter_):
         (lambda: Drift(0.0), "first"),
         (lambda: Drift(0.1, -1.0), "walk = -1"),
         (lambda: filter_.run(np.zeros((5, 2))), r"samples \(5, 2\)"),
-        (lambda: filter_.held(E=1.0), ParameterError, "'E' must be of 'E_inner'"),
+        (lambda: filter_.held(E=1.0), ParameterError, "'E' must be one of .'E_inner'"),
         (lambda: lost.run(y), SolverError, f"'clamp' {left}"),
     )
 

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rom.arguments import finite, is_number, positive, shortened, typed, whole
-from rom.components.assumed_strain.triangles import Sheet, sides_of, whole_numbers
+from rom.components.assumed_strain.triangles import Sheet, endless, sides_of, whole_numbers
 from rom.components.histories import History, straightened
 from rom.errors import ConfigError, MeshError
 from rom.model import Array, Index
@@ -197,19 +197,17 @@ def prepared(body: Sheet, actions: Actions, span: tuple[float, float] = (0.0, 1.
     for k, load in enumerate(actions.loads):
         loads[k] = nodal(f"forces of load {k}", load.forces, body)
     sides = [_outer(body, k, traction) for k, traction in enumerate(actions.tractions)]
-    stress = [[x.pressure, x.shear] for x in actions.tractions]
     of = np.repeat(np.arange(len(sides)), [len(s) for s in sides])
+    stress = np.array([[x.pressure, x.shear] for x in actions.tractions], dtype=float)
+    pressed = np.vstack([np.zeros((0, 2), dtype=np.int64), *sides]), stress.reshape(-1, 2)[of]
     moved = [dofs_of(x.dofs, body, f"drive {k}:") for k, x in enumerate(actions.drives)]
-    driven, columns = _driven(dofs_of(actions.held, body), moved, len(loads) + len(sides))
-    times, table = _table(actions, [m.size for m in moved], span)
-    faces = [_faces(tool) for tool in actions.tools]
-    made = Prepared(
-        times, table, loads, np.vstack([np.zeros((0, 2), dtype=np.int64), *sides]),
-        np.reshape(stress, (-1, 2)).astype(float)[of], len(loads) + of, driven, columns,
-        np.vstack([np.zeros((0, 7)), *faces]), np.cumsum([0, *(len(f) for f in faces)]),
-        np.array([tool.friction for tool in actions.tools], dtype=float),
-        tuple(tool.name for tool in actions.tools),
-    )  # fmt: skip
+    driven = _driven(dofs_of(actions.held, body), moved, len(loads) + len(sides))
+    lines = _table(actions, [m.size for m in moved], span)
+    faces = [np.zeros((0, 7)), *(_faces(tool) for tool in actions.tools)]
+    tools = np.vstack(faces), np.cumsum([len(f) for f in faces])
+    friction = np.array([tool.friction for tool in actions.tools], dtype=float)
+    names = tuple(tool.name for tool in actions.tools)
+    made = Prepared(*lines, loads, *pressed, len(loads) + of, *driven, *tools, friction, names)
     _refuse_overlap(body, made)
     return made
 
@@ -247,9 +245,7 @@ def dofs_of(held: npt.ArrayLike, body: Sheet, name: str = "held") -> Index:
 
 def _outer(body: Sheet, k: int, traction: Traction) -> Index:
     """Sides of a traction; each must be at the edge, and turned as there."""
-    wanted = whole_numbers(f"traction {k}: sides", traction.sides)
-    if wanted.ndim != 2 or wanted.shape[1] != 2:
-        raise ConfigError(f"traction {k}: sides of the shape {wanted.shape}, needed is (k, 2).")
+    wanted = whole_numbers(f"traction {k}: sides", traction.sides, (None, 2))
     if not (is_number(traction.pressure) and is_number(traction.shear)):
         raise ConfigError(f"traction {k} needs finite pressure and shear.")
     there = {tuple(side) for side in outer_sides(body).tolist()}
@@ -267,8 +263,7 @@ def _faces(tool: Tool) -> Array:
     name = f"tool {check_text(tool.name, 'a tool')!r}"
     X = finite(f"{name}: the outline", tool.outline, (None, 2))
     whole(f"{name}: corners of the outline", len(X), 3)
-    rough = isinstance(tool.friction, float) and tool.friction == np.inf
-    if not (rough or (is_number(tool.friction) and tool.friction >= 0)):
+    if not (endless(tool.friction) or (is_number(tool.friction) and tool.friction >= 0)):
         given = shortened(tool.friction)
         raise ConfigError(f"{name}: the friction {given} must be 0 or more, or infinite.")
     along = np.roll(X, -1, axis=0) - X
@@ -319,9 +314,9 @@ def _refuse_overlap(body: Sheet, made: Prepared) -> None:
 def _covered(body: Sheet, places: Array) -> int:
     """Number of a place inside a triangle by more than a touch; -1 if there is none."""
     a, b, c = (body.points[body.triangles[:, k]] for k in range(3))
+    sides = (a, b), (b, c), (c, a)
     for k, p in enumerate(places):
-        parts = [np.linalg.det(np.stack([v - u, p - u], axis=-1))
-                 for u, v in ((a, b), (b, c), (c, a))]  # fmt: skip
+        parts = [np.linalg.det(np.stack([v - u, p - u], axis=-1)) for u, v in sides]
         if np.any(np.min(parts, axis=0) > 2 * 1e-3 * body.area):
             return k
     return -1

@@ -15,7 +15,7 @@ from scipy.sparse.linalg import spsolve
 
 from rom.arguments import Count, Share, finite, typed
 from rom.components.assumed_strain import kernels
-from rom.components.assumed_strain.actions import Actions, Load, nodal, prepared
+from rom.components.assumed_strain.actions import Actions, Load, Prepared, nodal, prepared
 from rom.components.assumed_strain.contact import touch
 from rom.components.assumed_strain.motion import Metal, depth_of, forces, mass, tangent
 from rom.components.assumed_strain.triangles import Sheet, placed
@@ -99,9 +99,10 @@ def quasi_static(body: Sheet, metal: Metal, actions: Actions, times: npt.ArrayLi
         SolverError: if no equilibrium is found, or plastic strain leaps even in the shortest steps;
             ``error.solution`` holds the instants before.
     """
-    t = _instants(times)
-    _refuse_free(body, actions)
-    return _Way(body, metal, actions, None, 0.0, (t[0], t[-1])).run(t, np.zeros_like(body.points))
+    t, acts = _over(times, body, actions)
+    if not actions.tools:
+        _refuse_free(body, acts.driven)
+    return _Way(body, metal, acts, None, 0.0).run(t, np.zeros_like(body.points))
 
 
 @typed
@@ -132,9 +133,14 @@ def equilibrium(
 
 @typed
 def implicit_motion(
-    body: Sheet, metal: Metal, actions: Actions, times: npt.ArrayLike, *,
-    v: npt.ArrayLike | None = None, rho_inf: Share = 0.5,
-) -> Course:  # fmt: skip
+    body: Sheet,
+    metal: Metal,
+    actions: Actions,
+    times: npt.ArrayLike,
+    *,
+    v: npt.ArrayLike | None = None,
+    rho_inf: Share = 0.5,
+) -> Course:
     """Motion with inertia by generalized-alpha steps, from one instant to the next.
 
     Args:
@@ -157,8 +163,8 @@ def implicit_motion(
             f"rho_inf = {rho_inf} with tools: impacts gain energy above {MAX_RHO_OF_IMPACTS}."
         )
     start = np.zeros_like(body.points) if v is None else nodal("velocities", v, body)
-    t, M = _instants(times), mass(body, metal)
-    return _Way(body, metal, actions, M, rho_inf, (t[0], t[-1])).run(t, start)
+    t, acts = _over(times, body, actions)
+    return _Way(body, metal, acts, mass(body, metal), rho_inf).run(t, start)
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,11 +186,9 @@ class _Way:
     """One run: what does not change, and the steps of Newton's method."""
 
     def __init__(
-        self, body: Sheet, metal: Metal, actions: Actions, M: csr_matrix | None, rho: float,
-        span: tuple[float, float] = (0.0, 1.0),
-    ) -> None:  # fmt: skip
-        self.body, self.metal, self.M = body, metal, M
-        self.acts = prepared(body, actions, span)
+        self, body: Sheet, metal: Metal, acts: Prepared, M: csr_matrix | None, rho: float
+    ) -> None:
+        self.body, self.metal, self.acts, self.M = body, metal, acts, M
         self.free = np.setdiff1d(np.arange(body.points.size), self.acts.driven)
         self.alpha_m, self.alpha_f = (2 * rho - 1) / (rho + 1), rho / (rho + 1)
         self.gamma = 0.5 - self.alpha_m + self.alpha_f
@@ -209,17 +213,17 @@ class _Way:
                 end = min(now.t + part * (t[k] - t[k - 1]), t[k])
                 end = t[k] if t[k] - end < 1e-9 * (t[k] - t[k - 1]) else end
                 found = self.step(now, end)
-                grown = 0.0 if found is None else (found.history - now.history)[..., 4].max()
+                grown, why = 0.0, "no balance of forces"
+                if found is not None:
+                    grown = (found.history - now.history)[..., 4].max()
+                    why = f"plastic strain grows by {grown:.2g}, more than {MAX_STRAIN_STEP} a step"
                 if found is not None and grown <= MAX_STRAIN_STEP:
                     now, part = found, min(part * (1 + (2 * grown <= MAX_STRAIN_STEP)), 1.0)
                 elif part > MIN_STEP:
                     part /= 2
                 else:
-                    what = "no balance of forces" if found is None else (
-                        f"plastic strain grows by {grown:.2g}, more than {MAX_STRAIN_STEP} a step,"
-                    )  # fmt: skip
                     raise SolverError(
-                        f"{what} between {now.t:.4g} s and {end:.4g} s, instant {k}.",
+                        f"{why} between {now.t:.4g} s and {end:.4g} s, instant {k}.",
                         hint="Take more instants, or less load; the sheet may be free to move.",
                         solution=self.course(kept),
                     )
@@ -252,19 +256,17 @@ class _Way:
         def rows(name: str) -> Array:
             return np.array([getattr(now, name) for now in kept])
 
-        return Course(
-            rows("t"), rows("x"), rows("v"), rows("history")[..., 4], rows("tool_forces"),
-            rows("reactions"), kept[-1].history, self.most,
-        )  # fmt: skip
+        plastic, last = rows("history")[..., 4], kept[-1].history
+        t, x, v, tools, reactions = map(rows, ("t", "x", "v", "tool_forces", "reactions"))
+        return Course(t, x, v, plastic, tools, reactions, last, self.most)
 
     def start(self, t: float, v: Array) -> _Now:
         """The sheet as it began; with inertia, its acceleration."""
         x, n = self.body.points.copy(), self.body.points.size
         x.reshape(-1)[self.acts.driven] += self.acts.displacements(t)
-        zero = np.zeros((*self.body.weights.shape, 5))
-        slip = np.zeros((len(x), len(self.acts.friction)))
-        now = _Now(t, x, np.zeros_like(x), np.zeros_like(x), zero, slip, np.zeros(n),
-                   np.zeros((slip.shape[1], 2)), np.zeros_like(x))  # fmt: skip
+        history, tools = np.zeros((*self.body.weights.shape, 5)), len(self.acts.friction)
+        still, slip, pushed = np.zeros_like(x), np.zeros((len(x), tools)), np.zeros((tools, 2))
+        now = _Now(t, x, still, still, history, slip, np.zeros(n), pushed, still)
         if self.M is None:
             return now
         balance, now, _ = self.balance(now, x, t, [])
@@ -308,8 +310,8 @@ class _Way:
             rows, change = K[free], np.zeros(trial.whole.size)
             change[driven] = jump
             if free.size:
-                change[free] = spsolve(rows[:, free].tocsc(),
-                                       trial.whole[free] - rows[:, driven] @ jump)  # fmt: skip
+                right = trial.whole[free] - rows[:, driven] @ jump
+                change[free] = spsolve(rows[:, free].tocsc(), right)
             if not np.isfinite(change).all():
                 return None
             trial = self.searched(now, trial, change.reshape(-1, 2), i == 0)
@@ -391,31 +393,29 @@ class _Way:
         return placed(A, first, ends, x.size) + placed(A, second, ends, x.size)
 
 
-def _refuse_free(body: Sheet, actions: Actions) -> None:
+def _refuse_free(body: Sheet, driven: Index) -> None:
     """Without tools, held and driven dofs stop every rigid motion."""
-    if actions.tools:
-        return
-    way = prepared(body, actions)
     place = body.points - body.points.mean(axis=0)
     motions = np.zeros((body.points.size, 3))
     motions[::2, 0] = motions[1::2, 1] = np.abs(place).max()
     motions[::2, 2], motions[1::2, 2] = -place[:, 1], place[:, 0]
-    stopped = np.linalg.matrix_rank(motions[way.driven], tol=1e-9) if way.driven.size else 0
+    stopped = np.linalg.matrix_rank(motions[driven], tol=1e-9) if driven.size else 0
     if body.state == "axisymmetric":
-        if not np.any(way.driven % 2):
+        if not np.any(driven % 2):
             raise ConfigError("the solid can slide along its axis; hold the second dof of a node.")
     elif stopped < 3:
         raise ConfigError(
-            f"{way.driven.size} held and driven dofs leave {3 - stopped} of three rigid motions.",
+            f"{driven.size} held and driven dofs leave {3 - stopped} of three rigid motions.",
             hint="Hold two dofs of one node and one of another, or more.",
         )
 
 
-def _instants(times: npt.ArrayLike) -> Array:
+def _over(times: npt.ArrayLike, body: Sheet, actions: Actions) -> tuple[Array, Prepared]:
+    """Instants (k,) [s], and what acts from the first to the last."""
     t = finite("times", times, None)
     if t.ndim != 1 or len(t) < 2 or not np.all(np.diff(t) > 0):
         raise ConfigError(f"times of the shape {t.shape}: two or more that grow are needed.")
-    return t
+    return t, prepared(body, actions, (t[0], t[-1]))
 
 
 def _stretch_ratio(body: Sheet, x: Array) -> Array:

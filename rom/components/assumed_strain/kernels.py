@@ -30,8 +30,8 @@ def _returned(e11, e22, e12, e33, ep, numbers):
         left = 1 - 3 * mu * step / q
     p = 3 * K * third
     flow = (1 - left) / (2 * mu)  # of the trial deviator into plastic strain
-    return (p + left * s11, p + left * s22, left * s12, p + left * s33,
-            flow * s11, flow * s22, flow * s12, flow * s33, step)  # fmt: skip
+    t11, t22, t12, t33 = p + left * s11, p + left * s22, left * s12, p + left * s33
+    return t11, t22, t12, t33, flow * s11, flow * s22, flow * s12, flow * s33, step
 
 
 @inner

@@ -6,7 +6,7 @@ Source:
 """
 
 from dataclasses import dataclass, replace
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +19,7 @@ from rom.components.assumed_strain.triangles import (
     STATES,
     Sheet,
     constant_gradients,
+    endless,
     placed,
     sides_of,
 )
@@ -52,7 +53,7 @@ class Metal:
     def __post_init__(self) -> None:
         for name in ("E", "nu", "rho", "yield_stress", "hardening"):
             value = getattr(self, name)
-            if not is_number(value) and not (name == "yield_stress" and _endless(value)):
+            if not is_number(value) and not (name == "yield_stress" and endless(value)):
                 raise MaterialError(f"{name} = {shortened(value)} must be a finite number.")
         if not isinstance(self.linear, bool):
             raise MaterialError(f"linear = {shortened(self.linear)} must be True or False.")
@@ -72,10 +73,6 @@ class Metal:
         """Fastest elastic wave [m/s]."""
         K, mu = self.numbers[:2]
         return float(np.sqrt((K + 4 / 3 * mu) / self.rho))
-
-
-def _endless(value: object) -> bool:
-    return isinstance(value, float) and value == np.inf
 
 
 @typed
@@ -155,10 +152,15 @@ class Flight:
 
 @typed
 def fly(
-    body: Sheet, metal: Metal, v: Array, held: npt.ArrayLike,
-    t_end: Annotated[float, Positive("s")], *,
-    pictures: Annotated[int, Count(2)] = 41, actions: Actions | None = None,
-) -> Flight:  # fmt: skip
+    body: Sheet,
+    metal: Metal,
+    v: Array,
+    held: npt.ArrayLike,
+    t_end: Annotated[float, Positive("s")],
+    *,
+    pictures: Annotated[int, Count(2)] = 41,
+    actions: Actions | None = None,
+) -> Flight:
     """Explicit motion from rest lengths.
 
     Nodes that come into a tool are put back onto its face, by an impulse with Coulomb's friction.
@@ -183,14 +185,14 @@ def fly(
     lumped = np.asarray(mass(body, metal).sum(axis=1)).ravel()[::2]
     free, x, parts = np.ones(v.shape, dtype=bool), body.points.copy(), _parts(body, metal, None)
     free.reshape(-1)[acts.driven] = False
-    t, kept = np.linspace(0, t_end, pictures), (pictures, *x.shape)
-    seen = (np.full(kept, np.nan), np.zeros((pictures, *body.weights.shape)),
-            np.zeros((pictures, len(acts.friction), 2)), np.zeros(kept))  # fmt: skip
+    shapes = x.shape, body.weights.shape, (len(acts.friction), 2), x.shape
+    t, seen = np.linspace(0, t_end, pictures), [np.zeros((pictures, *shape)) for shape in shapes]
+    seen[0][:] = np.nan
     acting = acts.times, acts.table, acts.forces, depth_of(body), acts.driven, acts.columns
     tools, histories = (acts.faces, acts.first, acts.friction), (parts[6], parts[6].copy())
     solid = (*parts[:4], body.area), *parts[4:6], metal.wave_speed
     start = x, np.where(free, v, 0.0), lumped, free
-    steps, work = kernels.fly(*start, *solid, (*acting, tools), t, histories, seen)
+    steps, work = kernels.fly(*start, *solid, (*acting, tools), t, histories, tuple(seen))
     path, plastic = seen[:2]
     if steps < 0 or not np.isfinite(path).all():
         k = int(np.append(np.isfinite(path).all(axis=(1, 2)), False).argmin())
@@ -207,7 +209,10 @@ def depth_of(body: Sheet) -> float:
     return -1.0 if body.state == "axisymmetric" else body.thickness
 
 
-def _parts(body: Sheet, metal: Metal, history: Array | None) -> tuple[Any, ...]:
+Parts = tuple[Index, Array, Array, Array, Array, int, Array]
+
+
+def _parts(body: Sheet, metal: Metal, history: Array | None) -> Parts:
     """Arguments of the kernels between positions and results."""
     shape = (*body.weights.shape, 5)
     history = np.zeros(shape) if history is None else finite("history", history, shape)

@@ -13,14 +13,13 @@ Source:
 """
 
 import numpy as np
-import numpy.typing as npt
 from scipy.sparse import coo_matrix, csr_matrix, eye, identity, kron, vstack
 
 from rom.arguments import typed
 from rom.components.assumed_strain.motion import Metal, mass, tangent
 from rom.components.assumed_strain.triangles import Sheet, placed, sides_of
 from rom.errors import ConfigError, InterfaceError
-from rom.model import Array, FEModel, Index, Interface, SurfaceMesh
+from rom.model import Array, FEModel, Index, Interface, Mask, SurfaceMesh
 
 
 @typed
@@ -46,8 +45,8 @@ def in_space(body: Sheet, metal: Metal, interfaces: dict[str, Index]) -> FEModel
     K = _placed(tangent(body, metal, body.points), (0, 1))
     K += _placed(bending(body, metal, parts), (2,))
     M = kron(mass(body, metal)[::2, ::2], identity(3), "csr")
-    faces = {name: _interface(name, nodes, body, points)
-             for name, nodes in zip(interfaces, parts, strict=True)}  # fmt: skip
+    each = zip(interfaces, parts, strict=True)
+    faces = {name: _interface(name, nodes, body, points) for name, nodes in each}
     surface = SurfaceMesh(np.arange(n), body.triangles)
     made = {"geometry": "sheet", "material": metal, "thickness [m]": body.thickness}
     return FEModel(K, M, points, faces, surface=surface, provenance=made)
@@ -77,8 +76,6 @@ def _interface(name: str, nodes: Index, body: Sheet, points: Array) -> Interface
     origin = S.sum(axis=0) @ points[nodes] / S.sum()
     return Interface(name, nodes, points[nodes], S, np.asarray(origin).ravel())
 
-
-Mask = npt.NDArray[np.bool_]
 
 QUADRATIC_RTOL = 1e-3  # least singular value of a fit, relative: below, its nodes lie on a conic
 

@@ -85,16 +85,10 @@ def sheet(
     patch = np.hstack([T, _opposite(T)])
     loose = np.setdiff1d(np.arange(len(X)), T)
     if loose.size:
-        raise MeshError(
-            f"{loose.size} of {len(X)} points belong to no triangle, the first is {loose[0]}."
-        )
-    G = np.zeros((len(T), 3, 6, 2))
-    for k in range(3):
-        G[:, k] = _side_gradients(X, patch, constant, k)
-    if element == "CST":
-        G = constant[:, None, None]
-    else:
-        G = G[:, None] if element == "F1" else G[:, :, None]
+        text = f"{loose.size} of {len(X)} points belong to no triangle"
+        raise MeshError(f"{text}, the first is {loose[0]}.")
+    G = np.stack([_side_gradients(X, patch, constant, k) for k in range(3)], axis=1)
+    G = {"CST": constant[:, None, None], "F1": G[:, None], "F3": G[:, :, None]}[element]
     alone = patch < 0
     patch = np.where(alone, np.hstack([T, T]), patch)
     depth = 2 * np.pi * X[T, 0].mean(axis=1) if state == "axisymmetric" else thickness
@@ -102,13 +96,20 @@ def sheet(
     return Sheet(X, T, patch, np.ascontiguousarray(G), weights, area, state, thickness)
 
 
-def whole_numbers(name: str, value: npt.ArrayLike) -> Index:
-    """Whole numbers of any shape, which counts of nodes or dofs are; True and False are none.
+def endless(value: object) -> bool:
+    """Whether a value is infinite, as friction or a yield stress may be."""
+    return isinstance(value, float) and value == np.inf
+
+
+def whole_numbers(
+    name: str, value: npt.ArrayLike, shape: tuple[int | None, ...] | None = None
+) -> Index:
+    """Whole numbers, which counts of nodes or dofs are, of a shape; True and False are none.
 
     Raises:
         ConfigError: for anything else.
     """
-    found = finite(name, value, None)
+    found = finite(name, value, shape)
     if np.any(found % 1) or np.abs(found).max(initial=0.0) > LARGEST_WHOLE:
         raise ConfigError(
             f"{name} = {shortened(value)}: numbers of nodes or dofs are whole, 2^53 at most.",
@@ -135,8 +136,8 @@ def constant_gradients(X: Array, T: Index) -> tuple[Array, Array]:
     a, b, c = X[T[:, 0]], X[T[:, 1]], X[T[:, 2]]
     area = 0.5 * ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
     if not area.min() > 0:
-        raise MeshError(f"triangle {int(area.argmin())} has the area {area.min():.3g} m^2.",
-                        hint="Number its corners counter-clockwise.")  # fmt: skip
+        text = f"triangle {int(area.argmin())} has the area {area.min():.3g} m^2."
+        raise MeshError(text, hint="Number its corners counter-clockwise.")
     G = np.zeros((len(T), 6, 2))
     for k, side in enumerate((c - b, a - c, b - a)):
         G[:, k] = np.column_stack([-side[:, 1], side[:, 0]]) / (2 * area[:, None])
@@ -145,9 +146,8 @@ def constant_gradients(X: Array, T: Index) -> tuple[Array, Array]:
 
 def placed(A: Array, rows: Index, columns: Index, n: int) -> csr_matrix:
     """Small matrices (k, r, c) added at rows (k, r) and columns (k, c) of one (n, n)."""
-    place = (np.repeat(rows, columns.shape[1], axis=1).ravel(),
-             np.tile(columns, (1, rows.shape[1])).ravel())  # fmt: skip
-    return coo_matrix((A.ravel(), place), shape=(n, n)).tocsr()
+    i, j = np.repeat(rows, columns.shape[1], axis=1), np.tile(columns, (1, rows.shape[1]))
+    return coo_matrix((A.ravel(), (i.ravel(), j.ravel())), shape=(n, n)).tocsr()
 
 
 def sides_of(T: Index) -> Index:

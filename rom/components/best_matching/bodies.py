@@ -4,8 +4,8 @@ These are points of a sphere, without size, frame and clock.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -186,7 +186,7 @@ class Bodies:
         return x
 
 
-def integrated(rates: Any, y: Array, t: Array) -> Array:
+def integrated(rates: Callable[[float, Array], Array], y: Array, t: Array) -> Array:
     """(k, n) solution of y' = rates(t, y) at the instants t."""
     t = np.asarray(t, dtype=float)
     found = solve_ivp(rates, (t[0], t[-1]), y, t_eval=t, method="DOP853", rtol=1e-12, atol=1e-14)

@@ -22,7 +22,6 @@ Source:
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -49,11 +48,11 @@ class Extended:
 
     x: Array
     p: Array
-    phi: Any
-    pi: Any
-    time: Any = 0.0
+    phi: Array | float
+    pi: Array | float
+    time: Array | float = 0.0
 
-    def scaled(self, phi: Any) -> "Extended":
+    def scaled(self, phi: Array | float) -> "Extended":
         """The same motion with another logarithm of the scale () or (k,) [1], along what Q makes.
 
         With zero, x and p are Newton's.
@@ -90,7 +89,7 @@ def shape_gauge(linking: "Linking", state: Extended) -> tuple[float, float]:
     """
     N = 1 / linking.rate_of_pi(state)
     size = linking.bodies.size(state.x)
-    return N, N * np.exp(-2 * state.phi) * float((state.x * state.p).sum()) / size
+    return N, N * float(np.exp(-2 * state.phi)) * float((state.x * state.p).sum()) / size
 
 
 @dataclass(frozen=True, slots=True)
@@ -235,7 +234,8 @@ class Linking:
         """Newton's kinetic and potential energy."""
         T = 0.5 * float((state.p**2 / self.bodies.mass[:, None]).sum())
         V = self.bodies.potential(state.x)
-        return np.exp(-2 * state.phi) * T, np.exp(self.bodies.degree * state.phi) * V
+        smaller, deeper = np.exp(-2 * state.phi), np.exp(self.bodies.degree * state.phi)
+        return float(smaller * T), float(deeper * V)
 
     def _rates(self, y: Array, gauge: Gauge) -> Array:
         n, m = 3 * self.bodies.mass.size, self.bodies.mass[:, None]

@@ -5,7 +5,6 @@ Source:
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -44,7 +43,7 @@ def generators(x: Array, *, scale: bool = False) -> Array:
     return np.hstack([R, np.reshape(x, (-1, 1))]) if scale else R
 
 
-def rigid_part(mass: Any, R: Array, V: Array) -> Array:
+def rigid_part(mass: Array, R: Array, V: Array) -> Array:
     """Generators' amounts X in the columns of V: R^T M (V - R X) = 0.
 
     Args:
@@ -68,7 +67,7 @@ def rigid_part(mass: Any, R: Array, V: Array) -> Array:
     return unit[:, None] * G @ (unit[:, None] * MR.T) @ V
 
 
-def match(mass: Any, x: Array, v: Array, *, scale: bool = False) -> Matched:
+def match(mass: Array, x: Array, v: Array, *, scale: bool = False) -> Matched:
     """Take the best rigid motion out of velocities.
 
     Args:
@@ -87,7 +86,7 @@ def match(mass: Any, x: Array, v: Array, *, scale: bool = False) -> Matched:
     return Matched(motion, residual.reshape(-1, 3), float(energy))
 
 
-def frame(mass: Any, reference: Array, x: Array, *, plane: bool = False) -> tuple[Array, Array]:
+def frame(mass: Array, reference: Array, x: Array, *, plane: bool = False) -> tuple[Array, Array]:
     """Where the reference lies best over x: x = r + A (reference + what differs).
 
     Args:
@@ -137,7 +136,7 @@ def _turn_in_plane(C: Array) -> Array:
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, length]]) / length
 
 
-def stacked(mass: Any, X: Array, *, plane: bool = False) -> Array:
+def stacked(mass: Array, X: Array, *, plane: bool = False) -> Array:
     """Lay each picture of a film over its predecessor.
 
     Args:
@@ -159,7 +158,7 @@ def stacked(mass: Any, X: Array, *, plane: bool = False) -> Array:
     return film
 
 
-def emergent_rate(mass: Any, x: Array, dx: Array, kinetic: float) -> float:
+def emergent_rate(mass: Array, x: Array, dx: Array, kinetic: float) -> float:
     """Time that passes per unit of a parameter along a sequence of configurations.
 
     dt / d lambda = sqrt(T_bm(dx / d lambda) / (E - V)), however pictures were turned or numbered.
@@ -181,7 +180,7 @@ def emergent_rate(mass: Any, x: Array, dx: Array, kinetic: float) -> float:
     return float(np.sqrt(match(mass, x, dx).energy / kinetic))
 
 
-def _weighted(mass: Any, V: Array) -> Array:
+def _weighted(mass: Array, V: Array) -> Array:
     """M V, for particles with one or three rows of V each, or for a mass matrix."""
     if np.ndim(mass) == 1 and len(V) % len(mass) == 0:
         return np.repeat(np.asarray(mass, dtype=float), len(V) // len(mass))[:, None] * V

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from scipy.sparse import identity, kron
@@ -26,7 +25,7 @@ from rom.eigen.attachments import added_mass
 from rom.eigen.verbs import Operators, orthonormal_in, own_points, rigid_motions
 from rom.errors import ModelError, ParameterError
 from rom.model import Array, FEModel, Interface, Layered, Region
-from rom.names import offered
+from rom.names import check_known
 from rom.reduction.full_model import mesh_operators
 from rom.reduction.interfaces.characteristic import GivenFunctions
 
@@ -56,11 +55,8 @@ class AffineModel:
         self.added = added_mass(model, self.ops.first, self.ops.n_local)
         names = dict.fromkeys(p.region for p in parameters.values() if p.region is not None)
         for name in names:
-            if name not in model.regions:
-                raise ParameterError(
-                    f"there is no region {name!r}; the model has {offered(model.regions, name)}.",
-                    hint="Regions are the named physical volumes of the geometry.",
-                )
+            text = f"there is no region {name!r}, a named physical volume; the model has"
+            check_known(name, model.regions, text, ParameterError)
         self.regions = {name: model.regions[name] for name in names}
 
     @property
@@ -77,14 +73,16 @@ class AffineModel:
         """Models whose rigid motions the basis needs besides those of the centre."""
         return iter(())
 
-    def kinds(self, interfaces: dict[str, Any]) -> dict[str, Any]:
+    def kinds(self, interfaces: dict[str, object]) -> dict[str, object]:
         """Kinds of the interfaces whose coordinates are the same at all factors."""
         return interfaces
 
-    def terms(self, body: FlexibleBody, E: Array) -> dict[str, Any]:
-        """Fields of the family, of its body at the centre of the ranges by shapes (n_local, r)."""
+    def terms(
+        self, body: FlexibleBody, E: Array
+    ) -> tuple[FlexibleBody, tuple[Share, ...], Stretch | None]:
+        """Body, shares and layers of the family, at the centre of the ranges, by (n_local, r)."""
         stress = body.stress.operator if isinstance(body.stress, StressRecovery) else None
-        return {"body": body, "shares": tuple(self.shares(E, stress))}
+        return body, tuple(self.shares(E, stress)), None
 
     def bare(self, point: Point) -> Operators:
         """The model at some factors, without what interfaces carry."""
@@ -201,7 +199,7 @@ class StretchedModel(AffineModel):
         points = self.stretch.mapped(self.model.points, w)
         return replace(self.model, points=points, interfaces=faces)
 
-    def kinds(self, interfaces: dict[str, Any]) -> dict[str, Any]:
+    def kinds(self, interfaces: dict[str, object]) -> dict[str, object]:
         """All motions that are rigid at some thickness, for interfaces that are rigid."""
         for name, kind in interfaces.items():
             if not isinstance(kind, str) or kind != "rbe2":
@@ -232,8 +230,10 @@ class StretchedModel(AffineModel):
         points = own_points(self.ops, self.model_at(point).points)
         return self.ops.varied((0.0, K), (0.0, M), rigid_motions(points))
 
-    def terms(self, body: FlexibleBody, E: Array) -> dict[str, Any]:
-        """Fields of the family: its body at nominal points, shares and layers."""
+    def terms(
+        self, body: FlexibleBody, E: Array
+    ) -> tuple[FlexibleBody, tuple[Share, ...], Stretch | None]:
+        """The body at nominal points, shares and layers."""
         points, middle = own_points(self.ops, self.model.points), self.bare(centre(self.parameters))
         X = self.stretch.fields(points)
         Phi = np.hstack([middle.rigid, E])
@@ -254,11 +254,8 @@ class StretchedModel(AffineModel):
         surface = body.surface
         if surface is not None:
             surface = replace(surface, points=self.model.points[self.model.surface.nodes])
-        return {
-            "body": replace(body, markers=markers, surface=surface),
-            "shares": tuple(shares),
-            "stretch": replace(self.stretch, rigid=rigid),
-        }
+        body = replace(body, markers=markers, surface=surface)
+        return body, tuple(shares), replace(self.stretch, rigid=rigid)
 
     def _coefficients(self, ops: Operators, Phi: Array, R: Array) -> Array:
         """(6 + r, 6) combinations of Phi that give the rigid motions of one field."""

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 from rom.arguments import typed
 from rom.assembly.assembly import Assembly, Place
@@ -74,6 +73,6 @@ class FamilyAssembly:
         point = complete(self.parameters, values)
         bodies = {}
         for name, family in self.families.items():
-            own: dict[str, Any] = {key: point[f"{name}.{key}"] for key in family.parameters}
-            bodies[name] = family.at(**own)
+            own = {key: point[f"{name}.{key}"] for key in family.parameters}
+            bodies[name] = family.at(extrapolate=False, **own)
         return Assembly(bodies, self.couplings)

@@ -75,7 +75,7 @@ class BodyFamily:
     body: FlexibleBody
     parameters: dict[str, Parameter]
     shares: tuple[Share, ...]
-    reference: Any = "mean-axis"
+    reference: object = "mean-axis"
     damping: Rayleigh | ModalDamping | None = None
     provenance: dict[str, Any] = field(default_factory=dict)
     certificate: Report | None = None
@@ -119,7 +119,7 @@ class BodyFamily:
         point = complete(self.parameters, values, extrapolate=extrapolate)
         return self._summed(point, fields=False).frequencies(n, fixed=fixed, springs=springs)
 
-    def with_reference(self, reference: Any) -> "BodyFamily":
+    def with_reference(self, reference: object) -> "BodyFamily":
         """The same family seen from another floating frame.
 
         Raises:

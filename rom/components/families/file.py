@@ -21,6 +21,8 @@ from rom.model import Array
 SCHEMA_NAME = "rom-family"
 VERSION = (1, 1)  # counts like that of the body file
 INTEGRALS = InertiaIntegrals.__slots__
+Damping = Rayleigh | ModalDamping
+Entry = dict[str, Any]  # of a manifest: names, numbers and lists, as JSON has them
 
 
 def save(family: BodyFamily, path: str | Path) -> Path:
@@ -49,9 +51,7 @@ def save(family: BodyFamily, path: str | Path) -> Path:
     return write_archive(path, manifest, arrays, f"family {family.body.name!r}")
 
 
-def load(
-    manifest: dict[str, Any], arrays: dict[str, Array], body: FlexibleBody, path: Path
-) -> BodyFamily:
+def load(manifest: Entry, arrays: dict[str, Array], body: FlexibleBody, path: Path) -> BodyFamily:
     """The family of which a file holds a body; see `rom.load`."""
     with stated(path):
         family = _family(manifest, arrays, body)
@@ -59,7 +59,7 @@ def load(
     return family
 
 
-def _family(manifest: dict[str, Any], arrays: dict[str, Array], body: FlexibleBody) -> BodyFamily:
+def _family(manifest: Entry, arrays: dict[str, Array], body: FlexibleBody) -> BodyFamily:
     frame = manifest["frame"]
     return BodyFamily(
         body,
@@ -73,7 +73,7 @@ def _family(manifest: dict[str, Any], arrays: dict[str, Array], body: FlexibleBo
     )
 
 
-def _layers(stretch: Stretch | None) -> dict[str, Any] | None:
+def _layers(stretch: Stretch | None) -> Entry | None:
     if stretch is None:
         return None
     return {
@@ -83,23 +83,21 @@ def _layers(stretch: Stretch | None) -> dict[str, Any] | None:
     }
 
 
-def _stretch(entry: dict[str, Any] | None, arrays: dict[str, Array]) -> Stretch | None:
+def _stretch(entry: Entry | None, arrays: dict[str, Array]) -> Stretch | None:
     if entry is None:
         return None
     layers = tuple(tuple((low, high) for low, high in part) for part in entry["layers"])
     return Stretch(entry["axis"], tuple(entry["regions"]), layers, arrays["stretch/rigid"])
 
 
-def _share(i: int, entry: dict[str, Any], arrays: dict[str, Array]) -> Share:
-    numbers: dict[str, Any] = {name: arrays[f"share/{i}/{name}"] for name in INTEGRALS}
-    integrals = InertiaIntegrals(**numbers | {"mass": numbers["mass"].item()})
+def _share(i: int, entry: Entry, arrays: dict[str, Array]) -> Share:
+    numbers = {name: arrays[f"share/{i}/{name}"] for name in INTEGRALS if name != "mass"}
+    integrals = InertiaIntegrals(mass=arrays[f"share/{i}/mass"].item(), **numbers)
     K, stress = arrays[f"share/{i}/K"], arrays.get(f"share/{i}/stress")
     return Share(entry["region"], integrals, K, stress, bool(entry["fixed"]))
 
 
-def _damping(
-    damping: Rayleigh | ModalDamping | None,
-) -> tuple[dict[str, Any] | None, dict[str, Array]]:
+def _damping(damping: Damping | None) -> tuple[Entry | None, dict[str, Array]]:
     if isinstance(damping, Rayleigh):
         return {"kind": "Rayleigh", **asdict(damping)}, {}
     if isinstance(damping, ModalDamping):
@@ -109,9 +107,7 @@ def _damping(
     return None, {}
 
 
-def _damping_of(
-    entry: dict[str, Any] | None, arrays: dict[str, Array]
-) -> Rayleigh | ModalDamping | None:
+def _damping_of(entry: Entry | None, arrays: dict[str, Array]) -> Damping | None:
     if entry is None:
         return None
     if entry["kind"] == "Rayleigh":
@@ -125,10 +121,9 @@ def _verify(family: BodyFamily, path: Path) -> None:
     """Shares that fit the body."""
     r, stretch = family.body.n_modes, family.stretch
     n = r if stretch is None else len(stretch.rigid) + 6 + r
-    expected: dict[str, tuple[int, ...]] = {
-        "first_moment": (3,), "inertia": (3, 3), "S": (3, n), "Ibar_kl": (3, 3, n),
-        "S_kl": (3, 3, n, n), "K": (r, r) if stretch is None else (3, 6 + r, 6 + r),
-    }  # fmt: skip
+    expected: dict[str, tuple[int, ...]] = {"first_moment": (3,), "inertia": (3, 3), "S": (3, n)}
+    expected |= {"Ibar_kl": (3, 3, n), "S_kl": (3, 3, n, n)}
+    expected["K"] = (r, r) if stretch is None else (3, 6 + r, 6 + r)
     if isinstance(family.body.stress, StressRecovery):
         expected["stress"] = family.body.stress.operator.shape
     found = [

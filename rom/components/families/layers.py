@@ -11,8 +11,7 @@ the thickness it has there.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.linalg import null_space
@@ -43,7 +42,7 @@ class Stretch:
     axis: int
     regions: tuple[str, ...]
     layers: tuple[tuple[tuple[float, float], ...], ...]
-    rigid: Any = ()
+    rigid: Array = field(default_factory=lambda: np.zeros((0, 0, 6)))
 
     def fields(self, points: Array) -> Array:
         """(2 + number of regions, k, 3): the part that stays, outside all layers, in each region.
@@ -100,9 +99,12 @@ def stretched_body(
     (integrals, stiffness), (k, m, t), (w, at_centre) = terms, factors, weights
     n = w.size
     mass = float((m * t) @ [part.mass for part in integrals])
-    S: Any = sum(c * part.S for c, part in zip(m * t, integrals, strict=True))
-    S_kl: Any = sum(c * part.S_kl for c, part in zip(m * t, integrals, strict=True))
-    K: Any = sum(c * (s * A[0] + A[1] + A[2] / s) for c, s, A in zip(k, t, stiffness, strict=True))
+    S, S_kl = (
+        np.sum([c * getattr(part, name) for c, part in zip(m * t, integrals, strict=True)], axis=0)
+        for name in ("S", "S_kl")
+    )
+    each = zip(k, t, stiffness, strict=True)
+    K = np.sum([c * (s * A[0] + A[1] + A[2] / s) for c, s, A in each], axis=0)
     R = np.einsum("j,jkl->kl", w, stretch.rigid)
     Y = _coordinates(body, R, np.einsum("aakl->kl", S_kl[:, :, n:, n:]))
     second = np.einsum("abij,i,j->ab", S_kl[:, :, :n, :n], w, w)

@@ -12,7 +12,7 @@ import numpy as np
 from rom.arguments import between, number, one_of, typed
 from rom.errors import ParameterError, warn
 from rom.model import Array
-from rom.names import check_text, named
+from rom.names import check_known, check_text
 from rom.plausible import FACTOR, warn_outside
 
 MAX_CORNER_PARAMETERS = 3  # all corners of the range are visited up to here
@@ -119,7 +119,7 @@ class Thickness(Parameter):
 KINDS = {kind.__name__: kind for kind in (YoungsModulus, Density, Thickness)}
 
 
-def checked_parameters(parameters: dict[str, Any]) -> dict[str, Parameter]:
+def checked_parameters(parameters: dict[str, Parameter]) -> dict[str, Parameter]:
     """The parameters by name, if they are such."""
     for name, value in parameters.items():
         if type(value) not in KINDS.values():
@@ -140,21 +140,19 @@ def checked_parameters(parameters: dict[str, Any]) -> dict[str, Parameter]:
 
 
 def complete(
-    parameters: dict[str, Parameter], values: dict[str, Any], *, extrapolate: bool = False
+    parameters: dict[str, Parameter], values: dict[str, float], *, extrapolate: bool = False
 ) -> Point:
     """Factors of all parameters, positive and within their ranges; one for those not given.
 
     Those outside a range are refused, or announced where one extrapolates.
     """
-    if unknown := sorted(set(values) - set(parameters)):
-        raise ParameterError(
-            f"there is no parameter {named(unknown)}; the family has {sorted(parameters)}."
-        )
+    for name in values:
+        check_known(name, parameters, f"no parameter {name!r}; the family has", ParameterError)
     each = parameters.items()
     return {name: _checked(name, p, values.get(name, 1.0), extrapolate) for name, p in each}
 
 
-def _checked(name: str, parameter: Parameter, value: Any, extrapolate: bool) -> float:
+def _checked(name: str, parameter: Parameter, value: float, extrapolate: bool) -> float:
     number = np.ndim(value) == 0 and not isinstance(value, bool | str)
     if not (number and np.isfinite(value) and value > 0):
         raise ParameterError(f"{name} = {value!r} must be a positive factor.")
@@ -220,12 +218,12 @@ def factors(
     return k, m
 
 
-def written(parameters: dict[str, Parameter]) -> dict[str, Any]:
+def written(parameters: dict[str, Parameter]) -> dict[str, dict[str, object]]:
     """The parameters in plain numbers and words."""
     return {name: {"kind": type(p).__name__, **asdict(p)} for name, p in parameters.items()}
 
 
-def read(text: dict[str, Any]) -> dict[str, Parameter]:
+def read(text: dict[str, dict[str, Any]]) -> dict[str, Parameter]:
     """The parameters that were `written`."""
     fields = {name: dict(entry) for name, entry in text.items()}
     return {name: KINDS[entry.pop("kind")](**entry) for name, entry in fields.items()}

@@ -12,7 +12,7 @@ are estimated as the basis grows, and compared with full models where it was not
 
 import logging
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import partial
 
 import numpy as np
 
@@ -84,8 +84,8 @@ def reduce_parametric(  # noqa: PLR0913  one keyword per choice
     *,
     parameters: dict[str, Parameter],
     method: Method | Characteristic,
-    interfaces: dict[str, Any],
-    reference: Any = "mean-axis",
+    interfaces: dict[str, object],
+    reference: object = "mean-axis",
     damping: Rayleigh | ModalDamping | None = None,
     name: str = "body",
     stress: bool = False,
@@ -139,11 +139,10 @@ def reduce_parametric(  # noqa: PLR0913  one keyword per choice
     between("tol", tol, 0, 1, "()")
     affine = _affine(model, checked_parameters(parameters), stress)
     middle = centre(affine.parameters)
-    draft = FamilyDraft(
-        model=affine.model_at(middle), method=method, interfaces=affine.kinds(interfaces),
-        reference=reference, damping=damping, name=name, stress=stress, certify=certify,
-        affine=affine, tol=tol, samples=[middle],
-    )  # fmt: skip
+    start = partial(FamilyDraft, affine=affine, tol=tol, samples=[middle])
+    start = partial(start, model=affine.model_at(middle), method=method, name=name, stress=stress)
+    kinds = affine.kinds(interfaces)
+    draft = start(interfaces=kinds, reference=reference, damping=damping, certify=certify)
     draft.ops, draft.bare = affine.at(middle), affine.bare(middle)
     family = run(stages(draft), draft)
     family.provenance["seconds to reduce"] = draft.seconds
@@ -177,12 +176,9 @@ def share_out(draft: FamilyDraft) -> None:
     reduction = provenance["reduction"]
     reduction["points sampled"] = draft.samples
     del reduction["frequencies of the modes kept [Hz]"]  # those of the centre, where they are known
-    draft.body = BodyFamily(
-        parameters=draft.affine.parameters,
-        damping=draft.damping,
-        provenance=provenance,
-        **draft.affine.terms(draft.body, draft.E),
-    )
+    body, shares, stretch = draft.affine.terms(draft.body, draft.E)
+    family = BodyFamily(body, draft.affine.parameters, shares, damping=draft.damping)
+    draft.body = replace(family, provenance=provenance, stretch=stretch)
 
 
 def _affine(model: FEModel, parameters: dict[str, Parameter], stress: bool) -> AffineModel:
@@ -226,8 +222,8 @@ def join_bases(draft: FamilyDraft) -> None:
     added = [visit(point, whatever=False) for point in trials]
     draft.basis = common.basis
     if affine.ops.first == 0:
-        log.info("%d points sampled, %d of them trials; %d columns", len(draft.samples), sum(added),
-                 common.basis.Psi.shape[1])  # fmt: skip
+        counts = len(draft.samples), sum(added), common.basis.Psi.shape[1]
+        log.info("%d points sampled, %d of them trials; %d columns", *counts)
 
 
 @dataclass(frozen=True, slots=True)
@@ -334,14 +330,14 @@ def certify(draft: FamilyDraft) -> None:
     if affine.stretch is not None:  # its interfaces are rigid at each thickness in another way
         kinds = dict.fromkeys(kinds, "rbe2")
     rows: list[Row] = []
-    comparison: dict[str, Any] = {}
+    comparison = {}
     own = replace(basis, held=None)  # of another point
     for point in scattered(affine.parameters, HELD_OUT, 1 + draft.n_trials):
         where = ", ".join(f"{name} = {value:.4g}" for name, value in point.items())
         ops, body = affine.at(point), family.at(extrapolate=False, **point)
         here = connected(ops, affine.model_at(point), kinds)
         found: list[Row] = []
-        reduction: Any = None  # the basis of a stretched body depends on the thickness
+        reduction = None  # the basis of a stretched body depends on the thickness
         if affine.stretch is None:
             matrices = basis_matrices(here.ops, basis)
             reduction = basis, condensed_model(here, own, matrices[0]), matrices

@@ -17,7 +17,7 @@ Source:
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
@@ -27,7 +27,9 @@ from rom.arguments.quantities import Count, Positive
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.model import Array, Index
 
-Assembles = Callable[[Array, Array], Any]  # angles of equal shape (...) -> (...) true or false
+Assembles = Callable[
+    [Array, Array], npt.ArrayLike
+]  # angles of equal shape (...) -> (...) true or false
 Inertia = Callable[[Array, Array], Array]  # angles of equal shape (...) -> (..., 2, 2)
 Range = tuple[float, float] | None  # of a coordinate [rad or m]; None: a whole turn
 Ranges = tuple[Range, Range]

@@ -35,6 +35,7 @@ from rom.mbs.integrate.consistent_start import assembled
 from rom.mbs.kernels.work import workspace
 from rom.mbs.mechanism import Mechanism
 from rom.model import Array, Index
+from rom.names import check_known
 
 KEPT_POSTURES = 4096  # whose inertia is known: asking whether it exists costs nothing more
 # of a drive between two assemblies [rad, or sizes of the mechanism]: farther, it closes elsewhere
@@ -255,8 +256,8 @@ class Driven:
         rows = [int(k) for name in drives for k in self._packed.rows_of(name)]
         if len(rows) != 2 or not set(drives) <= set(mechanism.drives):
             raise ConfigError(f"{drives!r} must be two of the drives {sorted(mechanism.drives)}.")
-        if tool is not None and tool not in self._packed.names:
-            raise ConfigError(f"the tool {tool!r} is none of {list(self._packed.names)}.")
+        if tool is not None:
+            check_known(tool, self._packed.names, f"the tool {tool!r} is none of")
         self._rows, self._tool = np.array(rows), tool
         self._work = workspace(self._packed.system, len(self._packed.signals))
         self._known = lru_cache(KEPT_POSTURES)(self._found)

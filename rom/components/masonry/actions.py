@@ -9,9 +9,10 @@ Source:
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 from scipy.spatial import Delaunay
 
 from rom.arguments import typed, whole
@@ -271,8 +272,7 @@ def driver(masonry: Masonry, actions: Sequence[Action]) -> Callable[[Array], Dri
             support jumps in one step.
     """
     moved = [s for a in actions if isinstance(a, SupportMotion) for s in a.stones]
-    twice = sorted({s for s in moved if moved.count(s) > 1})
-    if twice:
+    if twice := sorted({s for s in moved if moved.count(s) > 1}):
         raise ConfigError(f"supports {twice} are moved by two actions; only one may move each.")
     loads = [a.begin(masonry) for a in actions if isinstance(a, PointLoad | MovingLoad | Wind)]
     supports = [a.begin(masonry) for a in actions if isinstance(a, SupportMotion)]
@@ -283,7 +283,7 @@ def driver(masonry: Masonry, actions: Sequence[Action]) -> Callable[[Array], Dri
     def at(t: Array) -> Drive:
         middle = (t[1:] + t[:-1]) / 2
         n = len(middle)
-        parts = [_forces([], [], [], np.zeros((n, 0, 2))), *(load(middle) for load in loads)]
+        parts = [_forces(-1, 0, 0.0, np.zeros((n, 0, 2))), *(load(middle) for load in loads)]
         *columns, turned = zip(*parts, strict=True)
         block, corner, share, force = (np.concatenate(x, axis=1) for x in columns)
         turns = np.concatenate(turned)
@@ -302,17 +302,20 @@ def driver(masonry: Masonry, actions: Sequence[Action]) -> Callable[[Array], Dri
     return at
 
 
-def _forces(block: Any, corner: Any, share: Any, force: Array, *, turns: int = 0) -> Forces:
+def _forces(
+    block: npt.ArrayLike,
+    corner: npt.ArrayLike,
+    share: npt.ArrayLike,
+    force: Array,
+    *,
+    turns: int = 0,
+) -> Forces:
     """Forces (n, L, 2) at places that are given for each of the n times, or for all of them."""
     n, count = force.shape[:2]
-    wide = (n, count, 3) if count else (n, 0)
-    return Forces(
-        np.broadcast_to(np.array(block, dtype=np.int64), (n, count)),
-        np.broadcast_to(np.array(corner, dtype=np.int64), wide).reshape(n, count, 3),
-        np.broadcast_to(np.array(share, dtype=float), wide).reshape(n, count, 3),
-        force,
-        np.full(count, turns),
-    )
+    blocks = np.broadcast_to(np.asarray(block, dtype=np.int64), (n, count))
+    corners = np.broadcast_to(np.asarray(corner, dtype=np.int64), (n, count, 3))
+    shares = np.broadcast_to(np.asarray(share, dtype=float), (n, count, 3))
+    return Forces(blocks, corners, shares, force, np.full(count, turns))
 
 
 def _moving(name: str, stone: int, masonry: Masonry) -> int:

@@ -5,7 +5,7 @@ momentum. Its edges stay straight between their corners.
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -111,11 +111,12 @@ class Contacts(NamedTuple):
 
 def contacts(capacity: int, m: int, n_blocks: int) -> Contacts:
     """Room for contacts of blocks with at most m coordinates."""
-    shapes = ((), (), (), (), (), (), (), (), (4,), (2, m), (2, m))
-    rows: list[Any] = [np.zeros((capacity, *shape)) for shape in shapes]
-    rows[0], rows[7] = rows[0].astype(np.int64), rows[7].astype(np.int64)
-    rows += [np.zeros(n_blocks + 1, dtype=np.int64), np.zeros((n_blocks, 2, 2))]
-    return Contacts(np.zeros(1, dtype=np.int64), np.zeros((capacity, 5), dtype=np.int64), *rows)
+    sizes = 1, (capacity, 5), capacity, capacity, n_blocks + 1
+    used, who, state, bond, first = (np.zeros(size, dtype=np.int64) for size in sizes)
+    along, n, t = (np.zeros((capacity, *shape)) for shape in ((4,), (2, m), (2, m)))
+    numbers = np.zeros((6, capacity))  # from anchor to friction
+    box = np.zeros((n_blocks, 2, 2))
+    return Contacts._make([used, who, state, *numbers, bond, along, n, t, first, box])
 
 
 @inner
@@ -161,8 +162,9 @@ def outside(box, j, x, y, reach):
     """Whether a point is too far from the box around block j to meet an edge of it."""
     over = EDGE_OVERHANG_RTOL * (box[j, 0, 1] - box[j, 0, 0] + box[j, 1, 1] - box[j, 1, 0])
     over += reach
-    return (x < box[j, 0, 0] - over or x > box[j, 0, 1] + over
-            or y < box[j, 1, 0] - over or y > box[j, 1, 1] + over)  # fmt: skip
+    if x < box[j, 0, 0] - over or x > box[j, 0, 1] + over:
+        return True
+    return y < box[j, 1, 0] - over or y > box[j, 1, 1] + over
 
 
 @inner

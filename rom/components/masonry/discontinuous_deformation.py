@@ -69,11 +69,9 @@ def work(B: Blocks) -> Work:
     """Memory for steps of these blocks."""
     V, (b, m) = len(B.corner), B.load.shape
     n = int(B.size[B.equation >= 0].sum())
-    return Work(
-        np.zeros((V, 2)), np.zeros((V, 2, m)), np.zeros((n, n)), np.zeros((n, n)),
-        np.zeros(n, dtype=np.int64), np.zeros(n), np.zeros((b, m)), np.zeros((b, m)),
-        np.zeros((b, m)), np.zeros((b, m)),
-    )  # fmt: skip
+    P, T, A, U = (np.zeros(shape) for shape in ((V, 2), (V, 2, m), (n, n), (n, n)))
+    d, q, v, load = np.zeros((4, b, m))
+    return Work(P, T, A, U, np.zeros(n, dtype=np.int64), np.zeros(n), d, q, v, load)
 
 
 @inner

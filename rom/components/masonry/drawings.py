@@ -1,8 +1,8 @@
 """Stones drawn as plane surfaces, in gmsh for instance: outlines, joints and what is wrong."""
 
+import re
 from collections.abc import Mapping, Sequence
 from itertools import product
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -48,8 +48,8 @@ def drawn(
     """
     x = finite("points", points, (None, 2), error=ModelError)
     T = _numbers_below("triangles", triangles, (None, 3), len(x))
-    rows = {name: _numbers_below(f"stone {name!r}", chosen, None, len(T)).ravel()
-            for name, chosen in surfaces.items()}  # fmt: skip
+    each = surfaces.items()
+    rows = {name: _numbers_below(f"stone {name!r}", k, None, len(T)).ravel() for name, k in each}
     rock, names = rock or Rock(), list(rows)
     outlines = [x[_outline(name, x, T[chosen])] for name, chosen in rows.items()]
     fixed = {k for name in held for k in _numbers(name, names)}
@@ -62,22 +62,20 @@ def drawn(
     return masonry
 
 
-def _numbers_below(what: str, given: npt.ArrayLike, shape: Any, count: int) -> Index:
+def _numbers_below(
+    what: str, given: npt.ArrayLike, shape: tuple[None, int] | None, count: int
+) -> Index:
     """Whole numbers that count from 0."""
     found = finite(what, given, shape, error=ModelError)
-    numbers = found.astype(np.int64)
-    if (numbers != found).any():
-        raise ModelError(f"{what}: {found[numbers != found][0]} must be a whole number.")
-    if numbers.size and not 0 <= numbers.min() <= numbers.max() < count:
-        got = f"{numbers.min()} to {numbers.max()}"
-        raise ModelError(f"{what} must be 0 to {count - 1}, got {got}.")
-    return numbers
+    if (wrong := (found % 1 != 0) | (found < 0) | (found >= count)).any():
+        needed = f"must be a whole number, 0 to {count - 1}"
+        raise ModelError(f"{what}: {found[wrong][0]:g} {needed}.")
+    return found.astype(np.int64)
 
 
 def _numbers(name: str, names: list[str]) -> list[int]:
-    parts = ((k, one.rpartition(" ")) for k, one in enumerate(names))
-    found = [k for k, (group, _, part) in parts
-             if names[k] == name or (group == name and part.isdigit())]  # fmt: skip
+    meant = re.compile(rf"{re.escape(name)}( \d+)?")
+    found = [k for k, one in enumerate(names) if meant.fullmatch(one)]
     if not found:
         raise ConfigError(f"held is {name!r}, which is no stone; use one of {names}.")
     return found

@@ -12,7 +12,7 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 
@@ -78,7 +78,7 @@ def read_joints(path: str | Path) -> tuple[Joint, ...]:
     return tuple(_law(f"{path}, joint {k + 1}", law) for k, law in enumerate(laws))
 
 
-def _law(where: str, law: Any) -> Joint:
+def _law(where: str, law: object) -> Joint:
     if not isinstance(law, Mapping) or not {"friction"} <= set(law) <= LAW_KEYS:
         keys = sorted(law) if isinstance(law, Mapping) else law
         needed = "It needs friction, and may have between, cohesion and tension."
@@ -96,13 +96,13 @@ def _law(where: str, law: Any) -> Joint:
         raise ConfigError(error.message, where=where, hint=error.hint) from error
 
 
-def _number(value: Any, unit: str) -> float:
+def _number(value: object, unit: str) -> float:
     if isinstance(value, bool) or not isinstance(value, str | int | float):
         raise TypeError(f"{value!r} is no number.")
     return float(in_si(value, unit)) if isinstance(value, str) else float(value)
 
 
-def _count(value: Any) -> int:
+def _count(value: object) -> int:
     if isinstance(value, bool) or not isinstance(value, int):
         raise TypeError(f"between = ...{value!r}: stones go by their numbers.")
     return value
@@ -177,6 +177,5 @@ def _check_touch(joints: Sequence[Joint], touching: Index, n: int) -> None:
         rows = _pairs(joint, n) if joint.cohesion or joint.tension else None
         for pair in [] if rows is None else np.sort(rows, axis=1).tolist():
             if tuple(pair) not in there:
-                text = f"stones {pair[0]} and {pair[1]} do not touch along an edge at the start"
-                raise ConfigError(f"{text}: no joint of theirs could be glued.",
-                                  hint="Name pairs that touch, or lay them closer.")  # fmt: skip
+                text = f"stones {pair[0]} and {pair[1]} do not touch along an edge at the start."
+                raise ConfigError(text, hint="Name pairs that touch, or lay them closer.")

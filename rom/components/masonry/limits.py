@@ -15,10 +15,10 @@ Source:
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq, linprog, minimize_scalar
+from scipy.optimize import OptimizeResult, brentq, linprog, minimize_scalar
 from scipy.sparse import coo_matrix, hstack
 
 from rom.arguments import Between, Count, Length, Positive, between, typed
@@ -97,8 +97,9 @@ def arch(
     rock = rock or Rock()
     joints = np.linspace(-half_angle, half_angle, n + 1)
     inner, outer = radius - thickness / 2, radius + thickness / 2
-    stones = [rock.stone(*(_sector(inner, outer, np.linspace(*ends, m)) for m in (2, 33)))
-              for ends in pairwise(joints)]  # fmt: skip
+    ends = list(pairwise(joints))
+    coarse, fine = ([_sector(inner, outer, np.linspace(*e, m)) for e in ends] for m in (2, 33))
+    stones = map(rock.stone, coarse, fine)
     left, right = (_springer(inner, outer, half_angle * side) for side in (-1, 1))
     return rock.masonry([rock.stone(left), *stones, rock.stone(right)], (0, n + 1))
 
@@ -152,8 +153,8 @@ def wall(
             )
     stones = [rock.stone(_box(-b, length + b, -h, 0.0))]
     for r in range(courses):
-        holes = sorted((x - b / 2 * (r == top), y + b / 2 * (r == top), r == top)
-                       for x, y, low, top in openings if low <= r <= top)  # fmt: skip
+        here = [(x, y, r == top) for x, y, low, top in openings if low <= r <= top]
+        holes = sorted((x - b / 2 * lintel, y + b / 2 * lintel, lintel) for x, y, lintel in here)
         if any(one[1] > other[0] + 1e-9 for one, other in pairwise(holes)):
             text = f"in course {r} of the wall two of the openings {openings} meet."
             raise ConfigError(text, hint="Leave a brick between two lintels.")
@@ -189,8 +190,6 @@ def stands(masonry: Masonry, loads: Sequence[Load] = (), *, t: float = 0.0) -> b
     system = _joint_forces(masonry)
     carried = system.weight + _applied(masonry, loads, t)
     found = _solve(system, carried, np.zeros((len(carried), 0)))
-    if found.status not in (0, 2):
-        raise SolverError(f"no answer whether the masonry stands: {found.message}")
     return bool(found.status == 0)
 
 
@@ -217,17 +216,15 @@ def load_factor(masonry: Masonry, loads: Sequence[Load], *, t: float = 0.0) -> f
     found = _solve(system, system.weight, load[:, None])
     if found.status == 2:
         raise ConfigError("the masonry does not stand by itself; it needs thickness or friction.")
-    if found.status not in (0, 3):
-        raise SolverError(f"no load factor: {found.message}")
     return float(found.x[-1]) if found.status == 0 else np.inf
 
 
 class _System(NamedTuple):
     """Equilibrium of free stones: balance of joint forces, weight, and Coulomb's law."""
 
-    balance: Any
+    balance: coo_matrix
     weight: Array
-    slip: Any
+    slip: coo_matrix
     cohesion: Array
     pull: Array
 
@@ -282,17 +279,21 @@ def _applied(masonry: Masonry, loads: Sequence[Load], t: float) -> Array:
     return total
 
 
-def _solve(system: _System, carried: Array, factored: Array) -> Any:
-    """The largest sum of factors of the columns of ``factored``; they come last."""
+def _solve(system: _System, carried: Array, factored: Array) -> OptimizeResult:
+    """The largest sum of factors of the columns of ``factored``, which come last, if it answers.
+
+    The status is 0, 2 where nothing balances, or 3 where factors grow without bound.
+    """
     unit, n = float(np.abs(carried).max()), len(system.pull)
     n_factors = factored.shape[1]
     slip = hstack([system.slip, coo_matrix((2 * n, n_factors))])
     balance = hstack([system.balance, factored / unit])
-    bounds = [(-x / unit, None) for x in system.pull] + [(None, None)] * n
-    return linprog(
-        np.r_[np.zeros(2 * n), -np.ones(n_factors)], slip, system.cohesion / unit, balance,
-        -carried / unit, bounds + [(0, None)] * n_factors, method="highs",
-    )  # fmt: skip
+    bounds = [(-x / unit, None) for x in system.pull] + [(None, None)] * n + [(0, None)] * n_factors
+    cost, known = np.r_[np.zeros(2 * n), -np.ones(n_factors)], (balance, -carried / unit)
+    found = linprog(cost, slip, system.cohesion / unit, *known, bounds, method="highs")
+    if found.status not in (0, 2, 3):
+        raise SolverError(f"no answer whether the masonry stands: {found.message}")
+    return found
 
 
 @dataclass(frozen=True, slots=True)

@@ -71,10 +71,9 @@ class Motion:
             slide = C.way[k] * C.friction[k] * C.force[k]
             drag = slide if C.state[k] == SLIDES else shear * C.slip[k]
             force = C.force[k] * normal - drag * np.array([-normal[1], normal[0]])
-            x, f, total = sums.get((min(i, j), max(i, j)), (np.zeros(2), np.zeros(2), 0.0))
-            sums[min(i, j), max(i, j)] = (
-                x + C.force[k] * corners[a], f + (force if i < j else -force), total + C.force[k]
-            )  # fmt: skip
+            pair, force = (min(i, j), max(i, j)), force if i < j else -force
+            x, f, total = sums.get(pair, (np.zeros(2), np.zeros(2), 0.0))
+            sums[pair] = x + C.force[k] * corners[a], f + force, total + C.force[k]
         return {
             pair: (x / total if total > 0 else np.full(2, np.nan), f)
             for pair, (x, f, total) in sorted(sums.items())

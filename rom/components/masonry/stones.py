@@ -10,7 +10,7 @@ Source:
 """
 
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -207,16 +207,15 @@ class Masonry:
         return law._replace(bonds=b._replace(pull=t * b.pull, cohesion=t * b.cohesion))
 
     def _watch(self) -> Law:
-        edges = [np.linalg.norm(s.outline - np.roll(s.outline, 1, axis=0), axis=1).min()
-                 for s in self.stones]  # fmt: skip
+        sides = (s.outline - np.roll(s.outline, 1, axis=0) for s in self.stones)
+        edges = [np.linalg.norm(along, axis=1).min() for along in sides]
         weight = np.mean([s.M[0, 0] for s in self.stones]) * np.linalg.norm(self.gravity)
         reach = CONTACT_REACH_RATIO * min(edges) if self.reach is None else self.reach
         p, free = float(self.stiffness), np.zeros(0)
         friction = friction_of_pairs(self.joints, self.friction, len(self.stones))
-        return Law(
-            p, SHEAR_STIFFNESS_RATIO * p, TENSION_RTOL * weight, float(reach), friction,
-            Bonds(np.zeros((0, 5), dtype=np.int64), free, free, free.astype(np.int64)),
-        )  # fmt: skip
+        none = Bonds(np.zeros((0, 5), dtype=np.int64), free, free, free.astype(np.int64))
+        tension = TENSION_RTOL * weight
+        return Law(p, SHEAR_STIFFNESS_RATIO * p, tension, float(reach), friction, none)
 
     def start(self) -> Array:
         """(B, 3 + R) coordinates at the start [m, rad]: mass centre, angle zero, no deformation."""
@@ -265,5 +264,5 @@ def _touching(B: Blocks, law: Law, q: Array) -> Contacts:
     V, m = len(B.corner), B.load.shape[1]
     C, none = (contacts(room, m, len(B.size)) for room in (8 * V, 0))
     find_contacts(B, law, q, none, C, np.zeros((V, 2)), np.zeros((V, 2, m)))
-    rows: list[Any] = [C.used, *(x[: C.used[0]] for x in C[1:-2]), C.first, C.box]
-    return Contacts(*rows)
+    used = {name: getattr(C, name)[: C.used[0]] for name in C._fields[1:-2]}
+    return C._replace(**used)

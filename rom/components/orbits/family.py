@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 from scipy.integrate import trapezoid
@@ -11,7 +10,7 @@ from rom.arguments import positive
 from rom.components.orbits.derivatives import Tangent, by_differences, by_steps, follows
 from rom.components.orbits.flow import Flow, Start
 from rom.components.orbits.motion import GOOD_RATIO, PeriodicMotion, Shooting
-from rom.components.orbits.shooting import Return, Turns, turns_of
+from rom.components.orbits.shooting import Chart, Return, Turns, turns_of
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.mbs.mechanism import Mechanism
 from rom.model import Array
@@ -106,7 +105,7 @@ class Family:
         flow = self.flow(p, motion.period)
         return Member(flow.begun(motion.state), motion.period)
 
-    def returned(self, at: Member, p: float, basis: Any = None) -> Return:
+    def returned(self, at: Member, p: float, basis: Chart | None = None) -> Return:
         """What comes of a start."""
         flow = self.flow(p, at.period)
         return Return.of(flow, self.turning(flow, at.start), at.start, basis)

@@ -200,11 +200,11 @@ class Flow:
         if self.step is None:
             like = replace(state, algorithmic=state.a)
             self.step = begin(self.record, self.W, like, self.packed.asked, self.settings.h)[0]
-        step: Any = self.step
+        step = self.step
         for memory in (step.work, step.lost, step.psi, step.drift):
             memory[:] = 0.0
-        step.q[:], step.v[:], step.vd[:], step.lam[:] = (
-            state.q, state.v + start.ahead, state.a, state.lam)  # fmt: skip
+        step.q[:], step.v[:] = state.q, state.v + start.ahead
+        step.vd[:], step.lam[:] = state.a, state.lam
         step.a[:] = state.a + start.later
         step.size[[0, 4]] = 0.0
         step.count[:] = 0
@@ -274,7 +274,9 @@ class Beside:
         self.q, self.v, self.vd = still_q + by_q @ x, still_v + by_v * x, x
         self.a = known + share * x
 
-    def _matrices(self, step: Any, base: Array, signal: Array) -> tuple[Array, Array, Array, Array]:
+    def _matrices(
+        self, step: Step, base: Array, signal: Array
+    ) -> tuple[Array, Array, Array, Array]:
         """Derivatives by accelerations, velocities and positions; gradient of the constraints."""
         now, W = self.now, self.now.W
         W.base[:], W.signal[:] = base, signal
@@ -301,10 +303,8 @@ def _bordered(A: Array, G: Array, by: Array, force: Array, gap: Array) -> Array:
     size = np.sqrt(np.abs(np.diag(A)))
     rows = np.maximum(np.linalg.norm(by / size, axis=1), 1e-300)
     columns = np.maximum(np.linalg.norm(G / size, axis=1), 1e-300)
-    whole = np.block([
-        [A / np.outer(size, size), (G / size / columns[:, None]).T],
-        [by / size / rows[:, None], np.zeros((len(G), len(G)))],
-    ])  # fmt: skip
+    upper = [A / np.outer(size, size), (G / size / columns[:, None]).T]
+    lower = [by / size / rows[:, None], np.zeros((len(G), len(G)))]
     right = np.vstack([force / size[:, None], gap / rows[:, None]])
-    found = np.linalg.lstsq(whole, right, rcond=REDUNDANT_RTOL)[0]
+    found = np.linalg.lstsq(np.block([upper, lower]), right, rcond=REDUNDANT_RTOL)[0]
     return found[: size.size] / size[:, None]

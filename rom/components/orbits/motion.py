@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Annotated
 
 import numpy as np
@@ -183,12 +183,9 @@ class Shooting:
 
     def solution(self, found: Return) -> Solution:
         """The motion over one period."""
-        flow, state = found.flow, found.flow.given(found.start)
-        h = flow.settings.h
-        return simulate(
-            self.mechanism, t_start=self.t0, t_end=self.t0 + flow.period, dt=h, state=state,
-            rho_inf=self.rho_inf, tolerance=1e-12,
-        )  # fmt: skip
+        flow, run = found.flow, partial(simulate, rho_inf=self.rho_inf, tolerance=1e-12)
+        run = partial(run, t_start=self.t0, t_end=self.t0 + flow.period, dt=flow.settings.h)
+        return run(self.mechanism, state=flow.given(found.start))
 
 
 @typed
@@ -251,10 +248,9 @@ def recorded(shooting: Shooting, tangent: Tangent, passes: int) -> PeriodicMotio
     """What is handed to the user of a motion that was found."""
     found = tangent.around
     angles = found.turns.angles(found.start.state, found.end)
-    return PeriodicMotion(
-        shooting.solution(found), found.flow.period, tangent.multipliers, shooting.period is None,
-        found.open, passes, angles, found.flow.runs[0], tangent.kept,
-    )  # fmt: skip
+    free, multipliers = shooting.period is None, tangent.multipliers
+    motion = shooting.solution(found), found.flow.period, multipliers, free, found.open
+    return PeriodicMotion(*motion, passes, angles, found.flow.runs[0], tangent.kept)
 
 
 @typed

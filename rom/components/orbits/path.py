@@ -2,8 +2,8 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Annotated, Any
+from functools import cached_property, partial
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
@@ -37,6 +37,8 @@ LOCATION_RTOL = 1e-4  # of a step: multipliers are differences
 LEAST_SIZE_RATIO = 0.1  # of the largest motion so far, below which steps do not shrink with it
 MAX_POINTS = 100_000
 CROSSING_TOL = 1e-2  # of a multiplier from the unit circle at a motion that is critical
+Test = Callable[[PeriodicMotion], float]
+Complex = npt.NDArray[np.complex128]
 REAL_TOL = 1e-6  # imaginary part of a multiplier that counts as none
 
 
@@ -82,7 +84,7 @@ class PeriodicPath:
         """(k,) periods [s]."""
         return np.array([motion.period for motion in self.motions])
 
-    def of(self, f: Callable[[Solution], Any]) -> Array:
+    def of(self, f: Callable[[Solution], npt.ArrayLike]) -> Array:
         """(k, ...) a number or an array of every motion, as its amplitude.
 
         Args:
@@ -142,14 +144,12 @@ def periodic_path(  # noqa: PLR0913  one keyword per choice, most have defaults
     first, last = finite("span", span, (2,))
     if first == last:
         raise ConfigError(f"span = ({first:g}, {last:g}) needs two values that differ.")
-    T = period_at(period, first)
-    begin = periodic_motion(
-        build(first), period=T, start=start, turns=turns, steps=steps, rho_inf=rho_inf,
-        guess=guess, settle=settle, progress=progress,
-    )  # fmt: skip
+    looked = partial(periodic_motion, build(first), period=period_at(period, first), start=start)
+    looked = partial(looked, turns=turns, steps=steps, rho_inf=rho_inf, progress=progress)
+    begin = looked(guess=guess, settle=settle)
     scale = Flow(begin.solution.mechanism, begin.state.t, begin.period, steps, rho_inf).probe
-    family = Family(build, period, begin, turns, steps, rho_inf, abs(last - first), scale,
-                     0.0 * scale)  # fmt: skip
+    size, still = abs(last - first), 0.0 * scale
+    family = Family(build, period, begin, turns, steps, rho_inf, size, scale, still)
     march = _March(family, (first, last), progress)
     with reached(lambda: march.path):
         march.go(begin, step, n)
@@ -239,8 +239,8 @@ class _March:
                 continue
             known = {id(one): values[0]}
 
-            def value(x: Point, test: Any = test, known: Any = known) -> float:
-                return float(known[id(x)]) if id(x) in known else test(self.motion(x))
+            def value(x: Point, test: Test = test, known: dict[int, float] = known) -> float:
+                return known[id(x)] if id(x) in known else test(self.motion(x))
 
             self.note(kind, self.curve.located(one, h, value, LOCATION_RTOL)[1])
 
@@ -260,12 +260,12 @@ def _pairs(motion: PeriodicMotion) -> float:
 
 
 # what changes its sign where a multiplier crosses the circle, and distances from where it crosses
-TESTS: dict[str, Callable[[PeriodicMotion], float]] = {
+TESTS: dict[str, Test] = {
     "branch": lambda motion: float(np.prod(motion.deviations - 1.0).real),
     "flip": lambda motion: float(np.prod(motion.deviations + 1.0).real),
     "Neimark-Sacker": _pairs,
 }
-ON_CIRCLE: dict[str, Callable[[Any], Any]] = {
+ON_CIRCLE: dict[str, Callable[[Complex], Array]] = {
     "branch": lambda found: np.abs(found - 1.0),
     "flip": lambda found: np.abs(found + 1.0),
     "Neimark-Sacker": lambda found: np.abs(np.abs(found[np.abs(found.imag) > REAL_TOL]) - 1.0),

@@ -25,7 +25,7 @@ from rom.mbs.parts.bodies import GROUND, Part
 from rom.mbs.parts.joints import Joint
 from rom.mbs.results.state import State
 from rom.model import Array
-from rom.names import offered
+from rom.names import check_known
 
 RANK_RTOL = 1e-9  # singular value of constraints that repeat others, of the largest one
 SYMMETRY_RTOL = 1e-8  # of inertia: by which a body may look different after its turn
@@ -153,9 +153,8 @@ def _hinged(
     """Body, axis and a point of it in the frame of the body, and the sign of its angle."""
     if name in mechanism.joints:
         return _of_joint(mechanism, mechanism.joints[name])
-    if name not in mechanism.parts:
-        known = [*(n for n, j in mechanism.joints.items() if j.turn), *mechanism.parts]
-        raise ConfigError(f"turns: no joint or body {name!r}; there are {offered(known, name)}.")
+    known = [*(n for n, j in mechanism.joints.items() if j.turn), *mechanism.parts]
+    check_known(name, known, f"turns: no joint or body {name!r}; there are")
     at = places[name][1]
     return name, _own_axis(mechanism.parts[name], state.v[at + 3 : at + 6]), np.zeros(3), 1.0
 

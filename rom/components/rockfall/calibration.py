@@ -7,7 +7,6 @@ Source:
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -16,6 +15,7 @@ from rom.components.histories import Table
 from rom.components.rockfall.impact import Gallery, Impact, scaled, strike
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.model import Array
+from rom.names import check_known
 
 CHANNELS: dict[str, Callable[[Gallery, Impact], Array]] = {
     "acceleration of the boulder": lambda g, i: i.forces[:, 0] / g.boulder,  # as a sensor reads it
@@ -25,10 +25,8 @@ CHANNELS: dict[str, Callable[[Gallery, Impact], Array]] = {
     "penetration": lambda _, i: i.z[:, 0] - i.z[:, 1],
     "deflection": lambda _, i: i.z[:, 2],
 }
-FIVE_PARAMETERS = (
-    "stiffness of the cushion", "recovery of the cushion", "mass of the plug",
-    "stiffness in bending", "damping of the slab",
-)  # fmt: skip
+OF_CUSHION = ("stiffness of the cushion", "recovery of the cushion")
+FIVE_PARAMETERS = (*OF_CUSHION, "mass of the plug", "stiffness in bending", "damping of the slab")
 MAX_FACTOR = 30.0  # by which a parameter may leave its first value
 MAX_GAP = 5.0  # a step of time that is so many medians long is a gap
 MIN_INSTANTS = 8  # of a history, so that its scatter says something
@@ -92,10 +90,13 @@ class Calibration:
     evaluations: int
 
 
+Names = Sequence[str]
+Measured = dict[str, History | Sequence[History]]
+
+
 def calibrate(
-    g: Gallery, measured: dict[str, History | Sequence[History]],
-    names: Sequence[str] = FIVE_PARAMETERS, *, t_end: float | None = None,
-) -> Calibration:  # fmt: skip
+    g: Gallery, measured: Measured, names: Names = FIVE_PARAMETERS, *, t_end: float | None = None
+) -> Calibration:
     """Fit parameters by least squares in their logarithms.
 
     Every channel weighs by the scatter about its best fit, or by the deviation it comes with; the
@@ -144,26 +145,23 @@ def calibrate(
     x, scales = np.zeros(len(names)), [float(np.abs(h.values).max()) for _, h in pieces]
     bounds = _bounds(g, names)
     for weights in (scales, None):  # by size first, by scatter then
-        deviations = weights or _scatter(residuals(x), pieces, len(names))
-        fit = least_squares(weighed, x, "3-point", bounds, diff_step=DERIVATIVE_STEP,
-                            args=(deviations,))  # fmt: skip
+        sizes = weights or _scatter(residuals(x), pieces, len(names))
+        step = DERIVATIVE_STEP
+        fit = least_squares(weighed, x, "3-point", bounds, diff_step=step, args=(sizes,))
         x = fit.x
     cov = _covariance(fit.jac, x, names, bounds)
     sigma = np.sqrt(np.diag(cov))
-    left = {c: float(np.sqrt(np.mean(r**2)) / s)
-            for (c, _), r, s in zip(pieces, residuals(x), scales, strict=True)}  # fmt: skip
-    return Calibration(
-        gallery(x), dict(zip(names, np.exp(x).tolist(), strict=True)),
-        dict(zip(names, sigma.tolist(), strict=True)), cov / np.outer(sigma, sigma), left, count,
-    )  # fmt: skip
+    each = zip(pieces, residuals(x), scales, strict=True)
+    left = {c: float(np.sqrt(np.mean(r**2)) / s) for (c, _), r, s in each}
+    factors, wide = (dict(zip(names, y.tolist(), strict=True)) for y in (np.exp(x), sigma))
+    return Calibration(gallery(x), factors, wide, cov / np.outer(sigma, sigma), left, count)
 
 
-def _pieces(measured: dict[str, Any], t_end: float | None) -> list[tuple[str, History]]:
+def _pieces(measured: Measured, t_end: float | None) -> list[tuple[str, History]]:
     """Channels and histories one by one, cut at the end."""
     pieces: list[tuple[str, History]] = []
     for channel, histories in measured.items():
-        if channel not in CHANNELS:
-            raise ConfigError(f"{channel!r} is no channel; known are {', '.join(CHANNELS)}.")
+        check_known(channel, CHANNELS, f"{channel!r} is no channel; known are")
         for h in [histories] if isinstance(histories, History) else histories:
             t, x = np.asarray(h.t, dtype=float), np.asarray(h.values, dtype=float)
             kept = t <= (np.inf if t_end is None else t_end)
@@ -182,14 +180,14 @@ def _scatter(left: list[Array], pieces: list[tuple[str, History]], n: int) -> li
     ]
 
 
-def _bounds(g: Gallery, names: Sequence[str]) -> tuple[Array, Array]:
+def _bounds(g: Gallery, names: Names) -> tuple[Array, Array]:
     """Logarithms of the factors; nothing gives back more than it takes."""
     most = np.log(MAX_FACTOR)
     limits = {"recovery of the cushion": min(most, 1e-9 - np.log(g.cushion.recovery))}
     return np.full(len(names), -most), np.array([limits.get(name, most) for name in names])
 
 
-def _covariance(J: Array, x: Array, names: Sequence[str], bounds: tuple[Array, Array]) -> Array:
+def _covariance(J: Array, x: Array, names: Names, bounds: tuple[Array, Array]) -> Array:
     """Inverse of J^T J, or the name of what the histories do not determine."""
     sizes = np.linalg.norm(J, axis=0)
     blind = [n for n, s in zip(names, sizes, strict=True) if s == 0]

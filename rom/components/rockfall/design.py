@@ -6,8 +6,9 @@ Source:
     allowed are the user's.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from scipy.optimize import brentq
@@ -101,13 +102,15 @@ def with_boulder(g: Gallery, boulder: Mass, height: float | None = None) -> Gall
         ConfigError: for a mass or a height that is not positive.
     """
     ratio, c = (boulder / g.boulder) ** (1 / 3), g.cushion
-    cushion = (replace(c, radius=c.radius * ratio) if isinstance(c, Layer)
-               else replace(c, stiffness=c.stiffness * ratio**0.5))  # fmt: skip
+    name, power = ("radius", 1.0) if isinstance(c, Layer) else ("stiffness", 0.5)
+    cushion = replace(c, **{name: getattr(c, name) * ratio**power})
     height = g.height if height is None else height
     return replace(g, boulder=boulder, cushion=cushion, height=height)
 
 
-def capacity_map(g: Gallery, boulders: Any, heights: Any, **allowed: float) -> list[list[Verdict]]:
+def capacity_map(
+    g: Gallery, boulders: Sequence[float], heights: Sequence[float], **allowed: float
+) -> list[list[Verdict]]:
     """Verdicts for boulders and heights.
 
     Args:
@@ -125,7 +128,7 @@ def capacity_map(g: Gallery, boulders: Any, heights: Any, **allowed: float) -> l
     return [[design_check(with_boulder(g, m, h), **allowed) for h in heights] for m in boulders]
 
 
-def capacity_heights(g: Gallery, boulders: Any, **allowed: float) -> Array:
+def capacity_heights(g: Gallery, boulders: Sequence[float], **allowed: float) -> Array:
     """(b,) heights [m] from which boulders [kg] take all that is allowed; inf beyond 300 m.
 
     Args:

@@ -4,21 +4,26 @@ Source:
     After Schellenberg, On the design of rockfall protection galleries, ETH Zurich (2009).
 """
 
+from collections.abc import Callable
 from dataclasses import astuple, dataclass, replace
 from typing import Annotated, Any
 
 import numpy as np
+import numpy.typing as npt
 from scipy.linalg import eigh
 
 from rom.arguments import Count, Length, Positive, finite, typed
+from rom.body.flexible import FlexibleBody
 from rom.components.rockfall import kernels
 from rom.components.rockfall.laws import GRAVITY, Cushion, Mass, Shear
 from rom.components.rockfall.layer import Layer
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.model import Array
+from rom.names import check_known
 from rom.rotation import skew
 
 Time = Annotated[float, Positive("s")]
+Kept = Annotated[int, Count(1)]
 STEP_RATIO = 0.1  # time step times the highest frequency
 STATES = ("whole", "cracked", "punched")
 # with no `t_end`: the longest periods in which no peak may have grown before an impact is over,
@@ -52,8 +57,8 @@ class Slab:
     capacity: float = np.inf
 
     def __post_init__(self) -> None:
-        phi, omega = (finite("the modes of a slab", x, (None,), error=ModelError)
-                      for x in (self.phi, self.omega))  # fmt: skip
+        both = self.phi, self.omega
+        phi, omega = (finite("the modes of a slab", x, (None,), error=ModelError) for x in both)
         if phi.size != omega.size or not (omega > 0).all():
             raise ModelError("a slab needs as many phi as omega, and supports that hold it.")
         if not np.any(self.phi):
@@ -79,13 +84,20 @@ class Slab:
 
     @classmethod
     def of_body(
-        cls, body: Any, patch: str, supports: tuple[str, ...], *, down: Any = (0.0, 0.0, -1.0),
-        n: int | None = None, damping: float = 0.05, capacity: float = np.inf,
-    ) -> "Slab":  # fmt: skip
+        cls,
+        body: FlexibleBody,
+        patch: str,
+        supports: tuple[str, ...],
+        *,
+        down: npt.ArrayLike = (0.0, 0.0, -1.0),
+        n: int | None = None,
+        damping: float = 0.05,
+        capacity: float = np.inf,
+    ) -> "Slab":
         """Modes of a reduced body.
 
         Args:
-            body: a ``FlexibleBody``.
+            body: on its supports.
             patch: interface under the plug.
             supports: interfaces held.
             down: (3,) direction of the blow, body frame.
@@ -215,9 +227,8 @@ class Impact:
 
 @typed
 def strike(
-    g: Gallery, *, t_end: Time | None = None, dt: Time | None = None,
-    keep: Annotated[int, Count(1)] = 1000,
-) -> Impact:  # fmt: skip
+    g: Gallery, *, t_end: Time | None = None, dt: Time | None = None, keep: Kept = 1000
+) -> Impact:
     """Let the boulder strike: central differences, damping at mid-step.
 
     Args:
@@ -306,7 +317,9 @@ FITTED_NUMBERS = VARIED_NUMBERS | {
 }
 
 
-def sensitivity(g: Gallery, answer: Any, factors: tuple[float, ...]) -> dict[str, Array]:
+def sensitivity(
+    g: Gallery, answer: Callable[[Gallery], float], factors: tuple[float, ...]
+) -> dict[str, Array]:
     """How an answer changes when one parameter is multiplied by a factor.
 
     Args:
@@ -338,8 +351,7 @@ def scaled(g: Gallery, factors: dict[str, float]) -> Gallery:
         ConfigError: for a name that is none of them.
     """
     for name, factor in factors.items():
-        if name not in FITTED_NUMBERS:
-            raise ConfigError(f"{name!r} cannot be varied; known are {', '.join(FITTED_NUMBERS)}.")
+        check_known(name, FITTED_NUMBERS, f"{name!r} cannot be varied; known are")
         path, power = FITTED_NUMBERS[name]
         if name == STRENGTH_NAME and not isinstance(g.cushion, Layer):
             raise ConfigError(f"{name} needs a cushion of type Layer.")
@@ -348,8 +360,9 @@ def scaled(g: Gallery, factors: dict[str, float]) -> Gallery:
     return g
 
 
-def _scaled(record: Any, path: str, factor: float) -> Any:
-    name, _, remainder = path.partition(".")
-    value = getattr(record, name)
-    value = _scaled(value, remainder, factor) if remainder else factor * value
-    return replace(record, **{name: value})
+def _scaled(g: Gallery, path: str, factor: float) -> Gallery:
+    part, _, name = path.rpartition(".")
+    if not part:
+        return replace(g, **{name: factor * getattr(g, name)})
+    record = getattr(g, part)
+    return replace(g, **{part: replace(record, **{name: factor * getattr(record, name)})})

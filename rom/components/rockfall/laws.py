@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
+import numpy.typing as npt
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
@@ -56,10 +57,9 @@ class Resistance(ABC):
             if (rest := missing(high)) >= 0:
                 return float(brentq(missing, low, high))
             low, left = high, -rest
-        raise ConfigError(
-            f"energy = {energy:.3g} J: the cushion takes up {energy - left:.3g} J before it is "
-            f"pressed through to {self.limit:g} m.", hint="Take a thicker or a stiffer one.",
-        )  # fmt: skip
+        text = f"energy = {energy:.3g} J: the cushion takes up {energy - left:.3g} J before it is"
+        hint = "Take a thicker or a stiffer one."
+        raise ConfigError(f"{text} pressed through to {self.limit:g} m.", hint=hint)
 
     def _marks(self) -> Array:
         """Penetrations that close in on the limit, or grow without one."""
@@ -173,7 +173,7 @@ class CushionForce:
             beside the slab.
     """
 
-    def __init__(self, cushion: Resistance, down: Any, gap: float, reach: float = np.inf):
+    def __init__(self, cushion: Resistance, down: npt.ArrayLike, gap: float, reach: float = np.inf):
         if not (0.0 <= gap < np.inf and reach > 0.0):
             raise ConfigError(f"gap = {gap} m must be 0 or more, reach = {reach} m positive.")
         self.cushion, self.down = cushion, unit_vector("down", down)

@@ -83,8 +83,15 @@ class Layer(Resistance):
 
     @classmethod
     @typed
-    def of_sand(cls, boulder: Mass, lame: Modulus, thickness: float, *,
-                rock: Density = ROCK_DENSITY, **more: Any) -> "Layer":  # fmt: skip
+    def of_sand(
+        cls,
+        boulder: Mass,
+        lame: Modulus,
+        thickness: float,
+        *,
+        rock: Density = ROCK_DENSITY,
+        **more: Any,
+    ) -> "Layer":
         """The sand of `Cushion.of_sand`, E = 2.5 lame, in a layer.
 
         Args:
@@ -107,9 +114,8 @@ class Layer(Resistance):
     @property
     def law(self) -> tuple[float, ...]:
         """(8,) the numbers of the law, as `kernels.cushion` takes them."""
-        numbers = (self.recovery, self.exponent, self.modulus, self.thickness, self.radius,
-                   np.tan(self.angle), self.strength)  # fmt: skip
-        return (kernels.CONE_LAW, *map(float, numbers))
+        sizes = self.modulus, self.thickness, self.radius, np.tan(self.angle), self.strength
+        return (kernels.CONE_LAW, *map(float, (self.recovery, self.exponent, *sizes)))
 
     def contact(self, d: float) -> float:
         """Radius of the contact [m] at a penetration [m].
@@ -147,8 +153,9 @@ class Layer(Resistance):
         return self.density * sand + concrete * cone
 
     @typed
-    def shear(self, d: float, slab: Length, *, modulus: Modulus, strength: Modulus,
-              **more: Any) -> Shear:  # fmt: skip
+    def shear(
+        self, d: float, slab: Length, *, modulus: Modulus, strength: Modulus, **more: Any
+    ) -> Shear:
         """The plug's ring of concrete in shear, from the load's edge a thickness outwards.
 
         A ring of radii r and r + h that only shears has 2 pi G h / log(1 + h / r); it cracks at

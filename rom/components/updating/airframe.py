@@ -228,9 +228,8 @@ def _stiffness(L: float, part: Part, material: Material, kind: str) -> Array:
 def _mass(L: float, part: Part, material: Material) -> Array:
     (a, b), M = part.size, np.zeros((12, 12))
     m, scale = material.rho * a * b * L, np.array([1, L, 1, L])
-    h = np.array(
-        [[156, 22, 54, -13], [22, 4, 13, -3], [54, 13, 156, -22], [-13, -3, -22, 4]]
-    ) * np.outer(scale, scale) * (m / 420)  # fmt: skip
+    h = np.array([[156, 22, 54, -13], [22, 4, 13, -3], [54, 13, 156, -22], [-13, -3, -22, 4]])
+    h = h * np.outer(scale, scale) * (m / 420)
     M[np.ix_(AXIAL_DOFS, AXIAL_DOFS)] = m * BAR_M
     M[np.ix_(TWIST_DOFS, TWIST_DOFS)] = m * (a**2 + b**2) / 12 * BAR_M
     M[np.ix_(IN_Y, IN_Y)] = h

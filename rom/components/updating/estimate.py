@@ -7,7 +7,7 @@ Source:
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -18,6 +18,7 @@ from rom.components.updating.family_model import (
     Attached,
     Family,
     FamilyModel,
+    Held,
     Parts,
     check_prior,
     check_units,
@@ -47,7 +48,7 @@ from rom.components.updating.verdict import (
 )
 from rom.errors import ConfigError, ParameterError, SolverError, warn
 from rom.model import Array, Mask, Row
-from rom.names import named
+from rom.names import check_known, named
 from rom.plausible import check_damping_ratio
 from rom.rows import row
 
@@ -70,7 +71,7 @@ def update(  # noqa: PLR0913  keywords of one call
     test: Responses,
     *,
     free: tuple[str, ...] | None = None,
-    fixed: Any = (),
+    fixed: Held = (),
     attached: Attached | None = None,
     candidates: Attached | None = None,
     damping: Annotated[float, Between(*DAMPING_RANGE)] = 0.01,
@@ -161,8 +162,8 @@ def _unknown(
 ) -> Mask:
     """(n_p,) which parameters are unknown."""
     chosen = set(model.names) - set(candidates) if free is None else {*free, *attached}
-    if wrong := chosen - set(model.names):
-        raise ParameterError(f"there is no parameter {named(wrong)}; known are {model.names}.")
+    for name in sorted(chosen):
+        check_known(name, model.names, f"no parameter {name!r}; there are", ParameterError)
     return np.array([name in chosen for name in model.names])
 
 
@@ -213,7 +214,7 @@ class _Search:
     n_known: int
     sums: Sums = field(init=False)
     settled: bool = False
-    count: Any = 1.0  # by which lines count less
+    count: Array | float = 1.0  # by which lines count less
 
     @staticmethod
     def begun(

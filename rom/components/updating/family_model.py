@@ -8,7 +8,6 @@ elastic ones of the family; what is held is eliminated.
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -24,7 +23,7 @@ from rom.components.families.assembled import FamilyAssembly
 from rom.components.families.family import BodyFamily
 from rom.components.families.parameters import Density, YoungsModulus
 from rom.components.updating.models import Modal, ParametricModel, modal
-from rom.eigen.supports import spring_matrices
+from rom.eigen.supports import Fixed, spring_matrices
 from rom.errors import ConfigError, ParameterError
 from rom.model import Array, Index, Mask
 from rom.names import check_known, named
@@ -36,6 +35,7 @@ MASS_DOFS = 3  # translations, which a point mass resists
 Family = BodyFamily | FamilyAssembly
 Structure = Family | FlexibleBody | Assembly
 Place = str | tuple[str, str]  # interface of a body alone; body and interface of an assembly
+Held = Fixed | tuple[Place, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,8 +80,7 @@ class Parts:
         if "" in self.bodies:
             return "", self.bodies[""].marker(str(place))
         body, interface = place if isinstance(place, tuple) and len(place) == 2 else ("", "")
-        if body not in self.bodies:
-            raise ConfigError(f"{place!r} must be (body, interface) of {named(self.bodies)}.")
+        check_known(body, self.bodies, f"{place!r} must be (body, interface) of")
         return body, self.bodies[body].marker(interface)
 
     def motion(self, place: Place) -> Array:
@@ -330,17 +329,18 @@ class FamilyModel:
         Rows of the sensors are given as (n_s, r).
         """
         kept = np.where(free, 0.0, x)
-        K, M = ((T.T @ A @ T) * np.exp(powers @ kept)[:, None, None]
-                for A, powers in ((self.K, self.k_powers), (self.M, self.m_powers)))  # fmt: skip
+        K = (T.T @ self.K @ T) * np.exp(self.k_powers @ kept)[:, None, None]
+        M = (T.T @ self.M @ T) * np.exp(self.m_powers @ kept)[:, None, None]
+        small = replace(self, K=K, M=M, seen=seen, driven=self.driven @ T, motions=self.motions @ T)
         names = tuple(np.array(self.names)[free].tolist())
-        return replace(
-            self, K=K, M=M, k_powers=self.k_powers[:, free], m_powers=self.m_powers[:, free],
-            seen=seen, driven=self.driven @ T, names=names, low=self.low[free],
-            high=self.high[free], motions=self.motions @ T,
-        )  # fmt: skip
+        k_powers, m_powers = self.k_powers[:, free], self.m_powers[:, free]
+        small = replace(small, names=names, low=self.low[free], high=self.high[free])
+        return replace(small, k_powers=k_powers, m_powers=m_powers)
 
 
-def summed(terms: Array, powers: Array, x: Array, amount: Any = 1.0) -> tuple[Array, Array]:
+def summed(
+    terms: Array, powers: Array, x: Array, amount: Array | float = 1.0
+) -> tuple[Array, Array]:
     """A sum of terms (n_t, ...) with factors, and its derivatives (n_p, ...) by their logarithms.
 
     Powers are as of `FamilyModel`; derivatives have all terms, whatever their amount in the sum.
@@ -354,7 +354,7 @@ def family_model(
     rows: tuple[Array, Array],
     attached: Attached,
     candidates: Attached,
-    fixed: Any,
+    fixed: Held,
 ) -> FamilyModel:
     """A family, body or assembly seen at sensors and driven at inputs, see `rom.update`.
 
@@ -368,7 +368,7 @@ def family_model(
             hint="Reduce a family with moduli and densities alone.",
         )
     outside = {**attached, **candidates}
-    own: dict[str, Any] = {} if isinstance(family, FlexibleBody | Assembly) else family.parameters
+    own = {} if isinstance(family, FlexibleBody | Assembly) else family.parameters
     if len(outside) < len(attached) + len(candidates) or set(outside) & set(own):
         raise ParameterError(f"{named(outside)}: one names two parameters; use another name.")
     terms, columns = terms_of(family), parts.columns
@@ -411,17 +411,17 @@ def _own_powers(family: BodyFamily | FlexibleBody) -> tuple[Array, Array]:
     return k, m
 
 
-def _conditions(family: Structure, fixed: Any) -> Array:
+def _conditions(family: Structure, fixed: Held) -> Array:
     """(c, n) coordinates that supports and couplings keep zero."""
     parts = Parts.of(family)
     if isinstance(family, FamilyAssembly | Assembly):
-        for place in fixed:
-            parts.marker(place)
+        places = tuple((body, marker.name) for body, marker in map(parts.marker, fixed))
         whole = family if isinstance(family, Assembly) else family.nominal
-        return whole.conditions(tuple(fixed))
+        return whole.conditions(places)
     body = parts.bodies[""]
-    body.check_support(fixed)
-    return body.held_rows(fixed)
+    names = fixed if isinstance(fixed, Mapping) else tuple(map(str, fixed))
+    body.check_support(names)
+    return body.held_rows(names)
 
 
 def _count_free(parts: Parts, attached: Attached, held: Array) -> int:

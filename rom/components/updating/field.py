@@ -6,9 +6,10 @@ OBSERVERS = ("filter_steps", "operation", "parameter_tracking", "tracking")
 FIELD = Field(
     verbs={"update": "rom.components.updating.verb"},
     moved={
-        **{f"rom.updating.{name}": f"rom.components.updating.observers.{name}"
-           for name in OBSERVERS},
+        f"rom.updating.{name}": f"rom.components.updating.observers.{name}" for name in OBSERVERS
+    }
+    | {
         "rom.updating": "rom.components.updating",
         "rom.io.responses": "rom.components.updating.responses",
     },
-)  # fmt: skip
+)

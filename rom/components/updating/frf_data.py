@@ -9,7 +9,6 @@ Source:
 
 import warnings
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -190,7 +189,7 @@ class Noise:
         count = np.maximum(used.sum(axis=0), 1)
         share = np.where(used, self.incoherent / np.where(used, self.force, 1.0), 0.0)
         share = np.where(used.any(axis=0), share.sum(axis=0) / count, np.inf)
-        least: Any = 1 / MAX_FORCE_SHARE
+        least = np.asarray(1 / MAX_FORCE_SHARE)
         if self.estimated:
             chance = np.sqrt(2 / (max(self.averages - FREEDOM_LOST, 1) * count))
             least = 1 - FORCE_DEVIATIONS * chance
@@ -203,7 +202,7 @@ class Noise:
                 "percentage or power; compare the coherence.",
             )
 
-    def errors(self, excess: Any = 0.0) -> Errors:
+    def errors(self, excess: Array | float = 0.0) -> Errors:
         """Of ln H, and what is known of them.
 
         Args:

@@ -1,8 +1,8 @@
 """Measured responses with their points and directions."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +13,7 @@ from rom.arguments.quantities import Count
 from rom.body.flexible import FlexibleBody
 from rom.body.surface import strain_rows, surface_of
 from rom.components.updating.frf_data import FREEDOM_LOST, Complex, Noise
+from rom.eigen.supports import Fixed
 from rom.errors import ConfigError
 from rom.model import Array, Index
 from rom.names import named
@@ -62,7 +63,7 @@ class Channels:
 
     def _name_bodies(self, k: int) -> None:
         """Keep a name of each of k channels, where there are any."""
-        given: Any = self.bodies
+        given: object = self.bodies
         if given is None:
             return
         each = (given,) * k if isinstance(given, str) else given
@@ -71,7 +72,7 @@ class Channels:
         one_each("names of bodies", len(each), "channels", k)
         object.__setattr__(self, "bodies", tuple(each))
 
-    def some(self, chosen: Any) -> "Channels":
+    def some(self, chosen: Sequence[int] | Index) -> "Channels":
         """Those with chosen numbers (j,)."""
         bodies = None if self.bodies is None else tuple(self.bodies[k] for k in chosen)
         points, directions = (np.asarray(A)[chosen] for A in (self.points, self.directions))
@@ -137,7 +138,11 @@ class Channels:
         return found
 
     def _placed(
-        self, bodies: Mapping[str, FlexibleBody], what: str, tolerance: float | None, gauges: Any
+        self,
+        bodies: Mapping[str, FlexibleBody],
+        what: str,
+        tolerance: float | None,
+        gauges: npt.ArrayLike,
     ) -> tuple[Index, Index]:
         """(k,) number of the body of each channel, and (k,) of the nearest point of its surface."""
         surfaces, points = [surface_of(one) for one in bodies.values()], np.asarray(self.points)
@@ -213,10 +218,10 @@ class Responses:
     H: Complex
     sensors: Channels
     inputs: Channels
-    coherence: Any
+    coherence: npt.ArrayLike
     averages: Annotated[int, Count(1)]
     quantity: str | tuple[str, ...] = "displacement"
-    force_noise: Any = 0.0
+    force_noise: npt.ArrayLike = 0.0
     estimator: Literal["H1", "Hv", "H2"] | None = None
 
     def __post_init__(self) -> None:
@@ -326,7 +331,7 @@ class MeasuredModes:
     frequencies: Array
     damping: Array
     points: Array
-    shapes: Any
+    shapes: npt.ArrayLike
 
     def __post_init__(self) -> None:
         m, k = len(self.frequencies), len(self.points)
@@ -338,7 +343,7 @@ class MeasuredModes:
             raise ConfigError(f"the shape of mode {bad[0] + 1} must be finite and not zero.")
 
     def mac(
-        self, body: FlexibleBody, *, fixed: Any = (), n: int, tolerance: float | None = None
+        self, body: FlexibleBody, *, fixed: Fixed = (), n: int, tolerance: float | None = None
     ) -> Array:
         """(m, n) modal assurance criterion of measured modes and elastic ones of a body [1].
 

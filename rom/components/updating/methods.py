@@ -6,7 +6,6 @@ Source:
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -121,7 +120,7 @@ def _modal_sensitivity(model: ParametricModel, modes: Modal) -> tuple[Array, Arr
 
 def through_modes(
     model: ParametricModel, modes: Modal, m: int, *, shared: bool = False
-) -> Callable[[Any, Any, Array], Complex]:
+) -> Callable[[Complex, Complex, Array], Complex]:
     """The function of sides (n_f, a, n), (n_f, n, b) and lines (n_f,) that gives side dZ side.
 
     Derivatives (n_f, a, b, n_p + m) are those by p, at the origin of the model, and by logarithms
@@ -131,7 +130,7 @@ def through_modes(
     by_p, last = _modal_sensitivity(model, modes), model.n_rigid + m - 1
     e, others = slice(model.n_rigid, last + (not shared)), slice(last, None)
 
-    def change(left: Any, right: Any, omega: Array) -> Complex:
+    def change(left: Complex, right: Complex, omega: Array) -> Complex:
         damped = left[:, :, None, e] * np.swapaxes(right[:, e], 1, 2)[:, None]
         w = 1j * omega[:, None, None, None]
         columns = [_through(left, by_p, right, omega), damped * (w * modes.d[e])]
@@ -234,11 +233,9 @@ def update_by_output(model: Model, test: Measurement, p: ArrayLike, zeta: ArrayL
         return weighted(test.weights, dH / H[..., None])
 
     start = np.concatenate([p, np.log(zeta)])
-    low = np.concatenate([np.full(n_p, MIN_PARAMETER), np.full(np.size(zeta), -np.inf)])
-    found = least_squares(
-        residual, start, jacobian, bounds=(low, np.inf), max_nfev=MAX_EVALUATIONS,
-        xtol=1e-12, ftol=1e-12, gtol=1e-12,
-    )  # fmt: skip
+    low = np.repeat([MIN_PARAMETER, -np.inf], [n_p, np.size(zeta)])
+    search = dict.fromkeys(("xtol", "ftol", "gtol"), 1e-12) | {"max_nfev": MAX_EVALUATIONS}
+    found = least_squares(residual, start, jacobian, (low, np.inf), **search)
     ended = _update(found.x, n_p, found.fun, found.jac, [*path[1:], found.x[:n_p]])
     return _judged(ended, model, test)
 
@@ -430,7 +427,7 @@ def _judged(found: Update, model: Model, test: Measurement) -> Update:
     return replace(found, verdict=explained(H, test, found.p.size + found.zeta.size))
 
 
-def weighted(weights: Any, r: Complex) -> Array:
+def weighted(weights: Array | float, r: Complex) -> Array:
     """Weighted residual, or its derivatives (.., n_q), real parts above imaginary parts."""
     weights = np.asarray(weights, dtype=float)
     if r.ndim == 3:

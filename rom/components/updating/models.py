@@ -6,7 +6,7 @@ Source:
 """
 
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,7 +17,7 @@ from scipy.stats import f as f_ratio
 from rom.arguments import finite, one_each
 from rom.components.updating.frf_data import Complex, frac
 from rom.errors import ConfigError, ModelError
-from rom.model import Array, Mask, Report, Row
+from rom.model import Array, Index, Mask, Report, Row
 from rom.reduction.bases.fixed_interface import craig_bampton
 from rom.rows import row
 
@@ -148,7 +148,7 @@ class Measurement:
     omega: Array
     H: Complex
     inputs: tuple[int, ...]
-    weights: Any = 1.0
+    weights: Array | float = 1.0
 
     def __post_init__(self) -> None:
         n = len(self.omega), len(self.inputs)
@@ -262,7 +262,7 @@ def parametric_basis(model: ParametricModel, n_modes: int, samples: ArrayLike) -
     return U[:, size > RANK_RTOL * size[0]]
 
 
-def sensor_dofs(model: ParametricModel) -> Any:
+def sensor_dofs(model: ParametricModel) -> Index:
     """(n_s,) the dofs that the sensors are, if they are such."""
     s = model.sensors.argmax(axis=1)
     if not np.array_equal(model.sensors, np.eye(len(model.K))[s]):
@@ -293,7 +293,9 @@ def likeness(H: Complex, measured: Complex, used: Mask) -> Row:
     return row("one less the median FRAC", 1.0 - float(np.median(value)), MAX_UNLIKE)
 
 
-def worst_rows(squares: Array, used: Mask, omega: Array, **known: Any) -> list[Row]:
+def worst_rows(
+    squares: Array, used: Mask, omega: Array, known: float = 1.0, scale: float = 0.0
+) -> list[Row]:
     """Chi-square of the sensor and of the band of lines that deviate most, see `chi_row`.
 
     Of squared residuals (n_f, n_s, n_e), those used, at lines (n_f,) [rad/s].
@@ -303,10 +305,9 @@ def worst_rows(squares: Array, used: Mask, omega: Array, **known: Any) -> list[R
     sensors = [(f"worst sensor, {k}", np.s_[:, k]) for k in range(squares.shape[1])]
     bands = [(f"worst band, {f[b[0]]:.4g} to {f[b[-1]]:.4g} Hz", np.s_[b]) for b in blocks]
     for parts in (sensors, bands):
-        found = [(name, squares[at].sum(), 2.0 * used[at].sum())
-                 for name, at in parts if used[at].any()]  # fmt: skip
-        worst = max(found, key=lambda x: deviation(*x[1:]))
-        rows.append(chi_row(*worst, len(parts), **known))
+        found = [(name, squares[at].sum(), 2.0 * used[at].sum()) for name, at in parts]
+        worst = max((x for x in found if x[2]), key=lambda x: deviation(*x[1:]))
+        rows.append(chi_row(*worst, len(parts), known, scale))
     return rows
 
 
@@ -316,15 +317,15 @@ def deviation(value: float, freedom: float) -> float:
 
 
 def chi_row(
-    name: str, value: float, freedom: float, trials: int, data: Any = None, scale: float = 0.0
+    name: str, value: float, freedom: float, trials: int, known: float = 1.0, scale: float = 0.0
 ) -> Row:
     """Chi-square over its expectation; the limit is kept by a right model but for one in 1000.
 
-    Squares over estimated variances vary more, as if they had less freedom; what is not known of
-    the scale of all makes the quotient one of F, whose denominator has the freedom 2 / variance.
+    Squares over estimated variances vary more, as if only a known share of the freedom were theirs;
+    the variance of a scale of all makes the quotient one of F, its denominator of freedom 2 / it.
     """
     freedom = max(freedom, 1.0)
-    own, scale = (freedom, scale) if data is None else (data.known * freedom, data.scale)
+    own = known * freedom
     limit = chi2.isf(MAX_FALSE_REFUSAL / trials, own) / own
     if scale > MIN_SCALE:
         limit = f_ratio.isf(MAX_FALSE_REFUSAL / trials, own, 2 / scale)

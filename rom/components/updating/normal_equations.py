@@ -8,8 +8,7 @@ condensed, says how much.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.linalg import null_space, qr
@@ -61,13 +60,13 @@ class Data:
     omega: Array
     logarithm: Complex
     weight: Array
-    common: Any = 0.0
-    varied: Any = 0.0
+    common: Array | float = 0.0
+    varied: Array | float = 0.0
     known: float = 1.0
     scale: float = 0.0
 
     @staticmethod
-    def of(test: Responses, excess: Any = 0.0) -> "Data":
+    def of(test: Responses, excess: Array | float = 0.0) -> "Data":
         """What a test says; by the level of a model beside it, see `Noise.errors`."""
         e, omega = test.noise.errors(excess), 2 * np.pi * test.frequencies
         return Data(omega, test.logarithm(), 1.0 / e.own, e.common, e.varied, e.known, e.scale)
@@ -103,7 +102,7 @@ class Sums:
     normal: Array
     gradient: Array
     squares: Array
-    varied: Any = 0.0
+    varied: Array = field(default_factory=lambda: np.zeros((0, 0)))
 
     @property
     def chi_square(self) -> float:
@@ -155,7 +154,7 @@ def _gram(J: Complex, n: int) -> Array:
     return np.asarray((flat.conj().T @ flat).real)
 
 
-def unsure(J: Complex, weight: Array, common: Any, varied: Any) -> Complex:
+def unsure(J: Complex, weight: Array, common: Array | float, varied: Array | float) -> Complex:
     """(n_f, n_s, n_e, n) derivatives of which J^H J is what estimated weights cost.
 
     With V = D^-1 + c^2 1 1^T and own variances d = 1 / D that vary by (v d)^2, estimates by
@@ -172,7 +171,7 @@ def unsure(J: Complex, weight: Array, common: Any, varied: Any) -> Complex:
     return white(J / w[..., None], weight, common) * (varied * np.sqrt(own))[..., None]
 
 
-def white(log: Complex, weight: Array, common: Any) -> Complex:
+def white(log: Complex, weight: Array, common: Array | float) -> Complex:
     """(n_f, n_s, n_e, n) logarithms whose errors become independent and of the variance one.
 
     Errors have the covariance D^-1 + c^2 1 1^T over the sensors, D = weight^2. With s the

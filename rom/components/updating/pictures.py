@@ -1,7 +1,6 @@
 """Pictures of a vibration test: where its points are on the body, and along which directions."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -10,6 +9,7 @@ from rom import view
 from rom.body.surface import surface_of
 from rom.components.updating.family_model import Family, Parts
 from rom.components.updating.measured import Channels, Responses
+from rom.model import Array, Index
 from rom.names import check_ending
 
 PIN_RATIO = 0.12  # length of a pin in a picture, over the size of the body
@@ -26,10 +26,10 @@ def match(family: Family, test: Responses, path: Path) -> None:
     check_ending(path, "a picture", ".png")
     points = np.vstack([test.sensors.points, test.inputs.points])
     far = cKDTree(_surface(family)[0]).query(points)[0]
-    drawn(
-        family, (test.sensors, test.inputs), path, "Points of a vibration test",
-        f"Largest distance of the {len(points)} points from one of the surface: {far.max():.3g} m.",
-    )  # fmt: skip
+    more = (
+        f"Largest distance of the {len(points)} points from one of the surface: {far.max():.3g} m."
+    )
+    drawn(family, (test.sensors, test.inputs), path, "Points of a vibration test", more)
 
 
 def drawn(
@@ -46,16 +46,16 @@ def drawn(
             pins += [view.cylinder(x, x + length * d / np.linalg.norm(d), thick, sides=12)]
             pins += [view.ellipsoid((1.5 * thick,) * 3, x, sides=12)]
         things[name] = view.joined(pins)
-    view.plane(
-        [view.Scene(f"Seen from {side}", things, view=(0.6 * y, y, 0.7 * z), up=(0, 0, 1))
-         for side, y, z in (("the front and above", -1.0, 1.0), ("behind and below", 1.0, -1.0))],
-        path, title=title,
-        caption="A ball marks a point, its pin the direction, in the axes of the geometry; a "
-        f"point may carry several. {more}",
-    )  # fmt: skip
+    text = "A ball marks a point, its pin the direction, in the axes of the geometry; a point may"
+    sides = ("the front and above", -1.0, 1.0), ("behind and below", 1.0, -1.0)
+    scenes = [
+        view.Scene(f"Seen from {side}", things, view=(0.6 * y, y, 0.7 * z), up=(0, 0, 1))
+        for side, y, z in sides
+    ]
+    view.plane(scenes, path, title=title, caption=f"{text} carry several. {more}")
 
 
-def _surface(family: Family) -> Any:
+def _surface(family: Family) -> tuple[Array, Index]:
     """Points (n, 3) [m] and triangles of all bodies together.
 
     Raises:

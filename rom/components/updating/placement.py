@@ -11,9 +11,10 @@ Source:
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
+import numpy.typing as npt
 
 from rom.arguments import finite, typed, whole
 from rom.body.flexible import FlexibleBody
@@ -23,6 +24,7 @@ from rom.components.updating.family_model import (
     Attached,
     Family,
     FamilyModel,
+    Held,
     Parts,
     check_prior,
     check_units,
@@ -34,6 +36,7 @@ from rom.components.updating.methods import blocks
 from rom.components.updating.models import DEAD_RATIO
 from rom.components.updating.normal_equations import responses_at, sensitivity
 from rom.components.updating.verdict import unseen_directions
+from rom.eigen.supports import Fixed
 from rom.errors import ConfigError, ModelError
 from rom.model import Array, Index
 from rom.names import csv_cell
@@ -104,7 +107,7 @@ class Plan:
 
 
 @typed
-def candidates(body: FlexibleBody | Family, n: int, *, fixed: Any = ()) -> Channels:
+def candidates(body: FlexibleBody | Family, n: int, *, fixed: Held = ()) -> Channels:
     """Points spread over the surface of a body, each with the three axes as directions.
 
     Each next point is the one farthest from those before. Points that supports hold are left out.
@@ -142,7 +145,7 @@ def candidates(body: FlexibleBody | Family, n: int, *, fixed: Any = ()) -> Chann
 
 @typed
 def independent(
-    body: FlexibleBody, sensors: Channels, n: int, *, modes: int, fixed: Any = ()
+    body: FlexibleBody, sensors: Channels, n: int, *, modes: int, fixed: Fixed = ()
 ) -> tuple[Index, Array]:
     """Sensors that tell the lowest elastic modes apart: effective independence.
 
@@ -187,14 +190,14 @@ def place(  # noqa: PLR0913  keywords of one call
     family: Family,
     sensors: Channels,
     inputs: Channels,
-    frequencies: Any,
+    frequencies: npt.ArrayLike,
     *,
     n_sensors: int,
     n_inputs: int = 1,
     noise: float = 0.0,
     floor: float | None = None,
     quantity: Literal["displacement", "velocity", "acceleration"] = "acceleration",
-    fixed: Any = (),
+    fixed: Held = (),
     attached: Attached | None = None,
     damping: float = 0.01,
     prior: Mapping[str, float] | None = None,

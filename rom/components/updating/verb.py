@@ -54,6 +54,18 @@ PLAN_POINTS = 20  # of the surface that are offered, each along three axes
 PLAN_ENDINGS = (".csv", ".uff", ".png")
 PLAN_SIZE = (8, 1)  # sensors and forces, where none are asked for
 FACTOR_HELP = "by a factor from LOW to HIGH that is sought; may be repeated"
+STIFFNESS_HELP = f"[N/m, N m/rad], {FACTOR_HELP}"
+JOINT = "NAME=BODY.INTERFACE,BODY.INTERFACE:KX,KY,KZ:LOW:HIGH"
+STRUCTURE_OPTIONS = (  # what each takes, names or an assignment that may be repeated; what it says
+    ("--couple", "BODY.INTERFACE=BODY.INTERFACE", "of an assembly: they move together; repeatable"),
+    ("--fixed", "NAME,...", "what was held"),
+    ("--free", "NAME,...", "unknown parameters (default: all); springs and masses are always"),
+    ("--spring", "NAME=INTERFACE:KX,KY,KZ:LOW:HIGH", f"interface to ground {STIFFNESS_HELP}"),
+    ("--joint", JOINT, f"between bodies {STIFFNESS_HELP}"),
+    ("--mass", "NAME=INTERFACE:KG:LOW:HIGH", f"on an interface [kg], {FACTOR_HELP}"),
+    ("--candidate", "NAME,...", "springs and masses that the model has not, tried by their score"),
+    ("--prior", "NAME=DEVIATION", "relative standard deviation of a factor about one, before"),
+)
 POINT_KEY = each(ratio("[m] and direction"), "x, y, z, dx, dy, dz")
 SCHEMA = record(
     "what a test says about a family of bodies; with --plan, what one will say",
@@ -109,56 +121,34 @@ def _test(parser: argparse.ArgumentParser) -> None:
 
 def _structure(parser: argparse.ArgumentParser) -> None:
     """What the model is, and what of it is unknown."""
-    parser.add_argument(
-        "--family", metavar="FILE or NAME=FILE", action="append", required=True,
-        help="family file, .rom.npz; of several, repeated, each with a name: an assembly",
-    )  # fmt: skip
-    several: dict[str, Any] = {"type": assignment, "action": "append", "default": []}
-    parser.add_argument(
-        "--couple", metavar="BODY.INTERFACE=BODY.INTERFACE", **several,
-        help="of an assembly: they move together; may be repeated",
-    )  # fmt: skip
-    parser.add_argument("--fixed", metavar="NAME,...", type=names, default=(), help="what was held")
-    parser.add_argument(
-        "--free", metavar="NAME,...", type=names,
-        help="unknown parameters (default: all); springs and masses are always",
-    )  # fmt: skip
-    parser.add_argument(
-        "--spring", metavar="NAME=INTERFACE:KX,KY,KZ:LOW:HIGH", **several,
-        help=f"between an interface and the ground [N/m, N m/rad], {FACTOR_HELP}",
-    )  # fmt: skip
-    parser.add_argument(
-        "--joint", metavar="NAME=BODY.INTERFACE,BODY.INTERFACE:KX,KY,KZ:LOW:HIGH", **several,
-        help=f"between bodies [N/m, N m/rad], {FACTOR_HELP}",
-    )  # fmt: skip
-    parser.add_argument(
-        "--mass", metavar="NAME=INTERFACE:KG:LOW:HIGH", **several,
-        help=f"on an interface [kg], {FACTOR_HELP}",
-    )  # fmt: skip
-    parser.add_argument(
-        "--candidate", metavar="NAME,...", type=names, default=(),
-        help="springs and masses that the model has not, tried by their score",
-    )  # fmt: skip
-    parser.add_argument(
-        "--prior", metavar="NAME=DEVIATION", **several,
-        help="relative standard deviation of a factor about one, before the test",
-    )  # fmt: skip
+    text = "family file, .rom.npz; of several, repeated, each with a name: an assembly"
+    takes = "FILE or NAME=FILE"
+    parser.add_argument("--family", metavar=takes, action="append", required=True, help=text)
+    for option, metavar, text in STRUCTURE_OPTIONS:
+        kind: dict[str, Any] = {"type": assignment, "action": "append", "default": []}
+        if metavar == "NAME,...":
+            kind = {"type": names, "default": None if option == "--free" else ()}
+        parser.add_argument(option, metavar=metavar, help=text, **kind)
 
 
 def _search(parser: argparse.ArgumentParser) -> None:
     """How the unknowns are sought."""
     parser.add_argument(
-        "--residual", choices=("responses", "equations", "response-function"), default="responses",
+        "--residual",
+        choices=("responses", "equations", "response-function"),
+        default="responses",
         help="what is made small: responses (default), equations of motion at the sensors, or what "
         "the response function method leaves",
-    )  # fmt: skip
+    )
     parser.add_argument(
         "--rank", type=count, help="of the basis of equations (default: one per mode of the band)"
     )
     parser.add_argument(
-        "--beside-poles", metavar="WIDTH", type=positive,
+        "--beside-poles",
+        metavar="WIDTH",
+        type=positive,
         help="half bandwidths of the poles within which lines count less",
-    )  # fmt: skip
+    )
     parser.add_argument(
         "--damping", type=positive, default=0.01, help="to start from (default 1 %%)"
     )
@@ -167,9 +157,13 @@ def _search(parser: argparse.ArgumentParser) -> None:
 def _plan_options(parser: argparse.ArgumentParser) -> None:
     """What a test to be should tell."""
     parser.add_argument(
-        "--plan", metavar="SENSORS,FORCES", type=_two_counts, nargs="?", const=PLAN_SIZE,
+        "--plan",
+        metavar="SENSORS,FORCES",
+        type=_two_counts,
+        nargs="?",
+        const=PLAN_SIZE,
         help="choose so many for a test to be (8,1 where they are left out)",
-    )  # fmt: skip
+    )
     parser.add_argument(
         "--lines", metavar="LOW:HIGH", type=_range, help="of the test that is planned [Hz]"
     )
@@ -177,10 +171,11 @@ def _plan_options(parser: argparse.ArgumentParser) -> None:
         "--noise", type=positive, default=0.05, help="relative, of what is planned (default 5 %%)"
     )
     parser.add_argument(
-        "--floor", type=number,
+        "--floor",
+        type=number,
         help="noise of what is planned where nothing moves [m/s^2 per N] (default: a thousandth of "
         "the largest response)",
-    )  # fmt: skip
+    )
 
 
 def run(args: argparse.Namespace) -> Answer:
@@ -195,10 +190,9 @@ def run(args: argparse.Namespace) -> Answer:
     require({"file": args.file}, hint="A test, or --plan for one that is to be made.")
     family = _family(args)
     outputs = _outputs(args, family)
-    test = read_responses(
-        args.file, averages=args.averages, coherence=args.coherence, points=args.points,
-        bodies=[name for name in Parts.of(family).bodies if name],
-    )  # fmt: skip
+    read = {name: getattr(args, name) for name in ("averages", "coherence", "points")}
+    bodies = [name for name in Parts.of(family).bodies if name]
+    test = read_responses(args.file, **read, bodies=bodies)
     if args.picture is not None:
         from rom.components.updating.pictures import match
 
@@ -209,12 +203,10 @@ def run(args: argparse.Namespace) -> Answer:
     outside = common.pop("attached")
     if wrong := sorted(set(args.candidate) - set(outside)):
         raise ConfigError(f"--candidate {wrong[0]} must name a --spring, --joint or --mass.")
-    found = update(
-        family, test, **common, free=args.free,
-        attached={name: part for name, part in outside.items() if name not in args.candidate},
-        candidates={name: outside[name] for name in args.candidate}, tolerance=args.tolerance,
-        residual=args.residual, rank=args.rank, beside_poles=args.beside_poles,
-    )  # fmt: skip
+    candidates = {name: outside.pop(name) for name in dict.fromkeys(args.candidate)}
+    options = ("free", "tolerance", "residual", "rank", "beside_poles")
+    common |= {name: getattr(args, name) for name in options}
+    found = update(family, test, **common, attached=outside, candidates=candidates)
 
     def write() -> None:
         bodies = {"": found.body} if "" in outputs else found.assembly.bodies
@@ -324,10 +316,9 @@ def _plan(args: argparse.Namespace) -> Answer:
     common = _common(args, family)
     offered = candidates(family, PLAN_POINTS, fixed=common["fixed"])
     (n_sensors, n_inputs), (low, high) = args.plan, args.lines
-    plan = place(
-        family, offered, offered, np.linspace(low, high, PLAN_LINES), n_sensors=n_sensors,
-        n_inputs=n_inputs, noise=args.noise, floor=args.floor, **common,
-    )  # fmt: skip
+    lines = np.linspace(low, high, PLAN_LINES)
+    common |= {"n_sensors": n_sensors, "n_inputs": n_inputs}
+    plan = place(family, offered, offered, lines, noise=args.noise, floor=args.floor, **common)
     data = _data(args, plan) | {
         "plan": {
             name: np.hstack([several.points, several.directions]).tolist()
@@ -393,10 +384,8 @@ def _outside(args: argparse.Namespace, family: "Family") -> "Attached":
             if len(places) != (n := 1 + (option == "joint")):
                 raise ConfigError(f"{shown} names {len(places)} places, needed are {n}.")
             low, high = (typed_number(f"--{option}", part) for part in parts[2:])
-            value: Any = [typed_number(f"--{option}", part) for part in parts[1].split(",")]
-            if option == "mass":
-                if len(value) != 1:
-                    raise ConfigError(f"{shown}: a mass must be one number [kg].")
-                value = value[0]
-            found[name] = kind(*places, value, low, high)
+            value = [typed_number(f"--{option}", part) for part in parts[1].split(",")]
+            if option == "mass" and len(value) != 1:
+                raise ConfigError(f"{shown}: a mass must be one number [kg].")
+            found[name] = kind(*places, value[0] if option == "mass" else value, low, high)
     return found

@@ -9,9 +9,9 @@ Source:
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from rom.arguments import finite, whole
 from rom.assembly.assembly import Assembly
@@ -105,7 +105,7 @@ class Updated:
         """
         if isinstance(self.family, FamilyAssembly):
             raise ConfigError("an assembly has several bodies.", hint="Take Updated.assembly.")
-        return self._signed(self.family.at(**self._own))
+        return self._signed(self.family.at(extrapolate=False, **self._own))
 
     @property
     def assembly(self) -> Assembly:
@@ -121,7 +121,7 @@ class Updated:
         return replace(found, bodies=bodies)
 
     @property
-    def _own(self) -> dict[str, Any]:
+    def _own(self) -> dict[str, float]:
         return {name: self.factors[name] for name in self.family.parameters}
 
     def _signed(self, body: FlexibleBody) -> FlexibleBody:
@@ -135,7 +135,7 @@ class Updated:
         }
         return replace(body, provenance=body.provenance | {"updating": data})
 
-    def responses(self, frequencies: Any) -> Complex:
+    def responses(self, frequencies: npt.ArrayLike) -> Complex:
         """(n_f, n_s, n_e) displacement per force of the updated model at lines [Hz] [m/N].
 
         Raises:
@@ -145,7 +145,13 @@ class Updated:
         return responses_at(self.model, self.logarithms, self.zeta, omega)
 
     def drawn(
-        self, frequencies: Any, sensors: Channels, inputs: Channels, *, n: int, seed: int = 0
+        self,
+        frequencies: npt.ArrayLike,
+        sensors: Channels,
+        inputs: Channels,
+        *,
+        n: int,
+        seed: int = 0,
     ) -> Complex:
         """Responses, also where nothing was measured, at factors that the test leaves possible.
 
@@ -183,10 +189,8 @@ class Updated:
 
     def __str__(self) -> str:
         d = self.deviations
-        lines = [
-            f"  {name} = {self.factors.get(name, np.nan):.5g} +- {100 * d[name]:.2g} %"
-            for name in self.names if name in self.factors
-        ]  # fmt: skip
+        known = [name for name in self.names if name in self.factors]
+        lines = [f"  {name} = {self.factors[name]:.5g} +- {100 * d[name]:.2g} %" for name in known]
         return "\n".join(["updated factors", *lines, str(self.verdict)])
 
 
@@ -341,8 +345,9 @@ def unseen_directions(
 def verdict(s: Sums, data: Data, n: int, missing: dict[str, float], doubts: list[Row]) -> Report:
     """Whether noise alone explains what is left by n unknowns, with scores of what is missing."""
     freedom = data.n_values - n
-    rows = [chi_row("chi-square of all residuals", s.chi_square, freedom, 1, data)]
-    rows += worst_rows(s.squares, data.weight > 0, data.omega, data=data)
+    known = {"known": data.known, "scale": data.scale}
+    rows = [chi_row("chi-square of all residuals", s.chi_square, freedom, 1, **known)]
+    rows += worst_rows(s.squares, data.weight > 0, data.omega, **known)
     if missing:
         name, score = max(missing.items(), key=lambda item: abs(item[1]))
         rows.append(row(f"largest score, {name} [deviations]", abs(score), MAX_SCORE))

@@ -1,9 +1,8 @@
 """Component mode synthesis of one sector, good for all nodal diameters at once."""
 
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from itertools import chain
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -13,7 +12,7 @@ from scipy.spatial import cKDTree
 from rom.arguments import typed
 from rom.checks.draft import Draft, run
 from rom.components.wheels.modes import cyclic_modes, wheel_modes
-from rom.components.wheels.sector import NO_DOFS, Complex, CyclicSector, each_diameter
+from rom.components.wheels.sector import NO_DOFS, Complex, CyclicSector, Matrix, each_diameter
 from rom.eigen.verbs import DEPENDENT_RTOL, every_row, orthonormal_in, own_rows, static_shapes
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, Basis, Index, Interface, Report, Row
@@ -21,6 +20,7 @@ from rom.reduction.bases.method import CraigBampton
 from rom.reduction.interfaces.polynomial import FourierLegendre, Polynomial
 from rom.rows import FREQUENCY_RTOL, N_COMPARED, frequency_rows
 
+Functions = Polynomial | FourierLegendre
 CYCLIC_FACES = "cyclic"  # what the faces are called where sectors of a wheel meet
 
 
@@ -62,7 +62,7 @@ def reduce_sector(
     sector: CyclicSector,
     *,
     n_modes: int | None = None,
-    functions: Polynomial | FourierLegendre | None = None,
+    functions: Functions | None = None,
     method: CraigBampton | None = None,
 ) -> ReducedSector:
     """Craig-Bampton reduction of a sector with a-priori functions on its cyclic faces.
@@ -116,7 +116,7 @@ class SectorDraft(Draft):
     """
 
     root: tuple[Index, Array] | None = None
-    parts: tuple[tuple[Any, int], ...] = ()
+    parts: tuple[tuple[Index, int], ...] = ()
     moved: Array = field(init=False)
     held: Index = field(init=False)
     q: int = field(init=False)
@@ -160,7 +160,7 @@ def project(draft: SectorDraft) -> None:
 
 
 def reduced_by(
-    sector: CyclicSector, method: Any, interfaces: dict[str, Any], *, of_bodies: bool
+    sector: CyclicSector, method: CraigBampton, interfaces: dict[str, Functions], *, of_bodies: bool
 ) -> ReducedSector:
     """A sector by what is given to `rom.reduce`: a method and the functions on its cyclic faces."""
     if of_bodies:
@@ -179,7 +179,7 @@ def reduced_by(
 def projected(sector: CyclicSector, Psi: Array, q: int, omega: Array) -> ReducedSector:
     """The sector in the coordinates of Psi, the first q of them one face, the next q the other."""
 
-    def small(A: Any) -> csr_matrix:
+    def small(A: Matrix) -> csr_matrix:
         return None if A is None else csr_matrix(Psi.T @ (A @ Psi))
 
     K, M = (0.5 * (A + A.T) for A in (small(sector.K), small(sector.M)))
@@ -195,7 +195,7 @@ def projected(sector: CyclicSector, Psi: Array, q: int, omega: Array) -> Reduced
     return ReducedSector(**kept, Psi=Psi, full=sector, omega=omega)
 
 
-def face_functions(sector: CyclicSector, functions: Polynomial | FourierLegendre) -> Array:
+def face_functions(sector: CyclicSector, functions: Functions) -> Array:
     """(k, m) functions on the leading face, orthonormal over its area, zero where it is held.
 
     Raises:
@@ -241,7 +241,6 @@ def distance(points: Array, line: Array) -> Array:
 
 
 N_FAMILIES = 2  # modes per number of nodal diameters, whose union is compared with a wheel
-STIFFER_BLADES = 0.05  # of all blades: the wheel stays cyclic, so that its truth is one sector
 
 
 def sector_certificate(small: CyclicSector, full: CyclicSector) -> Report:
@@ -260,24 +259,12 @@ def sector_certificate(small: CyclicSector, full: CyclicSector) -> Report:
 
 def wheel_certificate(frequencies: Array, full: CyclicSector) -> Report:
     """Frequencies [Hz] of a wheel of equal blades, ascending, against the full sector."""
-    return Report("certificate of the wheel", tuple(_of_wheel("equal blades", frequencies, full)))
+    return Report(
+        "certificate of the wheel", tuple(rows_of_wheel("equal blades", frequencies, full))
+    )
 
 
-def mistuned_certificate(wheel: Any) -> Report:
-    """Frequencies of a wheel whose blades are all a little stiffer, or softer, against its sector.
-
-    Args:
-        wheel: the `MistunedWheel`.
-    """
-    rows: list[Row] = []
-    for change in (STIFFER_BLADES, -STIFFER_BLADES):
-        exact = replace(wheel.sector, K=wheel.sector.K + change * wheel.blade_stiffness)
-        found = wheel.modes(np.full(wheel.sector.n_sectors, change)).frequencies
-        rows += _of_wheel(f"all blades {100 * change:+g} %", found, exact, wheel.speed)
-    return Report("certificate of the mistuned wheel", tuple(rows))
-
-
-def _of_wheel(what: str, found: Array, sector: CyclicSector, speed: float = 0.0) -> list[Row]:
+def rows_of_wheel(what: str, found: Array, sector: CyclicSector, speed: float = 0.0) -> list[Row]:
     """The lowest frequencies of a wheel against the union of those of its sector."""
     exact, complete = [], np.inf
     for modes in wheel_modes(sector, N_FAMILIES, speed=speed):

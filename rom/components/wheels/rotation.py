@@ -10,7 +10,7 @@ alone, because equal functions interpolate all three directions.
 """
 
 from dataclasses import replace
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from scipy.linalg import LinAlgError, eigh
@@ -18,7 +18,7 @@ from scipy.sparse import csr_matrix, identity, kron
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
 from rom.arguments import NotNegative, typed
-from rom.components.wheels.sector import CyclicSector
+from rom.components.wheels.sector import CyclicSector, Matrix
 from rom.eigen.search import MAX_DENSE_DOFS
 from rom.eigen.verbs import pins
 from rom.eigen.workers import held_solution
@@ -66,7 +66,7 @@ def refuse_attachments(model: FEModel) -> None:
         )
 
 
-def rotation_matrices(M: Any, axis: Array) -> tuple[csr_matrix, csr_matrix]:
+def rotation_matrices(M: Matrix, axis: Array) -> tuple[csr_matrix, csr_matrix]:
     """Coriolis matrix per rad/s and softening M (I (x) P) per (rad/s)^2, (n, n) each [kg].
 
     Args:
@@ -93,8 +93,8 @@ def centrifugal_displacement(sector: CyclicSector) -> Array:
     """
     T = sector.harmonic(0)
     load = sector.M @ arms(sector, sector.points).ravel()
-    return T @ held_solution(sector.workers, (T.T @ sector.K @ T, T.T @ sector.M @ T),
-                             axial_pins(sector), T.T @ load)  # fmt: skip
+    waves = T.T @ sector.K @ T, T.T @ sector.M @ T
+    return T @ held_solution(sector.workers, waves, axial_pins(sector), T.T @ load)
 
 
 def arms(sector: CyclicSector, points: Array) -> Array:

@@ -32,6 +32,7 @@ from rom.model import Array, FEModel, Index, Interface
 from rom.names import check_known
 
 Complex = npt.NDArray[np.complex128]
+Matrix = Any  # sparse, dense or of another library: SciPy has no types
 Value = TypeVar("Value")
 NO_DOFS = np.zeros(0, dtype=np.int64)
 PAIR_COST = 4.0  # of waves that travel, in real numbers of twice the size, over those that stand
@@ -72,11 +73,11 @@ class CyclicSector:
     """
 
     n_sectors: int
-    K: Any
-    M: Any
+    K: Matrix
+    M: Matrix
     slave: Index
     master: Index
-    coupling: Any
+    coupling: Matrix
     step: int = 1
     held: Index = field(default_factory=lambda: NO_DOFS)
     points: Array | None = None
@@ -85,9 +86,9 @@ class CyclicSector:
     axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
     at: Array = field(default_factory=lambda: np.zeros(3))
     matching: bool = True
-    coriolis: Any = None
-    centrifugal: Any = None
-    regions: dict[str, Any] = field(default_factory=dict)
+    coriolis: Matrix = None
+    centrifugal: Matrix = None
+    regions: dict[str, Matrix] = field(default_factory=dict)
     sprung: bool = False
     workers: Workers = field(default=ONE_PROCESS, repr=False)
 
@@ -240,7 +241,7 @@ class CyclicSector:
         ]
         return np.array(columns, dtype=complex).reshape(-1, self.n).T
 
-    def wheel(self, *others: Any) -> tuple[csr_matrix, ...]:
+    def wheel(self, *others: Matrix) -> tuple[csr_matrix, ...]:
         """Matrices of the whole wheel, dofs of sector j in its own turned axes.
 
         Args:
@@ -254,7 +255,7 @@ class CyclicSector:
         shift = identity(N, format="csr")[np.roll(np.arange(N), -self.step)]
         T = csr_matrix(kron(identity(N), own) + kron(shift, following))
 
-        def assembled(A: Any) -> csr_matrix:
+        def assembled(A: Matrix) -> csr_matrix:
             each = A if isinstance(A, list | tuple) else [A] * N
             return csr_matrix(T.T @ block_diag(each, format="csr") @ T)
 
@@ -317,6 +318,6 @@ def workers_of(model: FEModel) -> Workers:
     return ONE_PROCESS if model.operators is None else model.operators.workers
 
 
-def all_rows(model: FEModel, A: Any) -> csr_matrix:
+def all_rows(model: FEModel, A: Matrix) -> csr_matrix:
     """A matrix of the model on this process, on all ranks alike, whichever library holds it."""
     return csr_matrix(A if hasattr(A, "tocsr") else model.operators.gathered(A))

@@ -162,7 +162,7 @@ def test_the_doubt_names_the_first_instant_and_its_worst_triangle(monkeypatch, a
     assert [ratio.max() > 10 for ratio in worst] == [False] * 2 + [True] * 2 + [False] * 3
     named = f"from 0.2 s on triangle {worst[2].argmax()} is stretched {worst[2].max():.3g} times"
     with pytest.warns(RomWarning, match=named) as told:
-        _Way(body, SOFT, Actions(held), None, 0.0).doubt(kept)
+        _Way(body, SOFT, prepared(body, Actions(held)), None, 0.0).doubt(kept)
     assert len(told) == 1
 
 
@@ -463,7 +463,7 @@ ABOVE = box((-1, 1), (2, 2))
         ({"loads": [Load(0 * SMALL.points, ((0, 0), (0, 1)))]}, ConfigError, "load 0: times"),
         ({"drives": [Drive([18], ((0,), (0,)))]}, ConfigError, "drive 0: dofs 18 to 18"),
         ({"drives": [Drive([3], ((0,), (0,))), Drive([3], ((0,), (1,)))]}, ConfigError, "twice"),
-        ({"drives": [Drive([3], ((0,), (np.nan,)))]}, ConfigError, "drive 0: values"),
+        ({"drives": [Drive([3], ((0,), (np.nan,)))]}, ConfigError, "drive 0: value 0 is .nan"),
         ({"loads": [Load(0 * SMALL.points, None)]}, ConfigError, "load 0: its history must be"),
         ({"loads": [Load(0 * SMALL.points, Table((0, 0.5), (0, 1)))]}, ConfigError, "0.5 s; asked"),
         ({"tools": [Tool("pad", ABOVE, 0.0, np.sin)]}, ConfigError, r"'pad': .*\(257,\), needed"),

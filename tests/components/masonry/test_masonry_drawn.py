@@ -9,6 +9,7 @@ from scipy.optimize import brentq
 
 import rom
 from cases.paths import ROOT
+from cases.refusals import refuses
 from rom.components.masonry import PointLoad, Rock, drawn, ramp, reduced_stone, simulate, stands
 from rom.errors import ConfigError, ModelError
 from rom.fe.mesh import read_triangles
@@ -96,8 +97,8 @@ RING = [(0, 1, 5), (0, 5, 4), (1, 2, 6), (1, 6, 5), (2, 3, 7), (2, 7, 6), (3, 0,
         ((*stones_of(square(), square(at=(5, 0)))[:2], {"both": range(4)}), (),
          "'both' of 4 triangles is not one piece"),
         ((*stones_of(square())[:2], {"none": []}), (), "'none' of 0 triangles"),
-        ((*stones_of(square())[:2], {"far": [2]}), (), "stone 'far' must be 0 to 1, got 2 to 2"),
-        ((square(), [(0, 1, 4)], {"far": [0]}), (), "triangles must be 0 to 3, got 0 to 4"),
+        ((*stones_of(square())[:2], {"far": [2]}), (), "stone 'far': 2 must be .* 0 to 1"),
+        ((square(), [(0, 1, 4)], {"far": [0]}), (), "triangles: 4 must be .* 0 to 3"),
         (stones_of(square()), ("stone 0",), "all stones are held: stone 0. Leave one free"),
         (stones_of(square(), square(at=(0, 1.0))), ("stone",), "held: stone 0, stone 1"),
         ((*stones_of(square())[:2], {}), (), "all stones are held: there is none"),
@@ -107,8 +108,7 @@ RING = [(0, 1, 5), (0, 5, 4), (1, 2, 6), (1, 6, 5), (2, 3, 7), (2, 7, 6), (3, 0,
     ],
 )  # fmt: skip
 def test_drawings_that_are_no_masonry_are_named(drawing, held, words):
-    with pytest.raises((ConfigError, ModelError), match=words):
-        drawn(*drawing, held=held)
+    refuses((ConfigError, ModelError), words, drawn, *drawing, held=held)
 
 
 @pytest.mark.parametrize("k", [1, 8])

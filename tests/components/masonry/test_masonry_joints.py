@@ -8,6 +8,7 @@ from numba import njit
 from numpy.testing import assert_allclose
 
 from cases.components.masonry import SOFT, G, box
+from cases.refusals import refuses
 from rom.components.masonry import (
     Joint,
     Masonry,
@@ -169,24 +170,20 @@ tension = 1e5
 def test_files_that_are_no_joints_are_named(text, words, tmp_path):
     path = tmp_path / "joints.toml"
     path.write_text(text)
-    with pytest.raises(FileFormatError, match=words):
-        read_joints(path)
+    refuses(FileFormatError, words, read_joints, path)
 
 
 def test_joints_that_cannot_be_are_named(tmp_path):
     path = tmp_path / "joints.toml"
     path.write_text("[[joint]]\nfriction = -0.6")
-    with pytest.raises(ConfigError, match=r"joint 1: friction = -0.6"):
-        read_joints(path)
+    refuses(ConfigError, r"joint 1: friction = -0.6", read_joints, path)
     for between in (((0, 5),), ((1, 1),)):
         with pytest.raises(ConfigError, match="use stones from 0 to 1"):
             simulate(pair(Joint(0.5, between=between)), t_end=0.1, dt=0.01)
     apart = Masonry((stone(box(), **SOFT), stone(box(at=(0, 1.5)), **SOFT)), (0,), 1e10, 0.5,
                     joints=(Joint(0.5, 1e5, between=((0, 1),)),))  # fmt: skip
-    with pytest.raises(ConfigError, match="stones 0 and 1 do not touch"):
-        simulate(apart, t_end=0.1, dt=0.01)
-    with pytest.raises(ConfigError, match=r"thickness = 0 must be positive"):
-        pair(Joint(0.5), thickness=0.0)
+    refuses(ConfigError, "stones 0 and 1 do not touch", simulate, apart, t_end=0.1, dt=0.01)
+    refuses(ConfigError, r"thickness = 0 must be positive", lambda: pair(Joint(0.5), thickness=0.0))
 
 
 def spread_arch(n, thickness, k, x):

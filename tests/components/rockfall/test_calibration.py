@@ -104,8 +104,8 @@ GAP = np.r_[T[:20], T[30:]]
 
 test_bad_histories_are_named = refused(
     (lambda: History(GAP, np.sin(GAP)), ConfigError, r"gap from 0.0387\d+ s to 0.0612\d+ s"),
-    (lambda: History(T, np.where(T == T[7], np.nan, 1.0)), ConfigError, "value 7 of"),
-    (lambda: History(T[::-1], T), ConfigError, "times of a history must grow"),
+    (lambda: History(T, np.where(T == T[7], np.nan, 1.0)), ConfigError, "value 7 is"),
+    (lambda: History(T[::-1], T), ConfigError, "times must grow"),
     (lambda: History(T - 0.01, T), ConfigError, "t >= 0"),
     (lambda: History(T[:5], T[:5]), ConfigError, "8 values or more"),
     (lambda: History(T, 0 * T), ConfigError, "history needs values"),

@@ -76,22 +76,19 @@ def _changing(tracker: ParameterTracker) -> str:
     """Tables of a filter that linearises its equations again."""
     o, assumed = tracker.operation, tracker.assumed
     drifts = tracker.drifts.values()
-    tables = {
-        "DT": np.array([assumed.dt]), "REACH": np.array([LINEAR_REACH]),
-        "SCALE": o.scale, "STIFFNESS": o.K, "MASS": o.M, "DAMPING": o.XI, "DRIVEN": o.driven,
-        "K_POWERS": o.k_powers, "M_POWERS": o.m_powers, "LOW": o.low, "HIGH": o.high,
-        "WHITE": np.diag(assumed.white(o)), "VARIANCES": tracker.R,
-        "WALKS": np.array([d.walk**2 * assumed.dt for d in drifts]),
-        "BEFORE": np.r_[np.diag(assumed.before(o)), [d.first**2 for d in drifts]],
-    }  # fmt: skip
+    tables = {"DT": np.array([assumed.dt]), "REACH": np.array([LINEAR_REACH])}
+    tables |= {"SCALE": o.scale, "STIFFNESS": o.K, "MASS": o.M, "DAMPING": o.XI}
+    tables |= {"DRIVEN": o.driven, "K_POWERS": o.k_powers, "M_POWERS": o.m_powers}
+    tables |= {"LOW": o.low, "HIGH": o.high}
+    tables |= {"WHITE": np.diag(assumed.white(o)), "VARIANCES": tracker.R}
+    tables["WALKS"] = np.array([d.walk**2 * assumed.dt for d in drifts])
+    tables["BEFORE"] = np.r_[np.diag(assumed.before(o)), [d.first**2 for d in drifts]]
     for name, rows in (("SEEN", o.seen), ("WANTED", o.wanted)):
         tables[f"{name}_STILL"], tables[f"{name}_CARRIED"] = rows.displacement, rows.carried
         tables[f"{name}_MOVING"], tables[f"{name}_PUSHED"] = rows.velocity, rows.acceleration
     m, n_e = o.driven.shape
-    sizes = {
-        "MODES": m, "FORCES": n_e, "PARAMETERS": len(o.names), "TERMS": len(o.K),
-        "SENSORS": len(tracker.R), "WANTED": len(o.wanted.displacement),
-    }  # fmt: skip
+    sizes = {"MODES": m, "FORCES": n_e, "PARAMETERS": len(o.names), "TERMS": len(o.K)}
+    sizes |= {"SENSORS": len(tracker.R), "WANTED": len(o.wanted.displacement)}
     numbers = ", ".join(f"{name} = {size}" for name, size in sizes.items())
     names = ", ".join(json.dumps(name) for name in o.names)
     text = f"enum {{ {numbers} }};\nstatic const char *const NAMES[] = {{{names}}};\n"

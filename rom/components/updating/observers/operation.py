@@ -15,7 +15,7 @@ Source:
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from scipy.linalg import eigh, expm, expm_frechet
@@ -26,6 +26,7 @@ from rom.body.flexible import FlexibleBody
 from rom.body.recovery import StressRecovery
 from rom.components.updating.family_model import (
     Attached,
+    Held,
     Parts,
     Structure,
     family_model,
@@ -34,12 +35,11 @@ from rom.components.updating.family_model import (
 )
 from rom.components.updating.measured import POINT_RTOL, Channels
 from rom.errors import ConfigError, ModelError
-from rom.model import Array
-from rom.names import named
+from rom.model import Array, Index
+from rom.names import check_known, named
 
-UNITS = {
-    "displacement": "m", "velocity": "m/s", "acceleration": "m/s2", "strain": "1", "stress": "Pa"
-}  # fmt: skip
+UNITS = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s2"}
+UNITS |= {"strain": "1", "stress": "Pa"}
 UNSEEN_STATE_RTOL = 1e-9  # singular value of a motion that no sensor sees, over the largest
 DAMPED_RTOL = 1e-9  # decay over frequency from which on an unseen motion dies out by itself
 MAX_NORM = 0.5  # of a matrix whose exponential is summed; longer steps are doublings
@@ -180,7 +180,7 @@ def operation(
     attached: Attached,
     channels: tuple[Sequence[Sensors], Channels, Sequence[Sensors]],
     damping: float | None,
-    fixed: Any,
+    fixed: Held,
 ) -> Operation:
     """The equations of a body, an assembly or a family, see `tracker` and `parameter_tracker`.
 
@@ -190,11 +190,8 @@ def operation(
     parts = Parts.of(structure)
     nothing = np.eye(parts.n), np.zeros((0, parts.n))
     model = family_model(structure, nothing, attached, {}, fixed)
-    if wrong := set(names) - set(model.names):
-        raise ConfigError(
-            f"there is no parameter {named(sorted(wrong))}.",
-            hint=f"The family and what is attached have {named(model.names)}.",
-        )
+    for name in names:
+        check_known(name, model.names, f"no parameter {name!r} of family or attached; there are")
     if not model.K.shape[1]:
         what = named(body.name for body in parts.bodies.values())
         raise ConfigError(f"body {what} cannot move with {fixed!r} held; leave one of them free.")
@@ -212,13 +209,11 @@ def operation(
     terms = terms_of(structure)
     seen = _rows(parts, terms, V, sensors, "sensor", len(attached))
     asked = _rows(parts, terms, V, wanted, "wanted value", len(attached))
-    return Operation(
-        tuple(names), np.log(model.low[chosen]), np.log(model.high[chosen]), omega,
-        K=U.T @ model.K @ U, M=U.T @ model.M @ U,
-        k_powers=model.k_powers[:, chosen], m_powers=model.m_powers[:, chosen],
-        XI=XI, driven=(forces.rows(parts.bodies, "force") @ V).T,
-        seen=seen, wanted=asked,
-    )  # fmt: skip
+    low, high = (ends[chosen] for ends in model.ends)
+    matrices = U.T @ model.K @ U, U.T @ model.M @ U
+    powers = model.k_powers[:, chosen], model.m_powers[:, chosen]
+    driven = (forces.rows(parts.bodies, "force") @ V).T
+    return Operation(tuple(names), low, high, omega, *matrices, *powers, XI, driven, seen, asked)
 
 
 def _rows(
@@ -252,7 +247,7 @@ def _rows(
 
 
 def stress_rows(
-    body: FlexibleBody, channels: Channels, what: str, chosen: Any = None
+    body: FlexibleBody, channels: Channels, what: str, chosen: Index | None = None
 ) -> tuple[Array, Array]:
     """Normal stress along channels by elastic coordinates (k, r) [Pa], and by accelerations.
 
@@ -307,10 +302,8 @@ def check_seen(at: Linear, body: Operation) -> None:
             continue
         x = np.abs(Vh[-1])
         unseen = [f"force {k}" for k in range(n_e) if x[2 * m + k] > 0.1 * x.max()]
-        unseen += [
-            f"the motion at {w / (2 * np.pi):.4g} Hz"
-            for k, w in enumerate(body.omega) if max(x[k], x[m + k]) > 0.1 * x.max()
-        ]  # fmt: skip
+        moving = np.maximum(x[:m], x[m : 2 * m]) > 0.1 * x.max()
+        unseen += [f"the motion at {f:.4g} Hz" for f in body.omega[moving] / (2 * np.pi)]
         raise ModelError(
             f"the sensors do not see {named(unseen)}, which would drift.",
             hint="Add a displacement or a stress: accelerations do not see what stands still.",

@@ -12,14 +12,15 @@ Source:
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
+import numpy.typing as npt
 from scipy.linalg import block_diag
 
 from rom.arguments import positive, typed
 from rom.arguments.quantities import NotNegative, Positive
-from rom.components.updating.family_model import Attached, Family, check_units
+from rom.components.updating.family_model import Attached, Family, Held, check_units
 from rom.components.updating.measured import Channels
 from rom.components.updating.observers.operation import (
     Linear,
@@ -28,7 +29,7 @@ from rom.components.updating.observers.operation import (
     discrete,
     operation,
     step_derivatives,
-)  # fmt: skip
+)
 from rom.components.updating.observers.tracking import (
     Assumed,
     First,
@@ -40,10 +41,10 @@ from rom.components.updating.observers.tracking import (
     checked_record,
     linear_tracker,
     recorded,
-)  # fmt: skip
+)
 from rom.errors import ConfigError, ParameterError, SolverError
 from rom.model import Array
-from rom.names import named
+from rom.names import check_known
 from rom.plausible import check_damping_ratio
 
 LINEAR_REACH = 5e-3  # of a logarithm, within which transitions are linear in it
@@ -91,7 +92,7 @@ class ParameterTracker:
         """Of the parameters."""
         return self.operation.names
 
-    def run(self, samples: Any, times: Any = None) -> Track:
+    def run(self, samples: npt.ArrayLike, times: npt.ArrayLike | None = None) -> Track:
         """Filter a record that begins at rest.
 
         Args:
@@ -138,8 +139,8 @@ class ParameterTracker:
         Raises:
             ParameterError: for a name that is not tracked, or a factor that is not positive.
         """
-        if wrong := set(factors) - set(self.names):
-            raise ParameterError(f"{named(sorted(wrong))} must be of {named(self.names)}.")
+        for name in factors:
+            check_known(name, self.names, f"{name!r} must be one of", ParameterError)
         x = np.log([positive(name, factors.get(name, 1.0)) for name in self.names])
         return linear_tracker(self.operation, x, self.assumed, self.sensors, self.wanted)
 
@@ -156,7 +157,7 @@ def parameter_tracker(  # noqa: PLR0913  keywords of one call
     walk: Walk,
     damping: float = 0.01,
     attached: Attached | None = None,
-    fixed: Any = (),
+    fixed: Held = (),
     unmodelled: White = 0.0,
     first: First = None,
 ) -> ParameterTracker:

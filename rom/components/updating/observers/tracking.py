@@ -12,15 +12,16 @@ Source:
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
+import numpy.typing as npt
 
 from rom.arguments import finite, typed
 from rom.arguments.quantities import NotNegative, Positive
 from rom.assembly.assembly import Assembly
 from rom.body.flexible import FlexibleBody
-from rom.components.updating.family_model import check_units
+from rom.components.updating.family_model import Held, check_units
 from rom.components.updating.measured import Channels
 from rom.components.updating.observers.filter_steps import filtered
 from rom.components.updating.observers.operation import (
@@ -31,7 +32,7 @@ from rom.components.updating.observers.operation import (
     check_seen,
     discrete,
     operation,
-)  # fmt: skip
+)
 from rom.errors import ConfigError, SolverError
 from rom.model import Array
 
@@ -96,7 +97,7 @@ class Observer:
     inputs: tuple[tuple[str, str], ...]
     outputs: tuple[tuple[str, str], ...]
 
-    def run(self, samples: Any) -> Array:
+    def run(self, samples: npt.ArrayLike) -> Array:
         """(n_t, n_v) values [m, m/s, m/s^2 or Pa] a step after samples (n_t, n_y), from rest.
 
         Raises:
@@ -142,7 +143,7 @@ class Tracker:
     inputs: tuple[tuple[str, str], ...]
     outputs: tuple[tuple[str, str], ...]
 
-    def run(self, samples: Any, times: Any = None) -> Track:
+    def run(self, samples: npt.ArrayLike, times: npt.ArrayLike | None = None) -> Track:
         """Filter a record that begins at rest.
 
         Args:
@@ -248,7 +249,9 @@ def recorded(
     )
 
 
-def checked_record(samples: Any, times: Any, n_y: int, dt: float) -> Array:
+def checked_record(
+    samples: npt.ArrayLike, times: npt.ArrayLike | None, n_y: int, dt: float
+) -> Array:
     """(n_t, n_y) samples on equal steps."""
     y = np.ascontiguousarray(samples, dtype=float)
     if y.ndim != 2 or y.shape[1] != n_y or np.isinf(y).any():
@@ -332,7 +335,7 @@ def tracker(  # noqa: PLR0913  keywords of one call
     *,
     dt: Step,
     walk: Walk,
-    fixed: Any = (),
+    fixed: Held = (),
     unmodelled: White = 0.0,
     first: First = None,
 ) -> Tracker:

@@ -2,10 +2,10 @@
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
+from rom.components.updating.frf_data import Complex
 from rom.components.updating.measured import Channels, Responses
 from rom.errors import FileFormatError
 from rom.io.fields.universal import FREQUENCY_RESPONSE, Function
@@ -110,7 +110,7 @@ def _by_pair(functions: list[Function], bodies: Bodies) -> dict[tuple[Dof, Dof],
     return known
 
 
-def _receptance(f: Function) -> Any:
+def _receptance(f: Function) -> Complex:
     used = f.x > 0
     H = np.full(f.x.shape, np.nan, dtype=complex)
     H[used] = replace(f, x=f.x[used], y=f.y[used]).receptance()

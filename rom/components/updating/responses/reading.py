@@ -17,9 +17,10 @@ from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
 from rom.arguments import typed
 from rom.components.updating.measured import Channels, MeasuredModes, Responses
@@ -30,14 +31,19 @@ from rom.errors import ConfigError, FileFormatError, UnsafeFileError
 from rom.io.files import check_readable, write_whole
 from rom.io.hdf5 import h5py
 from rom.model import Array
+from rom.names import check_ending
+
+if TYPE_CHECKING:
+    import h5py as h5
 
 UNIVERSAL_ENDINGS, TABLE_ENDINGS = (".uff", ".unv", ".uf"), (".csv", ".txt")
 ARRAY_ENDINGS = (".h5", ".hdf5")
 HEADERS = ("v108", "v108")  # oldest and newest version of HDF5 that is written
 KINDS = {"fiu": "real numbers", "c": "complex numbers"}  # by the letters of NumPy
 MAX_ARRAY_BYTES = 2**32  # of all arrays of a test
-DATA_SETS = ("frequencies", "H", "coherence", "sensors/points", "sensors/directions",
-          "inputs/points", "inputs/directions")  # fmt: skip
+SIDES = ("sensors", "inputs")
+PLACES = tuple(f"{side}/{what}" for side in SIDES for what in ("points", "directions"))
+DATA_SETS = ("frequencies", "H", "coherence", *PLACES)
 TEXTS = ("estimator", "bodies of sensors", "bodies of inputs")  # attributes that may be missing
 FORCE_NOISE = "force_noise"  # a data set where it differs between lines
 
@@ -85,8 +91,7 @@ def read_responses(
                     return _test(file)
             except (OSError, RuntimeError, KeyError, TypeError, ValueError) as error:
                 raise FileFormatError(f"this is no whole HDF5 file: {error}.") from error
-    if ending not in UNIVERSAL_ENDINGS + TABLE_ENDINGS:
-        raise _unknown(path, UNIVERSAL_ENDINGS + TABLE_ENDINGS + ARRAY_ENDINGS)
+    check_ending(path, "a test", *UNIVERSAL_ENDINGS, *TABLE_ENDINGS, *ARRAY_ENDINGS)
     if averages is None:
         raise ConfigError(
             "averages is missing: how many are behind the functions?",
@@ -132,25 +137,23 @@ def write_responses(test: Responses, path: str | Path) -> Path:
         ConfigError: for another ending, or if the folder is missing or not writable.
         ResourceError: if the disk is full, or h5py is missing.
     """
-    path = Path(path)
-    if path.suffix.lower() not in ARRAY_ENDINGS:
-        raise _unknown(path, ARRAY_ENDINGS)
-    sides = ("sensors", test.sensors), ("inputs", test.inputs)
+    path = check_ending(path, "a test", *ARRAY_ENDINGS)
+    sides = list(zip(SIDES, (test.sensors, test.inputs), strict=True))
     places = (x for _, channels in sides for x in (channels.points, channels.directions))
     values = (test.frequencies, test.H, test.coherence, *places)
-    arrays: dict[str, Any] = dict(zip(DATA_SETS, values, strict=True))
+    arrays = dict(zip(DATA_SETS, map(np.asarray, values), strict=True))
     texts = {"quantity": ",".join(test.quantities), "units": "SI"}
     texts |= {f"bodies of {k}": "\n".join(x.bodies) for k, x in sides if x.bodies is not None}
     if test.estimator is not None:
         texts["estimator"] = test.estimator
     numbers = {"averages": test.averages, FORCE_NOISE: test.force_noise}
     if np.ndim(test.force_noise):
-        arrays[FORCE_NOISE] = numbers.pop(FORCE_NOISE)
+        arrays[FORCE_NOISE] = np.asarray(numbers.pop(FORCE_NOISE))
     texts["checksum"] = _checksum(list(arrays.values()))
     data = io.BytesIO()
     with h5py(".uff").File(data, "w", libver=HEADERS) as file:
         for name, value in arrays.items():
-            file[name] = np.asarray(value)
+            file[name] = value
         for name, text in texts.items():
             file.attrs[name] = np.bytes_(text.encode())
         file.attrs.update(numbers)
@@ -181,19 +184,15 @@ def _points(path: str | Path | None) -> tuple[dict[int, Array], dict[int, str]]:
         return functions_and_points(path)[1], {}
 
 
-def _unknown(path: Path, known: tuple[str, ...]) -> ConfigError:
-    return ConfigError(f"{path}: the ending must be one of {', '.join(known)}.")
-
-
-def _test(file: Any) -> Responses:
-    h5 = h5py(".uff")
-    if missing := [name for name in DATA_SETS if not isinstance(file.get(name), h5.Dataset)]:
+def _test(file: "h5.File") -> Responses:
+    dataset = h5py(".uff").Dataset
+    if missing := [name for name in DATA_SETS if not isinstance(file.get(name), dataset)]:
         raise FileFormatError(f"there is no data set {missing[0]!r}.")
     if missing := [name for name in ("averages", "quantity", "units") if name not in file.attrs]:
         raise FileFormatError(f"the file has no attribute {missing[0]!r}.")
     if (units := _text(file.attrs["units"])) != "SI":
         raise FileFormatError(f"units are {units!r}, not 'SI'.")
-    names = (*DATA_SETS, *[FORCE_NOISE] * isinstance(file.get(FORCE_NOISE), h5.Dataset))
+    names = (*DATA_SETS, *[FORCE_NOISE] * isinstance(file.get(FORCE_NOISE), dataset))
     if sum(file[name].nbytes for name in names) > MAX_ARRAY_BYTES:
         raise UnsafeFileError("its arrays take more than 4 GiB.")
     for name in names:
@@ -211,7 +210,7 @@ def _test(file: Any) -> Responses:
     averages = _number(file, "averages")
     if averages != int(averages):
         raise FileFormatError(f"averages = {averages} is no whole number.")
-    noise: Any = where[4] if where[4:] else 0.0
+    noise = where[4] if where[4:] else 0.0
     if FORCE_NOISE in file.attrs:
         noise = _number(file, FORCE_NOISE)
     quantity, *several = _text(file.attrs["quantity"]).split(",")
@@ -220,7 +219,7 @@ def _test(file: Any) -> Responses:
     return Responses(f, H, sensors, inputs, c, int(averages), each, noise, estimator)
 
 
-def _checksum(values: Sequence[Any]) -> str:
+def _checksum(values: Sequence[npt.ArrayLike]) -> str:
     """SHA-256 of the bytes of all arrays, one after another."""
     whole = sha256()
     for value in values:
@@ -228,12 +227,12 @@ def _checksum(values: Sequence[Any]) -> str:
     return whole.hexdigest()
 
 
-def _text(value: Any) -> str:
+def _text(value: object) -> str:
     """An attribute of fixed or free length."""
     return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
 
 
-def _number(file: Any, name: str) -> float:
+def _number(file: "h5.File", name: str) -> float:
     value = np.asarray(file.attrs[name])
     if value.shape or value.dtype.kind not in "fiu" or not np.isfinite(value):
         raise FileFormatError(f"{name} = {file.attrs[name]} is no number.")

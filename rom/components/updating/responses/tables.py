@@ -8,7 +8,6 @@ over. Columns stand between commas, semicolons or tabs; with these two, numbers 
 import codecs
 import re
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -97,7 +96,7 @@ def _functions(pair: Pair, own: dict[str, tuple[str, Array]], x: Array) -> list[
         y = a + 1j * b if first == "real" else a * np.exp(1j * b * ANGLES[other])
         found.append(Function(FREQUENCY_RESPONSE, x, y * factor, *pair, kind, FORCE_TYPE, ()))
     if "coherence" in own:
-        c: Any = own["coherence"][1]
+        c = own["coherence"][1].astype(complex)
         found.append(Function(COHERENCE_KIND, x, c, *pair, 0, FORCE_TYPE, ()))
     return found
 
@@ -143,7 +142,7 @@ def _numbers(rows: list[tuple[int, Row]], separator: str) -> Array:
         raise FileFormatError(
             "numbers have commas and points: one of them is of thousands.",
             hint="Write numbers without separators of thousands.",
-        )  # fmt: skip
+        )
     for number, cells in rows:
         try:
             found.append([_number(cell, separator) for cell in cells])

@@ -12,9 +12,8 @@ from rom.errors import ConfigError
 
 STANDARD_GRAVITY = 9.80665  # [m/s^2]
 LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "ft": 0.3048}  # [m]
-FORCES = {
-    "n": 1.0, "kn": 1e3, "mn": 1e-3, "kgf": STANDARD_GRAVITY, "lbf": 0.45359237 * STANDARD_GRAVITY
-}  # fmt: skip
+FORCES = {"n": 1.0, "kn": 1e3, "mn": 1e-3, "kgf": STANDARD_GRAVITY}
+FORCES["lbf"] = 0.45359237 * STANDARD_GRAVITY
 MOTIONS = {"": 8, "/s": 11, "/s^2": 12}  # types of ordinate in universal files
 SPELLINGS = {"\u00b2": "^2", "\u00b5": "u", "\u03bc": "u", "**": "^", "s2": "s^2", "inch": "in"}
 IN_G = ("g", "gn", "g's")

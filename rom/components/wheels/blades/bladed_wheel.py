@@ -34,6 +34,7 @@ from rom.errors import ConfigError, ModelError
 from rom.model import Array, Modes, Report
 from rom.plausible import check_damping_ratio
 
+PerBlade = Any  # an array for all blades alike, or a list of arrays, one for each
 RIGID_RTOL = 1e-9  # of the largest squared frequency: what is less negative is a rigid motion
 
 
@@ -274,12 +275,12 @@ class BladedWheel:
     def response(
         self,
         blades: Sequence[ReducedBlade],
-        force: Any,
+        force: PerBlade,
         *,
         engine_order: int,
         omega: npt.ArrayLike,
         damping: Annotated[float, Between(0.0, 1.0, "()")],
-        at: Any,
+        at: PerBlade,
         speed: float = 0.0,
     ) -> Complex:
         """Answer of all blades to forces that travel around the wheel.
@@ -328,7 +329,7 @@ class BladedWheel:
         return np.stack([amplitude @ row.T for row in seen], axis=1)
 
     def amplification(
-        self, blades: Sequence[ReducedBlade], force: Any, *, at: Any, **sweep: Any
+        self, blades: Sequence[ReducedBlade], force: PerBlade, *, at: PerBlade, **sweep: Any
     ) -> float:
         """Largest amplitude of any blade, as a multiple of that of the tuned wheel [1].
 
@@ -352,7 +353,7 @@ class BladedWheel:
         return peak / reference
 
 
-def _each(what: Any, N: int) -> list[Any]:
+def _each(what: PerBlade, N: int) -> PerBlade:
     """One for each blade: a list of arrays, or the same for all.
 
     Raises:

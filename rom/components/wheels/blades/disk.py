@@ -1,7 +1,5 @@
 """The disk of a substructured sector, condensed for each harmonic to the roots of its blades."""
 
-from typing import Any
-
 import numpy as np
 from scipy.linalg import block_diag, eigh
 
@@ -35,7 +33,7 @@ def bladed_wheel(
         AIAA J. 39 (2001) 1182; see docs/theory/cyclic_symmetry.md.
     """
     j = np.arange(sector.n_sectors)
-    given = {name: A for name, A in _disk(sector).items() if A is not None}
+    given = _disk(sector)
     blocks: dict[str, list[list[Array]]] = {name: [] for name in given}
     roots, rigid = [], []
     for n in sector.diameters:
@@ -120,13 +118,12 @@ def _condensed(
     return blocks, V
 
 
-def _disk(sector: SubstructuredSector) -> dict[str, Any]:
-    """Matrices of the sector without its blade, those of rotation None at rest."""
+def _disk(sector: SubstructuredSector) -> dict[str, Array]:
+    """Matrices of the sector without its blade, those of rotation where it turns."""
     at = np.r_[sector.root, sector.cantilever]
-    found: dict[str, Any] = {}
+    found = {}
     for name in ("K", "M", "coriolis", "centrifugal"):
-        whole = getattr(sector, name)
-        found[name] = None if whole is None else whole.toarray()
-        if whole is not None:
+        if (whole := getattr(sector, name)) is not None:
+            found[name] = whole.toarray()
             found[name][np.ix_(at, at)] -= getattr(sector.blade, name)
     return found

@@ -14,7 +14,7 @@ Source:
 """
 
 from dataclasses import dataclass, field, fields, replace
-from typing import Any
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -25,6 +25,7 @@ from rom.checks.draft import run
 from rom.components.wheels.faces import interpolation
 from rom.components.wheels.reduced import (
     CYCLIC_FACES,
+    Functions,
     ReducedSector,
     SectorDraft,
     basis,
@@ -38,7 +39,14 @@ from rom.eigen.verbs import dofs_of, every_row, own_rows, static_shapes
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, FEModel, Index, Interface
 from rom.names import check_known
-from rom.reduction.interfaces.polynomial import FourierLegendre, Polynomial, interface_functions
+from rom.reduction.interfaces.polynomial import Polynomial, interface_functions
+
+
+class Stresses(Protocol):
+    """What evaluates the stress of finite elements."""
+
+    def prestress(self, u: Array) -> csr_matrix:
+        """(n, n) geometric stiffness [N/m] of the stress at the displacement u (n,) [m]."""
 
 
 @typed
@@ -200,7 +208,9 @@ def blade_in(K: csr_matrix, M: csr_matrix, Psi: Array, n_root: int) -> ReducedBl
     return ReducedBlade(K_small, M_small, Psi, n_root)
 
 
-def turning(blade: ReducedBlade, M: csr_matrix, stresses: Any, axis: Array, u: Array) -> Any:
+def turning(
+    blade: ReducedBlade, M: csr_matrix, stresses: Stresses, axis: Array, u: Array
+) -> ReducedBlade:
     """The blade with the matrices of its rotation about a unit vector; u (n,) at 1 rad/s [m]."""
     G, softening = rotation_matrices(M, axis)
     Psi = blade.Psi
@@ -208,7 +218,7 @@ def turning(blade: ReducedBlade, M: csr_matrix, stresses: Any, axis: Array, u: A
     return replace(blade, coriolis=Psi.T @ (G @ Psi), centrifugal=0.5 * (C + C.T))
 
 
-def stresses_of(model: FEModel, blade: str | None) -> Any:
+def stresses_of(model: FEModel, blade: str | None) -> Stresses:
     """Stress that the elements of a blade carry.
 
     Raises:
@@ -268,8 +278,8 @@ def substructured_sector(
     *,
     n_modes: int,
     n_blade_modes: int,
-    functions: Polynomial | FourierLegendre | None = None,
-    root: Polynomial | FourierLegendre | None = None,
+    functions: Functions | None = None,
+    root: Functions | None = None,
     blade: str = "blade",
 ) -> SubstructuredSector:
     """Craig-Bampton reduction of disk and blade, with a-priori functions on all faces.

@@ -18,6 +18,7 @@ from rom.components.wheels.sector import CyclicSector
 from rom.model import Array
 from rom.paths.load_steps import load_steps
 
+Solid = Any  # of `rom.fe.forms.large_strain.FiniteStrain`, or whatever has its verbs
 MAX_ITERATIONS = 25
 INCREMENT_RTOL = 1e-9  # last increment, of the displacement; the next one is its square
 NOISE_RTOL = 1e-12  # of the extent; smaller increments are noise, which an instability amplifies
@@ -37,7 +38,7 @@ class SteadyRotation:
         square: square of the speed [(rad/s)^2].
     """
 
-    def __init__(self, sector: CyclicSector, solid: Any):
+    def __init__(self, sector: CyclicSector, solid: Solid):
         self.solid, self.square, self.workers = solid, 0.0, sector.workers
         self.T, self.kept = sector.harmonic(0), sector.free
         self.free = np.setdiff1d(np.arange(self.T.shape[1]), axial_pins(sector))

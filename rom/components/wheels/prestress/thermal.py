@@ -19,8 +19,9 @@ from scipy.sparse import block_diag, csr_matrix, identity
 
 from rom.arguments import finite, number, typed
 from rom.components.wheels.modes import real_form
+from rom.components.wheels.prestress.steady_rotation import Solid
 from rom.components.wheels.rotation import axial_pins, largest_ratio
-from rom.components.wheels.sector import CyclicSector, all_rows, workers_of
+from rom.components.wheels.sector import CyclicSector, Matrix, all_rows, workers_of
 from rom.eigen.supports import Fixed, held_dofs
 from rom.eigen.verbs import dofs_of, pins, rigid_motions
 from rom.eigen.workers import Workers, held_solution
@@ -28,7 +29,7 @@ from rom.errors import ConfigError, ModelError
 from rom.model import Array, FEModel, Index
 from rom.names import check_known
 
-Temperature = float | Mapping[str, float] | npt.ArrayLike | Callable[[Array], Any]
+Temperature = float | Mapping[str, float] | npt.ArrayLike | Callable[[Array], npt.ArrayLike]
 
 
 @typed
@@ -181,7 +182,7 @@ def thermal_buckling(model: FEModel, heat: Heat, *, fixed: Fixed = ()) -> float:
     return factor if factor * heat.largest_strain(model) < LARGEST_STRAIN else np.inf
 
 
-def finite_solid(model: FEModel, heat: Heat | None = None) -> Any:
+def finite_solid(model: FEModel, heat: Heat | None = None) -> Solid:
     """The solid in large motion, heated, see `rom.fe.forms.large_strain.FiniteStrain`.
 
     Raises:
@@ -195,7 +196,7 @@ def finite_solid(model: FEModel, heat: Heat | None = None) -> Any:
     return solid
 
 
-def critical_factor(K: Any, K_geo: Any) -> float:
+def critical_factor(K: Matrix, K_geo: Matrix) -> float:
     """Smallest positive tau with a singular K + tau K_geo; infinite if there is none.
 
     Args:
@@ -208,7 +209,7 @@ def critical_factor(K: Any, K_geo: Any) -> float:
 
 def _stressed(
     model: FEModel, heat: Heat, fixed: Fixed
-) -> tuple[Any, csr_matrix, csr_matrix, Index]:
+) -> tuple[Solid, csr_matrix, csr_matrix, Index]:
     """The solid, its stiffness, that of its thermal stress, and the dofs held."""
     solid = finite_solid(model, heat)
     held = held_dofs(model.interfaces, fixed) if fixed else _six_dofs(model.points)
@@ -218,7 +219,7 @@ def _stressed(
 
 
 def _thermal(
-    solid: Any, T: csr_matrix, held: Index, M: Any, workers: Workers
+    solid: Solid, T: csr_matrix, held: Index, M: Matrix, workers: Workers
 ) -> tuple[csr_matrix, csr_matrix]:
     """Stiffness of the cold solid and of the stress of its heat, with u = T a."""
     at_rest = np.zeros(T.shape[0])
@@ -258,12 +259,13 @@ def _carried_along(K_geo: csr_matrix, held: Index, R: Array) -> csr_matrix:
     return csr_matrix(W @ csr_matrix(0.5 * (S + S.T)) @ W.T - F @ W.T - W @ F.T)
 
 
-def _waves(sector: CyclicSector, diameter: int, *matrices: Any) -> tuple[csr_matrix, ...]:
+def _waves(sector: CyclicSector, diameter: int, *matrices: Matrix) -> tuple[csr_matrix, ...]:
     """Real matrices of the waves with some nodal diameters, motions of the whole wheel pinned."""
     T = sector.harmonic(diameter)
-    R: Any = sector.rigid(diameter)[sector.free]
+    rigid = sector.rigid(diameter)[sector.free]
     standing = sector.standing(diameter)
-    R = np.hstack([R.real, R.imag]) if standing else real_form(csr_matrix(R)).toarray()
+    R = np.hstack([rigid.real, rigid.imag])
+    R = R if standing else real_form(csr_matrix(rigid)).toarray()
     T = T if standing else real_form(T)
     R = R[:, np.linalg.norm(R, axis=0) > 0]
     whole = (T.T @ (A if standing else block_diag([A, A], format="csr")) @ T for A in matrices)
