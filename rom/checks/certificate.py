@@ -64,7 +64,7 @@ def certify(draft: Draft) -> None:
             begin(f"compare with the full model, {support}")
             full = connection.ops.affordable and (known or not fixed)
             loaded = fixed == tuple(connection.parts)[:1] and len(connection.parts) > 1
-            held = full_support(connection, parts, fixed) if full or loaded else None
+            held: Any = full_support(connection, parts, fixed) if full or loaded else None
             if loaded:
                 held = connection.ops.hold(held) if isinstance(held, np.ndarray) else held
                 static = _static_row(connection, body, held)

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from scipy.sparse import identity, kron
@@ -73,7 +74,7 @@ class AffineModel:
         """Models whose rigid motions the basis needs besides those of the centre."""
         return iter(())
 
-    def kinds(self, interfaces: dict[str, object]) -> dict[str, object]:
+    def kinds(self, interfaces: dict[str, Any]) -> dict[str, object]:
         """Kinds of the interfaces whose coordinates are the same at all factors."""
         return interfaces
 
@@ -199,7 +200,7 @@ class StretchedModel(AffineModel):
         points = self.stretch.mapped(self.model.points, w)
         return replace(self.model, points=points, interfaces=faces)
 
-    def kinds(self, interfaces: dict[str, object]) -> dict[str, object]:
+    def kinds(self, interfaces: dict[str, Any]) -> dict[str, object]:
         """All motions that are rigid at some thickness, for interfaces that are rigid."""
         for name, kind in interfaces.items():
             if not isinstance(kind, str) or kind != "rbe2":

@@ -4,7 +4,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from rom.arguments import typed
-from rom.assembly.assembly import Assembly, Place
+from rom.assembly.assembly import Assembly
+from rom.assembly.coupling import Place
 from rom.components.families.family import BodyFamily
 from rom.components.families.parameters import Parameter, complete
 from rom.errors import ConfigError

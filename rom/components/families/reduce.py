@@ -13,6 +13,7 @@ are estimated as the basis grows, and compared with full models where it was not
 import logging
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -84,7 +85,7 @@ def reduce_parametric(  # noqa: PLR0913  one keyword per choice
     *,
     parameters: dict[str, Parameter],
     method: Method | Characteristic,
-    interfaces: dict[str, object],
+    interfaces: dict[str, Any],
     reference: object = "mean-axis",
     damping: Rayleigh | ModalDamping | None = None,
     name: str = "body",

@@ -66,9 +66,9 @@ def _wheels(places: Places, body: str) -> Iterator[Mesh]:
             if getattr(pair, "helix", 0.0) or min(pair.teeth) < 0:
                 raise ConfigError(f"the wheels of {name!r} must be spur wheels with teeth outside.")
             axes = _axes(places, mesh)
-            cut, alpha = (pair.teeth[side], pair.module, pair.width), pair.pressure_angle
-            points, triangles = gear(*cut, pressure_angle=alpha)
-            turn = side * np.pi + middle_of_tooth(pair, side, mesh.phase) - np.pi / cut[0]
+            z, m, alpha = int(pair.teeth[side]), pair.module, pair.pressure_angle
+            points, triangles = gear(z, m, pair.width, pressure_angle=alpha)
+            turn = side * np.pi + middle_of_tooth(pair, side, mesh.phase) - np.pi / z
             c, s = np.cos(turn), np.sin(turn)
             rows = np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]) @ np.array(axes)
             yield points @ rows + places.point(marker)[0], triangles
@@ -112,7 +112,7 @@ def tooth_walls(
     if not loads.force.any():
         raise ConfigError(f"no tooth of {name!r} bears at that instant; take another one of sol.t.")
     mesh = solution.mechanism.gear_meshes[name]
-    places = moving(solution.mechanism, solution, [at], 1.0)
+    places = moving(solution.mechanism, solution, np.array([at]), 1.0)
     axes, middle = _axes(places, mesh), places.point(mesh.i)[0]
     lines = _lines(mesh.pair, loads, axes)
     points, triangles = joined([_wall(line, scale * load, upright) for line, load in lines])
@@ -170,7 +170,7 @@ def film_wall(
     """
     pressure = film_pressures(solution, name)[at]
     film = solution.mechanism.journal_bearings[name]
-    places = moving(solution.mechanism, solution, [at], 1.0)
+    places = moving(solution.mechanism, solution, np.array([at]), 1.0)
     z, x = (places.direction(film.j.body, axis)[0] for axis in film.axes[1:])
     middle = places.point(film.j)[0] + shift * z
     nt, nz = pressure.shape

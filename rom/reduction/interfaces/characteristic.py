@@ -2,6 +2,7 @@
 
 import logging
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.linalg import eigh, null_space, orth
@@ -53,7 +54,7 @@ class Characteristic:
     def __post_init__(self) -> None:
         whole("n", self.n, 6, reason="the rigid motions count")
 
-    def kinds(self, connection: Connection, interfaces: dict[str, object]) -> dict[str, object]:
+    def kinds(self, connection: Connection, interfaces: dict[str, Any]) -> dict[str, object]:
         """The kinds of all interfaces, functions in the place of "full".
 
         Args:
