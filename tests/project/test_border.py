@@ -22,7 +22,7 @@ from cases.files.border_calls import body, calls, mistuned, model
 from cases.files.docstrings import public
 from cases.paths import ROOT
 from rom.arguments.border import _Border, _taken
-from rom.arguments.kinds import Names, Unfit, evaluated
+from rom.arguments.kinds import Unfit, parameters_of
 from rom.errors import RomError
 
 SECONDS = 5.0  # a wrong argument is refused before work starts
@@ -210,10 +210,8 @@ def test_limits_and_units_of_numbers_are_those_on_record():
     found = set()
     for _, function, _ in at_the_border():
         plain = inspect.unwrap(getattr(function, "__func__", function))
-        name, known = plain.__qualname__, Names(vars(sys.modules[plain.__module__]))
-        for p in inspect.signature(plain).parameters.values():
-            for words in limits(evaluated(p.annotation, known)):
-                found.add(f"{name} {p.name}: {words}")
+        for p in parameters_of(plain):
+            found.update(f"{plain.__qualname__} {p.name}: {x}" for x in limits(p.annotation))
     record = set((ROOT / "tests/reference/limits.txt").read_text().splitlines())
     assert not found - record, f"not on record: {sorted(found - record)}"
     gone = record - found if find_spec("dolfinx") else set()  # without it some are not there
