@@ -36,7 +36,7 @@ class Motion(NamedTuple):
 
     Attributes:
         position: (K, 3) [m].
-        axes: (K, 3, 3) axes of each marker as columns.
+        axes: (K, 3, 3) axes of each marker as columns [1].
         velocity: (K, 3) [m/s].
         omega: (K, 3) angular velocity [rad/s].
     """
@@ -55,8 +55,8 @@ class Answer(NamedTuple):
         moment: (K, 3) about each marker, world [N m].
         energy: (1,) stored [J].
         lost: (1,) power turned into heat [W].
-        memory: (m,) to be remembered when the step is accepted.
-        outputs: (o,) values for the record.
+        memory: (m,) to be remembered when the step is accepted, in its own units.
+        outputs: (o,) values for the record, in their own units.
     """
 
     force: Array

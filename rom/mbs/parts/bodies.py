@@ -118,7 +118,11 @@ class Part:
         return np.asarray(self.flexible.markers[marker.place].point, dtype=float)
 
     def spin_about(self, name: str, axis: Array) -> float:
-        """Angular velocity [rad/s] through the frame about an axis (3,), which must be its own."""
+        """Angular velocity of the material through the frame about an axis (3,) of it [rad/s].
+
+        Raises:
+            ConfigError: naming the element that asks, if the body spins about another axis.
+        """
         speed = float(axis @ self.spin)
         if np.linalg.norm(self.spin - speed * axis) > SPIN_RTOL * np.linalg.norm(self.spin):
             raise ConfigError(
@@ -136,7 +140,11 @@ class Part:
             )
 
     def check_on_axis(self, name: str, marker: Marker) -> None:
-        """Let nothing, by name, hold a body that spins at a marker beside its axis."""
+        """Let nothing, by name, hold a body that spins at a point beside its axis.
+
+        Raises:
+            ModelError: if the marker lies beside the axis through the mass centre.
+        """
         speed = float(np.linalg.norm(self.spin))
         if not speed or self._surface_row(marker.place) is not None:
             return

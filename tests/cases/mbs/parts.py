@@ -1,9 +1,11 @@
-"""What many mechanisms begin with: a body on a guide or a hinge, a rod held at its start."""
+"""What many mechanisms begin with: a body on a guide or a hinge, a rod held; wrong calls on one."""
 
 import numpy as np
+import pytest
 
 import rom
 from rom.components.cosserat import body, straight
+from rom.errors import ConfigError
 
 ORIGIN = (0.0, 0.0, 0.0)
 X, Y, Z = np.eye(3)
@@ -79,3 +81,34 @@ def held_rod(n, *, joint="fixed", gravity=ORIGIN, on=None, axis=None, length=1.0
             "hook", base or mech.ground.marker(ORIGIN), rod.marker("start"), **about
         )
     return mech, rod
+
+
+def boxed():
+    """A mechanism of one box, a place of the ground, and the centre of the box."""
+    mech = rom.Mechanism()
+    box = mech.add_rigid("box", mass=1, inertia=(1, 1, 1), at=ORIGIN)
+    return mech, mech.ground.marker(ORIGIN), box.marker(ORIGIN)
+
+
+def refused_on(build, rows, error=ConfigError):
+    """A test that each call names its culprit, and leaves a mechanism as it was.
+
+    Args:
+        build: makes a mechanism, and what the calls take beside it.
+        rows: {what is wrong: (call, words of the message)}, with the class between where it is
+            another one.
+        error: that class.
+    """
+
+    @pytest.mark.parametrize("case", rows)
+    def test(case):
+        call, *kind, words = rows[case]
+        mech, *more = build()
+        entries = mech.parts, mech.joints, mech.drives, mech.elements
+        before = [set(x) for x in entries]
+        with pytest.raises(*kind or [error]) as caught:
+            call(mech, *more)
+        assert words in f"{caught.value} {caught.value.where}"
+        assert [set(x) for x in entries] == before
+
+    return test

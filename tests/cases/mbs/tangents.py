@@ -72,18 +72,30 @@ def assert_forces_are_the_gradient(packed, W, mesh, q):
     assert_allclose(moment, 0.0, atol=1e-11 * np.abs(one[3:]).max())
 
 
-def by_position(packed, W, q, v):
+def by_position(packed, W, q, v, a=None, lam=NONE, step=1e-9):
     """Derivatives of the forces by the position: as the tangent has them, and by differences."""
-    wanted = difference(lambda x: forces_at(packed, W, shifted(packed, q, x), v), v.size, 1e-9)
-    tangents_at(packed.system, W, q, v, 0 * v, NONE, (0.0, 0.0, 1.0))
+    a = 0 * v if a is None else a
+    wanted = difference(
+        lambda x: forces_at(packed, W, shifted(packed, q, x), v, a, lam), v.size, step
+    )
+    tangents_at(packed.system, W, q, v, a, lam, (0.0, 0.0, 1.0))
     return W.Kt.copy(), wanted
 
 
-def by_velocity(packed, W, q, v):
+def by_velocity(packed, W, q, v, a=None, lam=NONE):
     """Derivatives of the forces by the velocity: as the tangent has them, and by differences."""
-    wanted = difference(lambda x: forces_at(packed, W, q, v + x), v.size)
-    tangents_at(packed.system, W, q, v, 0 * v, NONE, (0.0, 1.0, 0.0))
+    a = 0 * v if a is None else a
+    wanted = difference(lambda x: forces_at(packed, W, q, v + x, a, lam), v.size)
+    tangents_at(packed.system, W, q, v, a, lam, (0.0, 1.0, 0.0))
     return W.S.copy(), wanted
+
+
+def elastic_forces(packed, W, q, stiffness, lam=NONE, step=1e-6):
+    """Slopes of the stored energy, and the forces at rest that go with a stiffness, both (n,)."""
+    none = 0 * packed.v
+    gradient, whole = energy_gradient(packed, W, q, step), forces_at(packed, W, q, none, lam=lam)
+    stiffness[:] = 0.0
+    return gradient, whole - forces_at(packed, W, q, none, lam=lam)
 
 
 def check_tangents(packed, W, state, motions, tolerance):
@@ -95,17 +107,16 @@ def check_tangents(packed, W, state, motions, tolerance):
     s, (q, v, a, lam) = packed.system, state
     zero = np.zeros(v.size)
 
-    def at(dq, dv, da):
-        return forces_at(packed, W, shifted(packed, q, dq), v + dv, a + da, lam)
+    def at(dq, da):
+        return forces_at(packed, W, shifted(packed, q, dq), v, a + da, lam)
 
-    C = difference(lambda x: at(zero, x, zero), v.size)
-    tangents_at(s, W, q, v, a, lam, (0.0, 1.0, 0.0))
-    assert_allclose(W.S, C, atol=1e-7 * np.abs(C).max())
+    found, C = by_velocity(packed, W, *state)
+    assert_allclose(found, C, atol=1e-7 * np.abs(C).max())
     for family in (springs.SPRINGS_FAMILY, joint_laws.TURNS_FAMILY):
         if family in packed.elements:
             packed.elements[family].law[:, 1] = 0.0
-    M = difference(lambda x: at(zero, zero, x), v.size)
-    K = difference(lambda x: at(motions @ x, zero, zero), motions.shape[1])
+    M = difference(lambda x: at(zero, x), v.size)
+    K = difference(lambda x: at(motions @ x, zero), motions.shape[1])
     tangents_at(s, W, q, v, a, lam, (1.0, 0.0, 1.0))
     assert_allclose(W.S, M, atol=1e-7 * np.abs(M).max())
     assert_allclose(W.Kt @ motions, K, atol=tolerance * np.abs(K).max())

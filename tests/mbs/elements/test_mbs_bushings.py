@@ -8,9 +8,9 @@ from numpy.testing import assert_allclose
 
 import rom
 from cases.mbs.mechanisms import prepared, tangents_at, two_soft
+from cases.mbs.parts import boxed, refused_on
 from cases.mbs.tangents import check_tangents, difference, energy_gradient, forces_at, near
 from rom import rotation
-from rom.errors import ConfigError
 from rom.mbs.elements import bushings
 from rom.mbs.integrate.simulation import simulate
 from rom.mbs.mechanism import Mechanism
@@ -158,15 +158,10 @@ WRONG = {
 }
 
 
-@pytest.mark.parametrize("case", WRONG)
-def test_wrong_bushings_are_refused_by_name(case):
-    mech = Mechanism()
-    part = box(mech)
-    arguments, words = WRONG[case]
-    with pytest.raises(ConfigError) as caught:
-        mech.bushing("s", mech.ground.marker((0, 0, 0)), part.marker((0, 0, 0)), **arguments)
-    assert words in str(caught.value)
-    assert not mech.bushings
+test_wrong_bushings_are_refused_by_name = refused_on(boxed, {
+    case: (lambda mech, *ends, given=given: mech.bushing("s", *ends, **given), words)
+    for case, (given, words) in WRONG.items()
+})  # fmt: skip
 
 
 @pytest.mark.parametrize(("end", "told"), [(0.45, False), (0.6, True)])

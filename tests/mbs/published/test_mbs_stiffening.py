@@ -68,8 +68,7 @@ def test_spin_up_of_kane_ryan_and_banerjee():
     assert_allclose(v[seen], exact, atol=2.5e-4)
     assert_allclose(v[sol.t > 15].max(), 3.64e-3, atol=3e-5)
     assert_allclose(u.min(), -0.01882, atol=1e-4)
-    report = audit(sol)
-    assert report.ok, report
+    assert audit(sol).ok, audit(sol)
 
 
 @pytest.mark.parametrize(

@@ -335,28 +335,22 @@ def test_a_bearing_with_a_liner_is_that_of_ross(load, E, eccentricity, attitude,
 @pytest.mark.parametrize(("given", "words"), [
     ({"kind": "rbe2"}, "'bore' of body 'bush', has no functions by which it could deform"),
     ({"kind": "rbe3"}, "has no functions"),
+    ({"on": "ground"}, "'mainbearing'.* has no functions"),
+    ({"on": "block"}, "'mainbearing'.* has no functions"),
     ({"bearing": bearing(aligned=True)}, "'mainbearing'.* deforms, and the film of an aligned"),
     ({"axis": (1, 0, 0)}, "'mainbearing'.* is no bore of it: its nodes lie .* mm from the axis"),
     ({"bearing": JournalBearing(0.05, LENGTH, CLEARANCE)}, "a radius of 25 mm"),
     ({"bearing": JournalBearing(DIAMETER, 0.05, CLEARANCE)}, "ends 5 mm before the bearing does"),
 ])  # fmt: skip
 def test_what_is_no_elastic_bush_is_refused_by_name(given, words):
-    given = {"kind": rom.FourierLegendre(1, 1), "axis": (0, 0, 1), "bearing": bearing()} | given
-    mech = rom.Mechanism(gravity=ORIGIN)
-    part = mech.add_flexible("bush", bush(given.pop("kind"), SOFT, (16, 1, 6)), at=ORIGIN)
-    shaft = mech.add_rigid("shaft", mass=1.0, inertia=(0.1,) * 3, at=ORIGIN)
+    given = {"kind": rom.FourierLegendre(1, 1), "on": "bush", "bearing": bearing()} | given
+    mech, solid = rom.Mechanism(gravity=ORIGIN), {"mass": 1.0, "inertia": (0.1,) * 3, "at": ORIGIN}
+    mech.add_flexible("bush", bush(given.pop("kind"), SOFT, (16, 1, 6)), at=ORIGIN)
+    shaft, _ = (mech.add_rigid(name, **solid) for name in ("shaft", "block"))
+    on = given.pop("on")
+    end = mech.part(on).marker("bore" if on == "bush" else ORIGIN)
     with pytest.raises(ConfigError, match=words):
-        mech.journal_bearing("mainbearing", shaft.marker(ORIGIN), part.marker("bore"), oil=OIL,
-                             elastic_bush=True, **given)  # fmt: skip
-
-
-def test_ground_and_rigid_bodies_are_no_elastic_bushes():
-    mech = rom.Mechanism(gravity=ORIGIN)
-    shaft, block = (mech.add_rigid(x, mass=1.0, inertia=(0.1,) * 3, at=ORIGIN) for x in "ab")
-    for other in (mech.ground, block):
-        with pytest.raises(ConfigError, match=r"'film'.* has no functions"):
-            ends = shaft.marker(ORIGIN), other.marker(ORIGIN)
-            mech.journal_bearing("film", *ends, bearing=bearing(), **SOFT_FILM)
+        mech.journal_bearing("mainbearing", shaft.marker(ORIGIN), end, **SOFT_FILM | given)
 
 
 ENTRY = """
