@@ -162,7 +162,5 @@ def _memory(manifest: dict[str, Any] | None, arrays: dict[str, Array]) -> Memory
     if manifest is None:
         return None
     h, origin = (float.fromhex(manifest[name]) for name in ("h", "origin"))
-    own = {
-        k.removeprefix(MEMORY_PREFIX): A for k, A in arrays.items() if k.startswith(MEMORY_PREFIX)
-    }
+    own = {k.partition("/")[2]: A for k, A in arrays.items() if k.startswith(MEMORY_PREFIX)}
     return Memory(str(manifest["method"]), h, origin, int(manifest["taken"]), own)

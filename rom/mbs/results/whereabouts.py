@@ -41,7 +41,7 @@ class Whereabouts:
             >>> rom.simulate(mech, t_end=2.0, dt=0.1).position("ball")[-1].round(6)
             array([6., 0., 0.])
         """
-        if body in self.mechanism.nonlinear:
+        if self._has_frames(body):
             return self._of_frames(body, marker, self.position)
         marker = self._frame(body) if marker is None else marker
         return self._places(body, 0, 3) if marker is None else self._seen(body, marker).position
@@ -52,7 +52,7 @@ class Whereabouts:
         Raises:
             ConfigError: if the body is unknown, or the marker was not one of the run.
         """
-        if body in self.mechanism.nonlinear:
+        if self._has_frames(body):
             return self._of_frames(body, marker, self.velocity)
         marker = self._frame(body) if marker is None else marker
         if marker is None:
@@ -65,7 +65,7 @@ class Whereabouts:
         Raises:
             ConfigError: if the body is unknown, or the marker was not one of the run.
         """
-        if body in self.mechanism.nonlinear:
+        if self._has_frames(body):
             frame = self.mechanism.nonlinear[body].marker(marker).body
             return _of_each(matrix, self.orientation(frame), 1)
         return self._seen(body, marker).axes
@@ -76,7 +76,7 @@ class Whereabouts:
         Raises:
             ConfigError: if the body is unknown.
         """
-        if body in self.mechanism.nonlinear:
+        if self._has_frames(body):
             return self._of_frames(body, None, self.orientation)
         if frame := self._frame(body):
             p = _of_each(quaternion, self._seen(body, frame).axes, 2)
@@ -89,7 +89,7 @@ class Whereabouts:
         Raises:
             ConfigError: if the body is unknown.
         """
-        if body in self.mechanism.nonlinear:
+        if self._has_frames(body):
             return self._of_frames(body, None, self.omega)
         if frame := self._frame(body):
             seen = self._seen(body, frame)
@@ -117,6 +117,9 @@ class Whereabouts:
             )
         return self._at_marker(self.packed.row(marker))
 
+    def _has_frames(self, body: str) -> bool:
+        return body not in self.packed.names and body in self.mechanism.nonlinear
+
     def _of_frames(self, body: str, marker: Any, ask: Callable[[str], Array]) -> Array:
         """An answer for one frame of a body of frames, or for all of them, (n_t, k, ...)."""
         whole = self.mechanism.nonlinear[body]
@@ -128,7 +131,7 @@ class Whereabouts:
     def _frame(self, body: str) -> Marker | None:
         """Marker that is the frame of the body, where its motion is that of another frame."""
         self._number(body)
-        return self.mechanism.part(body).own_frame
+        return self.mechanism.parts[body].own_frame
 
     def _number(self, body: str) -> int:
         check_known(body, self.packed.names, f"no body {body!r}; the mechanism has")
