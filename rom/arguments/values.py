@@ -11,14 +11,14 @@ import numpy as np
 import numpy.typing as npt
 
 from rom import rotation
-from rom.arguments.quantities import Between, NotNegative, Positive, Quantity, Whole
+from rom.arguments.quantities import Between, NotNegative, Positive, Quantity, Shape, Whole
 from rom.errors import ConfigError, QualityGateError, RomError
 
 Array = npt.NDArray[np.float64]  # not from rom.model, whose records are checked here
 SHOWN_LENGTH = 60  # letters of a wrong value in a message
 
 
-def shortened(value: Any) -> str:
+def shortened(value: object) -> str:
     """A value in a message, in one line of bearable length."""
     if isinstance(value, np.ndarray) and value.size > 1:
         return f"array of shape {value.shape} and type {value.dtype}"
@@ -43,7 +43,7 @@ def lowest(n: int | None) -> slice:
     return slice(None if n is None else whole("n", n))
 
 
-def vector(name: str, value: Any, n: int | None = None) -> Array:
+def vector(name: str, value: object, n: int | None = None) -> Array:
     """The value as (n,) finite numbers; without n as any number of them, one number alone too."""
     array = finite(name, [value] if n is None and np.isscalar(value) else value, None)
     if array.ndim != 1 or not array.size or n not in (None, array.size):
@@ -58,7 +58,7 @@ def matrix(name: str, value: Any, shape: tuple[int | None, int | None] = (None, 
     found = value if given else finite(name, value, None)
     if len(found.shape) != 2 or found.dtype.kind not in "iuf":
         raise ConfigError(f"{name} = {shortened(value)} must be a matrix of numbers.")
-    if any(n not in (None, size) for n, size in zip(shape, found.shape, strict=True)):
+    if not Quantity(shapes=(shape,)).has_shape(found.shape):
         raise ConfigError(f"{name} has shape {found.shape}, needed is {shape_words(shape)}.")
     return found
 
@@ -85,7 +85,7 @@ def symmetric(
         )
 
 
-def rows_at(name: str, at: Any, A: npt.NDArray[Any]) -> npt.NDArray[Any]:
+def rows_at(name: str, at: object, A: npt.NDArray[Any]) -> npt.NDArray[Any]:
     """(p, k) rows of A (n, k): at places (p,) that count from 0, or combined by (p, n) numbers."""
     wanted, n = finite(name, at, None), A.shape[0]
     if wanted.ndim == 2 and wanted.shape[1] == n and wanted.size:
@@ -107,7 +107,7 @@ def is_number(value: object) -> TypeGuard[float]:
 
 
 def one_of(
-    name: str, value: Any, words: Iterable[str], *, error: type[RomError] = ConfigError
+    name: str, value: object, words: Iterable[str], *, error: type[RomError] = ConfigError
 ) -> str:
     """The value as one of some words."""
     known = list(words)
@@ -117,38 +117,31 @@ def one_of(
 
 
 def finite(
-    name: str,
-    value: Any,
-    shape: tuple[int | None, ...] | None,
-    *,
-    error: type[RomError] = ConfigError,
+    name: str, value: object, shape: Shape | None, *, error: type[RomError] = ConfigError
 ) -> Array:
     """The value as a float array of this shape; None for any, or for any length."""
     try:
         array = np.array(value, dtype=float)
-        fits = not array.size or np.array(value).dtype.kind in "iuf"
+        numbers = not array.size or np.array(value).dtype.kind in "iuf"
     except (TypeError, ValueError, OverflowError):
-        fits = False
+        numbers = False
     wanted = "finite numbers" if shape is None else f"shape {shape_words(shape)}"
-    if not fits:
+    if not numbers:
         raise error(f"{name} = {shortened(value)} is not made of numbers, needed is {wanted}.")
-    if shape is not None and (
-        array.ndim != len(shape)
-        or any(n not in (None, k) for n, k in zip(shape, array.shape, strict=True))
-    ):
+    if shape is not None and not Quantity(shapes=(shape,)).has_shape(array.shape):
         raise error(f"{name} has shape {array.shape}, needed is {shape_words(shape)}.")
     if not np.isfinite(array).all():
         raise error(f"{name} = {shortened(array.tolist())} is not finite; give finite numbers.")
     return array
 
 
-def shape_words(shape: tuple[int | None, ...]) -> str:
+def shape_words(shape: Shape) -> str:
     """A shape as it is written, n for any length."""
     return str(shape).replace("None", "n")
 
 
 def one_each(
-    what: str, given: Any, each: str, wanted: Any, *, error: type[RomError] = ConfigError
+    what: str, given: object, each: str, wanted: object, *, error: type[RomError] = ConfigError
 ) -> None:
     """Refuse things, by their name in the plural, whose number or shape is not that of others."""
     if given != wanted:
@@ -156,24 +149,24 @@ def one_each(
         raise error(f"{n} {what} for {m} {each}; give one for each.")
 
 
-def number(name: str, value: Any, *, error: type[RomError] = ConfigError) -> float:
+def number(name: str, value: object, *, error: type[RomError] = ConfigError) -> float:
     """The value as a finite float."""
     return float(finite(name, value, (), error=error))
 
 
-def positive(name: str, value: Any, *, error: type[RomError] = ConfigError) -> float:
+def positive(name: str, value: object, *, error: type[RomError] = ConfigError) -> float:
     """The value as a finite positive float."""
     return _limited(name, value, Positive(), error)
 
 
-def not_negative(name: str, value: Any, *, error: type[RomError] = ConfigError) -> float:
+def not_negative(name: str, value: object, *, error: type[RomError] = ConfigError) -> float:
     """The value as a finite float of zero or more."""
     return _limited(name, value, NotNegative(), error)
 
 
 def between(
     name: str,
-    value: Any,
+    value: object,
     low: float,
     high: float,
     ends: str = "[]",
@@ -184,14 +177,14 @@ def between(
     return _limited(name, value, Between(low, high, ends), error)
 
 
-def _limited(name: str, value: Any, kind: Quantity, error: type[RomError]) -> float:
+def _limited(name: str, value: object, kind: Quantity, error: type[RomError]) -> float:
     x = number(name, value, error=error)
     if fault := kind.fault(x):
         raise error(name + fault)
     return x
 
 
-def unit_vector(name: str, value: Any) -> Array:
+def unit_vector(name: str, value: object) -> Array:
     """The value as a vector of length one."""
     x = finite(name, value, (3,))
     length = np.linalg.norm(x)
@@ -200,7 +193,7 @@ def unit_vector(name: str, value: Any) -> Array:
     return x / length
 
 
-def matrix33(name: str, value: Any) -> Array:
+def matrix33(name: str, value: npt.ArrayLike) -> Array:
     """A (3, 3) matrix from itself or from its diagonal."""
     if np.shape(value) == (3,):
         return np.diag(finite(name, value, (3,)))
@@ -229,7 +222,9 @@ def unit_quaternion(value: Any) -> Array:
     return rotation.quaternion(U @ V)
 
 
-def start_pose(at: Any, orientation: Any, velocity: Any, omega: Any) -> tuple[Array, ...]:
+def start_pose(
+    at: object, orientation: object, velocity: object, omega: object
+) -> tuple[Array, ...]:
     """(3,) place, (4,) quaternion, (3,) velocity and (3,) angular velocity; None for no motion."""
     zero = np.zeros(3)
     return (

@@ -66,7 +66,8 @@ def keyed(to: argparse._ActionsContainer, *several: str) -> None:
             key = next(key for key in kind.keys if key.name == name)
             kind = key.kind
         unit = getattr(kind, "unit", "1")
-        about = key.about[0].lower() + key.about[1:].rstrip(".").replace("`", "")
+        about = key.about.rstrip(".").replace("`", "").replace("%", "%%")
+        about = about[0].lower() + about[1:]
         about += f" [{unit}]" if unit != "1" else ""
         if key.default:
             default = key.default if isinstance(key.default, tuple) else (key.default,)

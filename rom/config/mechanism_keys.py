@@ -159,6 +159,7 @@ SPREAD_LOADS = {
     )
 }
 MANY = Key("markers", Markers(), "On which it acts.", ...)
+SPREAD_BY = {kind: kind for kind in SPREAD_LOADS}  # by their own keys
 ALONG_LINE = (
     "A force along the line between two markers, positive when it pushes them apart: x is its "
     "length, v its rate."
@@ -183,6 +184,7 @@ LAWS = {
     "python": Table("A law in Python between any markers, as `mechanism.law` takes it.", LAW),
     "user_force": Table("A force and moment in Python, as `user_force` takes it.", USER_FORCE),
 }
+LAW_BY = {"expression": "line", "values": "points", "function": "python"}
 ZEROS = (
     "Formula of t, the measured x and its rate v whose zeros are looked for, in place of a value."
 )
@@ -195,7 +197,7 @@ PASSES = (CONSTANTS, Key("expression", Text(), ZEROS), *WHEN)
 MEASURED = Key("axis", DIRECTION, "Along which its position is measured, in the world.", ...)
 POSITION, DISTANCE = (Key("value", Quantity("m"), f"{what}.") for what in ("Position", "Distance"))
 ASKED = Key("markers", Markers(), "It asks for, beyond those with names.")
-EVENTS = {
+EVENTS: dict[str, Table] = {
     kind: FormulaTable(about, (*keys, *PASSES), MOTION)
     for kind, about, *keys in (
         ("coordinate", "A joint coordinate passes a value.", JOINT, WHICH, PASSED),
@@ -204,6 +206,13 @@ EVENTS = {
     )
 }
 IN_PYTHON = "A function of (t, instant) in Python, as `mechanism.event` takes it."
+EVENTS["python"] = Table(IN_PYTHON, (ASKED, *PYTHON_KEYS, *WHEN))
+
+
+def pushing(kind: str, unit: str) -> Declared:
+    """The keys of a force or a torque on a marker."""
+    vector = Key("vector", Number(unit, (3,)), f"The {kind}.", ...)
+    return Declared(kind, MARKER, vector, FACTOR, about=f"A {kind} on a marker.")
 
 
 class Section(NamedTuple):
@@ -261,36 +270,25 @@ BEFORE_FIELDS: dict[str, tuple[str, Kind]] = {  # connections and forces: what, 
     )),
 }  # fmt: skip
 BEHIND_FIELDS: dict[str, tuple[str, Kind]] = {
-    "forces": ("forces", Declared(
-        "force", MARKER, Key("vector", Number("N", (3,)), "The force.", ...), FACTOR,
-        about="A force on a marker.",
-    )),
-    "torques": ("torques", Declared(
-        "torque", MARKER, Key("vector", Number("N m", (3,)), "The torque.", ...), FACTOR,
-        about="A torque on a marker.",
-    )),
-    "frictions": ("friction in joints", Declared(
-        "friction",
-        JOINT,
-        transition_speed=SPEED,
-        coulomb=ByCoordinate(NotNegative("N m"), NotNegative("N")),
-        stribeck_speed=SPEED,
-        viscous=ByCoordinate(NotNegative("N m s/rad"), NotNegative("N s/m")),
-    )),
+    "forces": ("forces", pushing("force", "N")),
+    "torques": ("torques", pushing("torque", "N m")),
+    "frictions": (
+        "friction in joints",
+        Declared(
+            "friction",
+            JOINT,
+            transition_speed=SPEED,
+            coulomb=ByCoordinate(NotNegative("N m"), NotNegative("N")),
+            stribeck_speed=SPEED,
+            viscous=ByCoordinate(NotNegative("N m s/rad"), NotNegative("N s/m")),
+        ),
+    ),
     "stops": ("stops of joints", Declared(f"stop {IMPACT}", JOINT, lower=WAY, upper=WAY)),
     "contacts": ("contacts", Variants(CONTACTS)),
-    "spread_loads": (
-        "loads spread over bodies",
-        Variants(SPREAD_LOADS, {kind: kind for kind in SPREAD_LOADS}),
-    ),
-    "laws": ("laws of force", Variants(LAWS, {
-        "expression": "line", "values": "points", "function": "python",
-    })),
-    "events": ("events", Variants(
-        {**EVENTS, "python": Table(IN_PYTHON, (ASKED, *PYTHON_KEYS, *WHEN))},
-        {"function": "python"},
-    )),
-}  # fmt: skip
+    "spread_loads": ("loads spread over bodies", Variants(SPREAD_LOADS, SPREAD_BY)),
+    "laws": ("laws of force", Variants(LAWS, LAW_BY)),
+    "events": ("events", Variants(EVENTS, {"function": "python"})),
+}
 SIMULATION = Declared(
     "rom.mbs.integrate.simulation:simulate",
     about="How it is moved.",

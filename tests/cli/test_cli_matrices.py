@@ -3,12 +3,11 @@
 The files are those of test_foreign_matrices.py and test_calculix.py.
 """
 
-import json
-
 import pytest
 from numpy.testing import assert_allclose
 
 import rom
+from cases.answers import answer
 from cases.paths import TESTS
 from rom.cli.main import main
 from rom.cli.matrices import labels
@@ -23,11 +22,6 @@ NASTRAN = (f"{HERE / 'dense.op4'}:KAA", "--mass", f"{HERE / 'dense.op4'}:maa", "
 SETS = ("--set", "root=3,7,12,20", "--set", "tip=41, 55,60-60,101")
 KINDS = {"root": "rbe2", "tip": "rbe2"}
 INTERFACES = ("-i", "root=rbe2", "-i", "tip=rbe2")
-
-
-def answer(capsys, *arguments, code=0):
-    assert main([*map(str, arguments), "--json"]) == code
-    return json.loads(capsys.readouterr().out)
 
 
 def test_frequencies_of_matrices_with_node_sets(capsys):

@@ -11,17 +11,16 @@ from numpy.testing import assert_allclose
 import rom
 from cases.files.reports import read
 from cases.files.toml_files import laid_out
-from cases.solid import block
+from cases.solid import block, reduced
 from rom.cli.main import main
 
 ADDRESS, XML_NAME = re.compile(r"[a-z]*://[^\s\"'<]*"), "http://www.w3.org/1999/xhtml"
-KINDS = {"root": "rbe2", "tip": "rbe2"}
 
 
 @pytest.fixture(scope="module")
 def rod(tmp_path_factory):
-    body = rom.reduce(block(cells=(6, 1, 1)), method=rom.CraigBampton(40), interfaces=KINDS,
-                      reference="root", name="bar <1>")  # fmt: skip
+    how = {"reference": "root", "name": "bar <1>", "certify": True}
+    body = reduced(40, block(cells=(6, 1, 1)), **how)
     return rom.save(body, tmp_path_factory.mktemp("rod") / "rod.rom.npz")
 
 

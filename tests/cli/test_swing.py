@@ -14,7 +14,7 @@ from cases.files.browser import PROGRAM, REASON, WITH_WEBGL, browser
 from cases.files.machine_parts import PARTS
 from cases.files.schema import errors
 from cases.files.step_parts import in_inches, step_box, step_plate
-from cases.solid import block
+from cases.solid import block, reduced
 from rom.cli.schemas import schema
 from rom.cli.verbs import swing
 from rom.errors import ConfigError, RomWarning
@@ -40,9 +40,7 @@ def rigid(solid):
 
 @pytest.fixture(scope="module")
 def bar(solid):
-    return rom.reduce(
-        solid, method=rom.CraigBampton(6), interfaces={"root": "rbe2"}, reference="root"
-    )
+    return reduced(6, solid, interfaces={"root": "rbe2"}, reference="root", certify=True)
 
 
 def test_a_bar_swings_as_the_rigid_pendulum_does(rigid):

@@ -1,6 +1,5 @@
 """Component files: the body is that of the same words in Python; mistakes have file and line."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -8,12 +7,11 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
+from cases.answers import answer
 from cases.command import ROOT
-from cases.files.schema import errors
 from cases.files.toml_files import SOLID
-from cases.solid import block
+from cases.solid import block, reduced
 from rom.cli.main import main
-from rom.cli.schemas import schema
 from rom.config.component import read_component
 from rom.errors import ConfigError, FileFormatError
 from rom.io.matrices.op4 import write_op4
@@ -67,11 +65,8 @@ def folder(bar, tmp_path, monkeypatch):
 
 def test_the_body_is_that_of_python(folder, bar):
     body = read_component("bar.toml").body()
-    same = rom.reduce(
-        bar, method=rom.CraigBampton(6), interfaces={"root": "rbe2", "tip": "rbe2"},
-        reference=("root", "tip"), name="bar",
-        damping=rom.ModalDamping(0.01, fixed={"root": "xyz rx", "tip": "yz"}),
-    )  # fmt: skip
+    damping = rom.ModalDamping(0.01, fixed={"root": "xyz rx", "tip": "yz"})
+    same = reduced(6, bar, reference=("root", "tip"), name="bar", damping=damping)
     assert body.name == "bar" and body.reference == same.reference
     assert_allclose(body.omega, same.omega, rtol=1e-7)
     assert_allclose(np.diag(body.D), 0.02 * body.omega, rtol=1e-9)
@@ -80,8 +75,8 @@ def test_the_body_is_that_of_python(folder, bar):
 
 
 def test_options_go_before_the_file(folder, capsys):
-    assert main(["reduce", "bar.toml", "-m", "3", "--name", "short", "--json", "-q"]) in (0, 5)
-    found = json.loads(capsys.readouterr().out)
+    short = "reduce bar.toml -m 3 --name short -q".split()
+    found = answer(capsys, *short, codes=(0, 5))
     assert found["name"] == "short" and found["output"] == "bar.rom.npz"
     assert rom.load("bar.rom.npz").n_modes == found["n_modes"] == 3 + 6
     damped = [*"reduce bar.toml -o held.npz -q --reference tip --no-certificate".split()]
@@ -91,12 +86,9 @@ def test_options_go_before_the_file(folder, capsys):
     assert_allclose(np.diag(held.D), 0.04 * held.omega, rtol=1e-9)
     assert main(damped[:-2]) == 0  # as in the file, between the pins
     pinned = rom.load("held.npz").with_reference(("root", "tip"))
-    capsys.readouterr()
     assert_allclose(np.diag(pinned.D), 0.04 * pinned.omega, rtol=1e-9)
-    assert main(["reduce", "bar.toml", "--f-max", "3e3", "--reference", "tip", "--no-certificate",
-                 "-o", "other.npz", "--json", "-q"]) == 0  # fmt: skip
-    found = json.loads(capsys.readouterr().out)
-    assert errors(found, schema("reduce")) == []
+    other = "reduce bar.toml --f-max 3e3 --reference tip --no-certificate -o other.npz -q"
+    found = answer(capsys, *other.split())
     assert found["output"] == "other.npz" and found["certificate"] is None
     assert "tip" in found["reference"] and "f_max=3000" in str(found["provenance"])
 
@@ -112,8 +104,7 @@ def test_a_certificate_is_wanted_or_not_or_wanted_in_full(folder, capsys):
 
 
 def test_modes_of_a_component_have_the_interfaces_of_its_body(folder, bar, capsys):
-    assert main(["modes", "bar.toml", "--fixed", "root", "-n", "2", "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
+    found = answer(capsys, "modes", "bar.toml", "--fixed", "root", "-n", 2)
     kinds = {"root": "rbe2", "tip": "rbe2"}
     expected = rom.modes(bar, 2, fixed=("root",), interfaces=kinds).frequencies
     assert_allclose(found["frequencies"], expected, rtol=1e-8)
@@ -232,10 +223,8 @@ def test_the_sample_describes_the_rod_of_the_demo():
 @pytest.mark.fenicsx
 def test_the_sample_is_meshed_as_the_shell_changes_it(capsys, monkeypatch):
     monkeypatch.chdir(ROOT)
-    found = []
-    for size in ("0.012", "0.009"):
-        assert main(["mesh", "meshes/connecting_rod.toml", "-p", f"lc={size}", "--json", "-q"]) == 0
-        found.append(json.loads(capsys.readouterr().out))
+    words = ("mesh", "meshes/connecting_rod.toml", "-q", "-p")
+    found = [answer(capsys, *words, f"lc={size}") for size in ("0.012", "0.009")]
     assert set(found[0]["interfaces"]) == {"pin_a", "pin_b"}
     assert found[0]["cells"] < found[1]["cells"]
 

@@ -11,6 +11,7 @@ from scipy.interpolate import PchipInterpolator
 from scipy.special import ellipk
 
 import rom
+from cases.answers import answer
 from cases.command import ROOT
 from cases.files.toml_files import PENDULUM
 from rom.cli.main import main
@@ -268,8 +269,7 @@ def test_the_command_tells_when_events_happened(tmp_path, capsys):
     file_of(tmp_path, FALLING.replace('[0, 0, 2], terminal', '[0, 0, 2], value = 0, terminal'),
             dt=5e-3)  # fmt: skip
     out = str(tmp_path / "out")
-    assert main(["simulate", str(tmp_path / "m.toml"), "-o", out, "--json", "-q"]) == 0
-    told = json.loads(capsys.readouterr().out)["events"]
+    told = answer(capsys, "simulate", tmp_path / "m.toml", "-o", out, "-q")["events"]
     assert told["turns"] == pytest.approx([0.3]) and told["never"] == []
     assert json.loads((tmp_path / "out" / "run.json").read_text())["events"] == told
     assert main(["simulate", str(tmp_path / "m.toml"), "-o", out, "--force"]) == 0

@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.special import ellipk
 
 import rom
+from cases.answers import answer
 from cases.command import ROOT, python
 from cases.files.toml_files import ALL, CRANK, PENDULUM, laid_out
 from cases.long import few
@@ -83,9 +84,8 @@ def test_the_slider_crank_is_that_of_python(folder, rod):
 
 
 def test_simulate_leaves_a_folder_that_says_how_it_came_about(folder, capsys):
-    words = ["simulate", "pendulum.toml", "--t-end", "0.1", "--gravity=0,-1.62,0", "-o", "out"]
-    assert main([*words, "--json", "-q"]) == 0
-    found = json.loads(capsys.readouterr().out)
+    words = "simulate pendulum.toml --t-end 0.1 --gravity=0,-1.62,0 -o out -q".split()
+    found = answer(capsys, *words)
     assert found["output"] == "out/motion.csv" and found["steps"] == 200
     assert found["also"] == ["out/scene.json", "out/run.json"]
     head, *rows = (folder / "out" / "motion.csv").read_text().splitlines()
@@ -341,8 +341,7 @@ def test_an_fmu_of_a_file_moves_as_the_file(case, folder, monkeypatch):
 
 @pytest.mark.once
 def test_the_command_line_writes_fmus_of_mechanisms(folder, capsys):
-    assert main(["export", "pendulum.toml", "p.fmu", "--dt", "1e-3", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["format"] == "fmu"
+    assert answer(capsys, *"export pendulum.toml p.fmu --dt 1e-3".split())["format"] == "fmu"
     with zipfile.ZipFile("p.fmu") as archive:
         settings = json.loads(archive.read("resources/fmu.json"))
     assert settings["dt"] == 1e-3 and settings["outputs"] == ["bob.top", "pivot"]

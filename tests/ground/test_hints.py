@@ -9,7 +9,7 @@ import pytest
 import rom
 from cases.mbs.mechanisms import random_body
 from cases.paths import ROOT
-from cases.solid import block
+from cases.solid import block, reduced
 from rom import errors
 from rom.errors import RomError, RomWarning, UnknownNameError
 
@@ -120,8 +120,7 @@ def test_an_unknown_name_is_still_an_attribute_error(things):
 
 @cache
 def rod():
-    return rom.reduce(block(), method=rom.CraigBampton(4), interfaces={"root": "rbe2"},
-                      reference="root", certify=False)  # fmt: skip
+    return reduced(4, block(), interfaces={"root": "rbe2"}, reference="root")
 
 
 def upside_down():

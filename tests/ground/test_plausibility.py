@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 import rom
 from cases.command import rom as run_rom
 from cases.files.cells import solid as solid_mesh
-from cases.solid import STEEL, block
+from cases.solid import STEEL, block, reduced
 from rom.body.conversion import Factors
 from rom.body.rotating import rotating_frequencies
 from rom.body.stiffening import known_loads
@@ -390,9 +390,7 @@ def test_matrices_of_other_units_are_doubted(case, tmp_path):
 @pytest.fixture(scope="module")
 def part():
     kinds = {"root": "rbe2", "tip": rom.Polynomial(2)}
-    body = rom.reduce(
-        block(cells=(4, 2, 2)), method=rom.CraigBampton(4), interfaces=kinds, certify=False
-    )
+    body = reduced(4, block(cells=(4, 2, 2)), interfaces=kinds)
     rng = np.random.default_rng(7)
     drawn = {load: rng.normal(size=body.K.shape) for load in known_loads(body)}
     return replace(body, K_geo={load: A + A.T for load, A in drawn.items()}, D=1e-4 * body.K)
@@ -415,13 +413,10 @@ def test_the_conversion_of_a_body_is_that_of_its_model():
     """The same beam meshed in mm, with MPa and t/mm^3."""
     kinds = {"root": "rbe2", "tip": rom.Polynomial(1)}
     si = block(size=(1.0, 0.1, 0.06), cells=(4, 1, 1))
-    L = 1e3
-    options = {"method": rom.CraigBampton(3), "interfaces": kinds, "certify": False}
-    body = rom.reduce(si, reference="root", **options)
     with pytest.warns(RomWarning, match="mm-t-s"):
         material = rom.Material(210e9 * 1e-6, 0.3, 7850.0 * 1e-12)
-    mm = block(size=(L, 0.1 * L, 0.06 * L), cells=(4, 1, 1), material=material)
-    native = rom.reduce(mm, reference="root", **options)
+    mm = block(size=(1e3, 100.0, 60.0), cells=(4, 1, 1), material=material)
+    body, native = (reduced(3, model, interfaces=kinds, reference="root") for model in (si, mm))
     found = body.in_units("mm-t-s")
     for name in ("mass", "first_moment", "inertia", "omega", "K"):
         A = np.asarray(getattr(native, name))
@@ -491,7 +486,7 @@ def test_amplitudes_of_second_order_move_the_tip_alike_in_any_units(part, units)
 def test_bodies_of_different_units_meet_in_si(part):
     half = block(cells=(4, 2, 2), origin=(1.0, 0.0, 0.0))
     kinds = {"root": rom.Polynomial(2), "tip": "rbe2"}
-    right = rom.reduce(half, method=rom.CraigBampton(4), interfaces=kinds, certify=False)
+    right = reduced(4, half, interfaces=kinds)
     pair = (("left", "tip"), ("right", "root"))
     both = {"left": part, "right": right}
     wanted = rom.Assembly(both, (pair,)).frequencies(12)

@@ -148,14 +148,10 @@ def _text(body: "FlexibleBody", output: Path) -> str:
     )
     if body.certificate is None:
         return head
-    return f"{head}\n{_lowest(body)}\n\n{body.certificate}"
-
-
-def _lowest(body: "FlexibleBody") -> str:
-    """The lowest elastic frequency in each support that was compared."""
-    found = body.provenance["comparison"].items()
-    lowest = ", ".join(f"{support} {table['reduced'][0]:.5g} Hz" for support, table in found)
-    return f"lowest elastic frequency: {lowest}; it depends on how the body is held"
+    compared = body.provenance["comparison"].items()
+    lowest = ", ".join(f"{support} {table['reduced'][0]:.5g} Hz" for support, table in compared)
+    about = f"lowest elastic frequency: {lowest}; it depends on how the body is held"
+    return f"{head}\n{about}\n\n{body.certificate}"
 
 
 def add_method(parser: argparse.ArgumentParser) -> None:

@@ -253,11 +253,20 @@ def _swing(
 def _write_motion(
     path: Path, tables: list[Path], body: "FlexibleBody", solution: "Solution"
 ) -> None:
-    from rom.io.history import write_history
+    """Positions of the interfaces [m] and elastic coordinates, one line per time; and histories."""
+    import numpy as np
 
-    _write(path, body, solution)
-    for table in tables:
-        write_history(solution, table)
+    from rom.io.files import write_whole
+    from rom.io.history import table, write_history
+
+    places = {name: solution.position(body.name, name) for name in body.interface_names}
+    names = ["t [s]", *(f"{name} {axis} [m]" for name in places for axis in "xyz")]
+    names += [f"q{k + 1}" for k in range(body.n_modes)]
+    values = np.column_stack([solution.t, *places.values(), solution.elastic(body.name)])
+    content = table(names, values, "%.10g")
+    write_whole(path, lambda file: file.write(content))
+    for history in tables:
+        write_history(solution, history)
 
 
 def _write_films(films: list[Path], solution: "Solution") -> None:
@@ -276,18 +285,3 @@ def _write_scene(path: Path, body: "FlexibleBody", solution: "Solution") -> None
     from rom.report.scene_file import write_scene
 
     write_scene(motion_scene(solution, title=f"Motion of {body.name}"), path)
-
-
-def _write(path: Path, body: "FlexibleBody", solution: "Solution") -> None:
-    """One line per time: positions of the interfaces [m], then elastic coordinates."""
-    import numpy as np
-
-    from rom.io.files import write_whole
-    from rom.io.history import table
-
-    places = {name: solution.position(body.name, name) for name in body.interface_names}
-    names = ["t [s]", *(f"{name} {axis} [m]" for name in places for axis in "xyz")]
-    names += [f"q{k + 1}" for k in range(body.n_modes)]
-    values = np.column_stack([solution.t, *places.values(), solution.elastic(body.name)])
-    content = table(names, values, "%.10g")
-    write_whole(path, lambda file: file.write(content))
