@@ -155,7 +155,7 @@ def _meshes(shapes: dict[str, Mesh], mechanism: "Mechanism") -> dict[str, Mesh]:
         fit = X.ndim == corner.ndim == 2 and X.shape[1] == corner.shape[1] == 3 and corner.size
         fit = fit and np.isfinite(X).all() and corner.dtype.kind in "iu"
         if not fit or corner.min() < 0 or corner.max() >= len(X):
-            what = f"(n, 3) points and (t, 3) corners from 0 to {len(X) - 1}"
+            what = "(n, 3) points and (t, 3) corners from 0 to n - 1"
             raise ConfigError(f"the shape of {name!r} must be {what}.")
         found[name] = X, corner.astype(np.int64)
     return found

@@ -17,6 +17,7 @@ from cases import command
 from cases.command import ran
 from cases.paths import ROOT
 from cases.solid import block, reduced
+from rom.cli.parser import build_parser
 from rom.errors import ResourceError
 
 pytestmark = pytest.mark.once
@@ -140,7 +141,11 @@ def kind(line):
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_every_command_of_a_page_is_started_by_something(page):
+    """With verbs and options that the parser knows."""
     assert [line for line in commands(page) if kind(line) is None] == []
+    for words in (shlex.split(line) for line in commands(page) if kind(line) == "rom"):
+        verb = words[words.index("rom") + 1 :] if "rom" in words else words[1:]
+        assert build_parser().parse_args(verb).verb == verb[0]
 
 
 SHOWN = [page for page in PAGES if page.name != "step_part.md" and

@@ -14,7 +14,7 @@ import rom
 from cases.command import ran
 from cases.paths import ROOT
 from rom import errors
-from rom.cli.parser import EXIT_CODES, verb_modules
+from rom.cli.parser import EXIT_CODES
 from rom.lazy import Front
 
 PLACES = re.compile(r"(?<![\w.~$-])/(home|root|tmp|work|mnt|Users|private)/\w")
@@ -42,19 +42,6 @@ def test_first_readme_block_runs(monkeypatch, tmp_path):
     exec(compile(block, "README.md", "exec"), {"__name__": "__main__"})
     assert len(block.splitlines()) <= 15
     assert len(readme().splitlines()) <= 150
-
-
-def test_commands_in_the_readme_and_on_pages_exist():
-    """Every line that starts with rom, with verbs and options the parser knows."""
-    from rom.cli.parser import build_parser
-
-    pages = (readme(), *(path.read_text() for path in (ROOT / "docs").glob("*.md")))
-    text = "\n".join(pages).replace("\\\n", " ")
-    lines = re.findall(r"^(?:mpirun -n \d )?rom (.+)$", text, re.M)
-    assert len(lines) >= len(verb_modules())
-    for line in lines:
-        words = re.sub(r"\s+#.*", "", line).split()
-        assert build_parser().parse_args(words).verb == words[0]
 
 
 def test_public_names_exist_and_are_documented():

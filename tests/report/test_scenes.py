@@ -229,6 +229,11 @@ def test_a_scene_of_a_run_comes_back(solution, tmp_path):
     assert read_scene(tmp_path / "scene.json") == found
 
 
+def first(**more):
+    """What changes the first body of a scene."""
+    return lambda s: s["bodies"][0].update(**more)
+
+
 DAMAGE = {  # what is wrong: (how it is made wrong, words of the message)
     "another schema": (lambda s: s.update(schema="x"), "version"),
     "a later version": (lambda s: s.update(version=[2, 0]), r"version \[2, 0\] is not known"),
@@ -236,18 +241,12 @@ DAMAGE = {  # what is wrong: (how it is made wrong, words of the message)
     "modes": (lambda s: s.update(modes=[{}]), "no bodies that move"),
     "no times": (lambda s: s.pop("times"), "'times'"),
     "fewer instants": (lambda s: s.update(times=coarse.array([0, 1], "float32")), "do not fit"),
-    "not a number": (
-        lambda s: s["bodies"][0].update(q=coarse.array(np.full(402, np.nan), "float32")),
-        "not finite",
-    ),
+    "not a number": (first(q=coarse.array(np.full(402, np.nan), "float32")), "not finite"),
     "a view of infinity": (lambda s: s["view"].update(radius=1e999), "not finite"),
-    "a corner too many": (
-        lambda s: s["bodies"][0].update(triangles=coarse.array([0, 1, 60000], "uint16")),
-        "points that are not there",
-    ),
+    "a corner too many": (first(triangles=coarse.array([0, 1, 60000], "uint16")), "not there"),
     "a cut array": (lambda s: s["bodies"][1]["position"].update(data="AAA"), "an array is cut"),
     "another type": (lambda s: s["bodies"][1]["position"].update(type="object"), "'object'"),
-    "a name that is none": (lambda s: s["bodies"][0].update(name=3), "no name"),
+    "a name that is none": (first(name=3), "no name"),
 }
 
 

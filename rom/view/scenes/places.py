@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rom.arguments import AnyMechanism
 from rom.mbs.parts.bodies import GROUND, Marker
 from rom.model import Array, Index
 from rom.rotation import matrix
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     from rom.mbs.mechanism import Mechanism
     from rom.mbs.results.solution import Solution
 
+Steps = Index | list[int]  # numbers of instants
 Pose = tuple[Array, Array]  # (f, 3) origins and (f, 3, 3) axes, as columns in the world
 MAX_CANDIDATES = 400  # instants that are compared
 SAME_PLACE_RATIO = 0.02  # of the longest way, below which two places are one
@@ -23,7 +25,7 @@ NO_TURN, NO_SHIFT = np.eye(3), np.zeros(3)
 class Places:
     """Bodies of a mechanism in f instants."""
 
-    mechanism: "Mechanism"
+    mechanism: AnyMechanism
     poses: dict[str, Pose]  # of the frame of each body
     elastic: dict[str, Array]  # (f, r) elastic coordinates of each body
     magnify: float = 1.0  # deformations are drawn so many times larger than they are
@@ -58,7 +60,7 @@ def at_start(mechanism: "Mechanism") -> Places:
     return Places(mechanism, poses, {name: part.q[None] for name, part in parts})
 
 
-def moving(mechanism: "Mechanism", solution: "Solution", steps: Index, magnify: float) -> Places:
+def moving(mechanism: "Mechanism", solution: "Solution", steps: Steps, magnify: float) -> Places:
     """Bodies at some of the instants of a motion."""
     poses, elastic = {}, {}
     for name in mechanism.parts:
