@@ -13,8 +13,9 @@ from cases.gear_unit import rigid_unit
 from cases.refusals import refused
 from rom import view
 from rom.components.gear_mesh import GearPair
+from rom.components.gear_mesh.gears.meshes import middle_of_tooth
 from rom.components.journal_bearing import film, iso_vg
-from rom.components.transmission.loaded import _lines, _tooth
+from rom.components.transmission.loaded import _lines
 from rom.errors import ConfigError
 from rom.view.canvas.solids import gear_outline
 
@@ -30,7 +31,7 @@ def still(**more):
 
 def placed(pair, side, phase):
     """(n, 2) outline of a wheel beside the other, the axis of the pinion in the origin."""
-    turn = _tooth(pair, side, phase) - np.pi / pair.teeth[side]
+    turn = side * np.pi + middle_of_tooth(pair, side, phase) - np.pi / pair.teeth[side]
     c, s = np.cos(turn), np.sin(turn)
     outline = gear_outline(pair.teeth[side], pair.module, pair.pressure_angle, 40)
     return outline @ np.array([[c, s], [-s, c]]) + (side * pair.distance, 0)
