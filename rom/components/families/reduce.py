@@ -185,10 +185,8 @@ def _affine(model: FEModel, parameters: dict[str, Parameter], stress: bool) -> A
     if not any(isinstance(p, Thickness) for p in parameters.values()):
         return AffineModel(model, parameters)
     if stress:
-        raise ParameterError(
-            "stress is not recovered from bodies with a parameter of thickness.",
-            hint="Reduce with stress=False.",
-        )
+        text = "stress is not recovered from bodies with a parameter of thickness."
+        raise ParameterError(text, hint="Reduce with stress=False.")
     return StretchedModel(model, parameters)
 
 
