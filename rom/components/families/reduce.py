@@ -12,7 +12,6 @@ are estimated as the basis grows, and compared with full models where it was not
 
 import logging
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -139,10 +138,11 @@ def reduce_parametric(  # noqa: PLR0913  one keyword per choice
     between("tol", tol, 0, 1, "()")
     affine = _affine(model, checked_parameters(parameters), stress)
     middle = centre(affine.parameters)
-    start = partial(FamilyDraft, affine=affine, tol=tol, samples=[middle])
-    start = partial(start, model=affine.model_at(middle), method=method, name=name, stress=stress)
-    kinds = affine.kinds(interfaces)
-    draft = start(interfaces=kinds, reference=reference, damping=damping, certify=certify)
+    draft = FamilyDraft(
+        model=affine.model_at(middle), method=method, interfaces=affine.kinds(interfaces),
+        reference=reference, damping=damping, name=name, stress=stress, certify=certify,
+        affine=affine, tol=tol, samples=[middle],
+    )  # fmt: skip
     draft.ops, draft.bare = affine.at(middle), affine.bare(middle)
     family = run(stages(draft), draft)
     family.provenance["seconds to reduce"] = draft.seconds
