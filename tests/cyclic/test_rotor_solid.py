@@ -209,11 +209,5 @@ def test_springs_that_hold_nothing_are_refused(published):
     refuses(ConfigError, "hold nothing", rom.supported_sector, published, face)
     refuses(ConfigError, "across = -1", rom.supported_sector, published, face, across=-1.0)
     small = rom.reduce_sector(published, n_modes=5)
-    refuses(
-        InterfaceError,
-        "'cyclic_low' is no interface",
-        rom.supported_sector,
-        small,
-        face,
-        across=1.0,
-    )
+    held = {"face": face, "across": 1.0}
+    refuses(InterfaceError, "'cyclic_low' is no interface", rom.supported_sector, small, **held)

@@ -327,7 +327,7 @@ def test_what_does_not_fit_an_assembly_is_named(families, bolted):
     part, place = rom.update(single, alone(single), fixed=("root",)), "must be .body, interface"
     refuse(
         (lambda: updated(seam), "input 0 at .* is as near to one as to another of 'frame', 'arm'"),
-        (lambda: updated(attached=one), "'tip' must be .body, interface. of 'frame', 'arm'"),
+        (lambda: updated(attached=one), "'tip' must be .body, interface. of .'arm', 'frame'"),
         (lambda: updated(attached=replace(BOLTS, one=leg)), place),
         (lambda: updated(attached=replace(BOLTS, one=knee)), InterfaceError, "knee"),
         (lambda: updated(fixed=(("leg", "root"),)), place),

@@ -190,20 +190,11 @@ WRONG_WORDS = (
     (["--plan", "500,1", *LINES], "n_sensors = 500"),
     (["test.h5", "--spring", "soil=tip:2e5:0.1"], "must be written INTERFACE:VALUE:LOW:HIGH"),
     (["test.h5", "--mass", "cable=tip:heavy:0.1:10"], "--mass: 'heavy' is not a number"),
-    (
-        ["test.h5", *ATTACHED[:2], "--mass", "soil=tip:1:0.1:10"],
-        "--mass soil needs a name",
-    ),
+    (["test.h5", *ATTACHED[:2], "--mass", "soil=tip:1:0.1:10"], "--mass soil needs a name"),
     (["test.h5", "--rank", "3"], "rank needs residual="),
     (["test.h5", "--residual", "equations"], "input 0 has no sensor at its point"),
-    (
-        ["test.h5", "--candidate", "cable"],
-        "--candidate cable must name a --spring",
-    ),
-    (
-        ["test.h5", "--family", "body.rom.npz"],
-        "--family family.rom.npz, body.rom.npz:",
-    ),
+    (["test.h5", "--candidate", "cable"], "--candidate cable must name a --spring"),
+    (["test.h5", "--family", "body.rom.npz"], "--family family.rom.npz, body.rom.npz:"),
     (["test.h5", "--joint", "j=a.tip,b.tip:1,1,1:0.1:1"], "need an assembly"),
     (["test.h5", "--force-noise", "0.1"], "the estimator of H is not named"),
     (["test.h5", "-o", "family.rom.npz"], "family.rom.npz"),

@@ -353,13 +353,10 @@ def test_noise_of_forces_and_few_averages_are_checked(exact):
     test = measured(exact, "H1", 0.0, 0.1, np.random.default_rng(0))
     named, some = replace(test, force_noise=0.2), replace(test, force_noise=0.01, estimator=None)
     refuse(
-        (lambda: replace(test, force_noise=-0.1), r"force_noise = -0\.1 must be zero or more"),
+        (lambda: replace(test, force_noise=-0.1), "force_noise .* zero or more"),
         (lambda: replace(test, averages=2), "estimated from 2 averages says nothing"),
         (lambda: replace(test, estimator="H3"), "estimator = 'H3'"),
-        (
-            lambda: replace(test, force_noise=np.zeros(3)),
-            r"force_noise \(3,\) must .* \(20, 2\)",
-        ),
+        (lambda: replace(test, force_noise=np.zeros(3)), r"force_noise \(3,\) .* \(20, 2\)"),
         (some.logarithm, "the estimator of H is not named"),
         (named.logarithm, r"force_noise alone has .* times the power"),
     )

@@ -27,10 +27,7 @@ FEW = (
     Sensors(Channels([[1.0, 0.1, 0], [0.75, 0, 0]], [[0, 0, 1]] * 2), "acceleration", 0.5),
 )
 GAUGE = [[0.125, 0.05, 0.08], [0.25, 0.05, 0.08]]
-WANTED = (
-    Sensors(Channels(GAUGE[:1], [[1, 0, 0]]), "stress"),
-    Sensors(TIP, "displacement"),
-)
+WANTED = (Sensors(Channels(GAUGE[:1], [[1, 0, 0]]), "stress"), Sensors(TIP, "displacement"))
 
 
 @pytest.fixture(scope="module")

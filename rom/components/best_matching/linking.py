@@ -131,10 +131,8 @@ class Linking:
             / max(span * np.sqrt(2 * T), 1e-300),
         }
         if wrong := {name: float(x) for name, x in whole.items() if not x < MOMENTUM_RTOL}:
-            raise ModelError(
-                f"not zero, relative to their scale: {wrong}.",
-                hint="`Bodies.at_rest_as_a_whole` takes them out.",
-            )
+            text = f"not zero, relative to their scale: {wrong}."
+            raise ModelError(text, hint="`Bodies.at_rest_as_a_whole` takes them out.")
         return Extended(x, p, 0.0, float((x * p).sum()))
 
     def energy_constraint(self, state: Extended) -> float:

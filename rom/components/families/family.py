@@ -133,10 +133,8 @@ class BodyFamily:
         regions = tuple(share.region for share in self.shares)
         k, m = factors(self.parameters, regions, point)
         m[[share.fixed for share in self.shares]] = 1.0
-        made: dict[str, Any] = {
-            "provenance": self.provenance | {"parameters": point},
-            "certificate": self.certificate,
-        }
+        made: dict[str, Any] = {"provenance": self.provenance | {"parameters": point}}
+        made["certificate"] = self.certificate
         if self.stretch is not None:
             return replace(self._stretched(self.stretch, point, (k, m)), **made)
         integrals = weighted(m, [share.integrals for share in self.shares])

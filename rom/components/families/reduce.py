@@ -12,7 +12,6 @@ are estimated as the basis grows, and compared with full models where it was not
 
 import logging
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -42,7 +41,6 @@ from rom.components.families.parameters import (
     scattered,
     written,
 )
-from rom.eigen.connection import Connection
 from rom.eigen.verbs import Operators, residual_errors
 from rom.errors import ConfigError, ParameterError
 from rom.model import Array, Basis, FEModel, Index, Report, Row
@@ -50,6 +48,7 @@ from rom.names import check_name
 from rom.reduction.bases.method import Method
 from rom.reduction.interfaces.characteristic import Characteristic
 from rom.reduction.interfaces.connection import connect as connected
+from rom.reduction.interfaces.records import Connection
 from rom.rows import N_COMPARED, frequency_rows, row
 from rom.stages.bodies import connect, few_functions, make_body, place_frame, project
 
@@ -140,10 +139,11 @@ def reduce_parametric(  # noqa: PLR0913  one keyword per choice
     between("tol", tol, 0, 1, "()")
     affine = _affine(model, checked_parameters(parameters), stress)
     middle = centre(affine.parameters)
-    start = partial(FamilyDraft, affine=affine, tol=tol, samples=[middle])
-    start = partial(start, model=affine.model_at(middle), method=method, name=name, stress=stress)
-    kinds = affine.kinds(interfaces)
-    draft = start(interfaces=kinds, reference=reference, damping=damping, certify=certify)
+    draft = FamilyDraft(
+        model=affine.model_at(middle), method=method, interfaces=affine.kinds(interfaces),
+        reference=reference, damping=damping, name=name, stress=stress, certify=certify,
+        affine=affine, tol=tol, samples=[middle],
+    )  # fmt: skip
     draft.ops, draft.bare = affine.at(middle), affine.bare(middle)
     family = run(stages(draft), draft)
     family.provenance["seconds to reduce"] = draft.seconds
@@ -186,10 +186,8 @@ def _affine(model: FEModel, parameters: dict[str, Parameter], stress: bool) -> A
     if not any(isinstance(p, Thickness) for p in parameters.values()):
         return AffineModel(model, parameters)
     if stress:
-        raise ParameterError(
-            "stress is not recovered from bodies with a parameter of thickness.",
-            hint="Reduce with stress=False.",
-        )
+        text = "stress is not recovered from bodies with a parameter of thickness."
+        raise ParameterError(text, hint="Reduce with stress=False.")
     return StretchedModel(model, parameters)
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Annotated
 
 import numpy as np
@@ -183,9 +183,16 @@ class Shooting:
 
     def solution(self, found: Return) -> Solution:
         """The motion over one period."""
-        flow, run = found.flow, partial(simulate, rho_inf=self.rho_inf, tolerance=1e-12)
-        run = partial(run, t_start=self.t0, t_end=self.t0 + flow.period, dt=flow.settings.h)
-        return run(self.mechanism, state=flow.given(found.start))
+        flow = found.flow
+        return simulate(
+            self.mechanism,
+            t_start=self.t0,
+            t_end=self.t0 + flow.period,
+            dt=flow.settings.h,
+            state=flow.given(found.start),
+            rho_inf=self.rho_inf,
+            tolerance=1e-12,
+        )
 
 
 @typed

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Annotated
 
 import numpy as np
@@ -144,9 +144,11 @@ def periodic_path(  # noqa: PLR0913  one keyword per choice, most have defaults
     first, last = finite("span", span, (2,))
     if first == last:
         raise ConfigError(f"span = ({first:g}, {last:g}) needs two values that differ.")
-    looked = partial(periodic_motion, build(first), period=period_at(period, first), start=start)
-    looked = partial(looked, turns=turns, steps=steps, rho_inf=rho_inf, progress=progress)
-    begin = looked(guess=guess, settle=settle)
+    T = period_at(period, first)
+    begin = periodic_motion(
+        build(first), period=T, start=start, turns=turns, steps=steps, rho_inf=rho_inf,
+        guess=guess, settle=settle, progress=progress,
+    )  # fmt: skip
     scale = Flow(begin.solution.mechanism, begin.state.t, begin.period, steps, rho_inf).probe
     size, still = abs(last - first), 0.0 * scale
     family = Family(build, period, begin, turns, steps, rho_inf, size, scale, still)

@@ -146,8 +146,7 @@ def calibrate(
     bounds = _bounds(g, names)
     for weights in (scales, None):  # by size first, by scatter then
         sizes = weights or _scatter(residuals(x), pieces, len(names))
-        step = DERIVATIVE_STEP
-        fit = least_squares(weighed, x, "3-point", bounds, diff_step=step, args=(sizes,))
+        fit = least_squares(weighed, x, "3-point", bounds, args=(sizes,), diff_step=DERIVATIVE_STEP)
         x = fit.x
     cov = _covariance(fit.jac, x, names, bounds)
     sigma = np.sqrt(np.diag(cov))

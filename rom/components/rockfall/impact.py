@@ -308,18 +308,13 @@ VARIED_NUMBERS = {  # what can be changed: where it stands, and the power of the
     "stiffness in bending": ("slab.omega", 0.5),
     "damping of the slab": ("slab.damping", 1.0),
 }
-
-
 STRENGTH_NAME = "strength of the cushion"
-FITTED_NUMBERS = VARIED_NUMBERS | {
-    "recovery of the cushion": ("cushion.recovery", 1.0),
-    STRENGTH_NAME: ("cushion.strength", 1.0),
-}
+FITTED_NUMBERS = VARIED_NUMBERS | {"recovery of the cushion": ("cushion.recovery", 1.0)}
+FITTED_NUMBERS[STRENGTH_NAME] = ("cushion.strength", 1.0)
+Answer = Callable[[Gallery], float]
 
 
-def sensitivity(
-    g: Gallery, answer: Callable[[Gallery], float], factors: tuple[float, ...]
-) -> dict[str, Array]:
+def sensitivity(g: Gallery, answer: Answer, factors: tuple[float, ...]) -> dict[str, Array]:
     """How an answer changes when one parameter is multiplied by a factor.
 
     Args:

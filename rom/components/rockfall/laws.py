@@ -18,7 +18,7 @@ Mass = Annotated[float, Positive("kg")]
 Modulus = Annotated[float, Positive("Pa")]
 Density = Annotated[float, Positive("kg/m^3")]
 GRAVITY = 9.81  # m/s^2
-ROCK_DENSITY = 2600.0  # [kg/m^3]
+ROCK = 2600.0  # its density [kg/m^3]
 # share of the energy that sand gives back: a boulder returns with a sixth of its speed, as the
 # pulse measured on gravel does, see the page on rockfall
 SAND_RECOVERY = 0.03
@@ -101,7 +101,7 @@ class Cushion(Resistance):
     @classmethod
     @typed
     def of_sand(
-        cls, boulder: Mass, lame: Modulus, *, rock: Density = ROCK_DENSITY, **more: Any
+        cls, boulder: Mass, lame: Modulus, *, rock: Density = ROCK, **more: Any
     ) -> "Cushion":
         """Hertz's half space, with equal Lame constants, under a spherical boulder.
 
@@ -126,7 +126,7 @@ class Cushion(Resistance):
         return (kernels.POWER_LAW, *map(float, numbers))
 
 
-def ball_radius(boulder: float, rock: float = ROCK_DENSITY) -> float:
+def ball_radius(boulder: float, rock: float = ROCK) -> float:
     """Radius [m] of a ball of a mass [kg] and a density [kg/m^3]."""
     return float((3 * boulder / (4 * np.pi * rock)) ** (1 / 3))
 

@@ -20,7 +20,7 @@ from rom.arguments import Between, Length, Positive, Share, between, typed, vect
 from rom.components.rockfall import kernels
 from rom.components.rockfall.laws import (
     GRAVITY,
-    ROCK_DENSITY,
+    ROCK,
     SAND_RECOVERY,
     Density,
     Mass,
@@ -84,13 +84,7 @@ class Layer(Resistance):
     @classmethod
     @typed
     def of_sand(
-        cls,
-        boulder: Mass,
-        lame: Modulus,
-        thickness: float,
-        *,
-        rock: Density = ROCK_DENSITY,
-        **more: Any,
+        cls, boulder: Mass, lame: Modulus, thickness: float, *, rock: Density = ROCK, **more: Any
     ) -> "Layer":
         """The sand of `Cushion.of_sand`, E = 2.5 lame, in a layer.
 

@@ -53,13 +53,12 @@ class Channels:
     def __post_init__(self) -> None:
         for name in ("points", "directions"):
             value = np.atleast_2d(finite(name, getattr(self, name), None))
-            object.__setattr__(self, name, value)
-        shapes = np.shape(self.points), np.shape(self.directions)
-        if shapes[0] != shapes[1] or len(shapes[0]) != 2 or shapes[0][1] != 3:
-            raise ConfigError(f"points {shapes[0]}, directions {shapes[1]} must be (k, 3) both.")
+            object.__setattr__(self, name, finite(name, value, (None, 3)))
+        k = len(np.asarray(self.points))
+        one_each("directions", len(np.asarray(self.directions)), "points", k)
         if not np.linalg.norm(self.directions, axis=1).all():
             raise ConfigError("a direction of a channel has length zero; give one as (0, 0, 1).")
-        self._name_bodies(shapes[0][0])
+        self._name_bodies(k)
 
     def _name_bodies(self, k: int) -> None:
         """Keep a name of each of k channels, where there are any."""
@@ -248,10 +247,9 @@ class Responses:
                 hint="Average more, or give one number that is known.",
             )
         noise = finite("force_noise", self.force_noise, None)
-        if noise.shape not in ((), wanted[::2]):
-            raise ConfigError(f"force_noise {noise.shape} must be a number or {wanted[::2]}.")
-        if not (noise >= 0).all():
-            raise ConfigError(f"force_noise = {noise.min():g} must be zero or more.")
+        if noise.shape not in ((), wanted[::2]) or not (noise >= 0).all():
+            needed = f"must be a number or {wanted[::2]}, zero or more"
+            raise ConfigError(f"force_noise {noise.shape} {needed}.")
         self._check_values()
 
     def _check_values(self) -> None:

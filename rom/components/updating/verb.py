@@ -57,14 +57,14 @@ FACTOR_HELP = "by a factor from LOW to HIGH that is sought; may be repeated"
 STIFFNESS_HELP = f"[N/m, N m/rad], {FACTOR_HELP}"
 JOINT = "NAME=BODY.INTERFACE,BODY.INTERFACE:KX,KY,KZ:LOW:HIGH"
 STRUCTURE_OPTIONS = (  # what each takes, names or an assignment that may be repeated; what it says
-    ("--couple", "BODY.INTERFACE=BODY.INTERFACE", "of an assembly: they move together; repeatable"),
+    ("--couple", "BODY.INTERFACE=BODY.INTERFACE", "of an assembly: they move together"),
     ("--fixed", "NAME,...", "what was held"),
     ("--free", "NAME,...", "unknown parameters (default: all); springs and masses are always"),
     ("--spring", "NAME=INTERFACE:KX,KY,KZ:LOW:HIGH", f"interface to ground {STIFFNESS_HELP}"),
     ("--joint", JOINT, f"between bodies {STIFFNESS_HELP}"),
     ("--mass", "NAME=INTERFACE:KG:LOW:HIGH", f"on an interface [kg], {FACTOR_HELP}"),
     ("--candidate", "NAME,...", "springs and masses that the model has not, tried by their score"),
-    ("--prior", "NAME=DEVIATION", "relative standard deviation of a factor about one, before"),
+    ("--prior", "NAME=DEVIATION", "NAME's relative standard deviation about one, before the test"),
 )
 POINT_KEY = each(ratio("[m] and direction"), "x, y, z, dx, dy, dz")
 SCHEMA = record(

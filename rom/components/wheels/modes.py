@@ -200,10 +200,8 @@ def _waves(
     H = (T @ elastic).conj().T
     lam, V = eigh(H @ KZ, H @ MZ)
     zero = np.zeros(rigid.shape[1])
-    return (
-        np.concatenate([zero, np.sqrt(np.maximum(lam, 0.0))])[:n],
-        np.hstack([rigid, elastic @ V])[:, :n],
-    )
+    omega = np.concatenate([zero, np.sqrt(np.maximum(lam, 0.0))])
+    return omega[:n], np.hstack([rigid, elastic @ V])[:, :n]
 
 
 def _basis(T: csr_matrix, M: csr_matrix, Z: Complex) -> Complex:

@@ -5,7 +5,6 @@ Over the speed they are followed by their shapes and not by their order.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -122,8 +121,14 @@ def travelling_modes(
     lam, U = lam[keep], U[:, keep]
     ahead = np.zeros(lam.size) if standing else -np.sign(lam.imag) * np.sign(speed)
     size = np.sqrt(np.einsum("fm,fm->m", U.conj(), M @ U).real)
-    known = partial(TravellingModes, sector=sector, diameter=diameter, speed=abs(speed))
-    return known(abs(lam.imag), T @ (U / size), direction=ahead)
+    return TravellingModes(
+        abs(lam.imag),
+        T @ (U / size),
+        sector=sector,
+        diameter=diameter,
+        speed=abs(speed),
+        direction=ahead,
+    )
 
 
 def _lowest(

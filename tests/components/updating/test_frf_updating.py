@@ -445,10 +445,7 @@ test_wrong_input_is_named = refused(
     (lambda: responses(BEAM, START, GUESS, OMEGA * np.nan, (2,)), "omega finite"),
     (lambda: update_by_output(BEAM, measured(), START, -GUESS), "ratios to start from"),
     (lambda: update_by_output(BEAM, measured(), START[:3], GUESS), r"needed is \(9,\)"),
-    (
-        lambda: update_by_output(BEAM, FIVE, START, GUESS),
-        "8 sensors of the model for 5 of the test",
-    ),
+    (lambda: update_by_output(BEAM, FIVE, START, GUESS), "8 sensors of the model for 5 of"),
     (lambda: response_function_method(BEAM, measured(), START, np.eye(3)), "needed is .48"),
     (lambda: response_function_method(BEAM, measured(), START, BEAM.K, steps=0), "steps = 0"),
     (lambda: parametric_basis(BEAM, 0, START), "n_modes = 0"),

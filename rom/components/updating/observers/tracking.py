@@ -313,10 +313,8 @@ def linear_tracker(
     """The filter at logarithms x (n_p,) of factors, which stay."""
     at, n_e = operation.at(x), operation.driven.shape[1]
     if len(at.C) < n_e:
-        raise ConfigError(
-            f"{len(at.C)} sensors for {n_e} unknown forces.",
-            hint="Add sensors, or join forces that have one history.",
-        )
+        text = f"{len(at.C)} sensors for {n_e} unknown forces."
+        raise ConfigError(text, hint="Add sensors, or join forces that have one history.")
     R = np.concatenate([np.full(len(s.names), s.noise**2.0) for s in sensors])
     if not R.all():
         raise ConfigError("a sensor has no noise; give its standard deviation.")

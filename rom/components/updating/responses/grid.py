@@ -140,10 +140,8 @@ def _channels(dofs: list[Dof], points: Points) -> Channels:
     owners = tuple(body for *_, body in dofs)
     if any(owners) and not all(owners):
         node = dofs[owners.index("")][0]
-        raise FileFormatError(
-            f"node {node} has no body, others have one.",
-            hint="Name the bodies of all nodes, or of none.",
-        )
+        text = f"node {node} has no body, others have one."
+        raise FileFormatError(text, hint="Name the bodies of all nodes, or of none.")
     where = np.array([points[node] for node, *_ in dofs])
     return Channels(where, axes, owners if any(owners) else None)
 
