@@ -41,6 +41,7 @@ from rom.components.families.parameters import (
     scattered,
     written,
 )
+from rom.eigen.connection import Connection
 from rom.eigen.verbs import Operators, residual_errors
 from rom.errors import ConfigError, ParameterError
 from rom.model import Array, Basis, FEModel, Index, Report, Row
@@ -48,7 +49,6 @@ from rom.names import check_name
 from rom.reduction.bases.method import Method
 from rom.reduction.interfaces.characteristic import Characteristic
 from rom.reduction.interfaces.connection import connect as connected
-from rom.reduction.interfaces.records import Connection
 from rom.rows import N_COMPARED, frequency_rows, row
 from rom.stages.bodies import connect, few_functions, make_body, place_frame, project
 

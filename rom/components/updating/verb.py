@@ -44,7 +44,7 @@ EXAMPLES = """\
       --spring clamp=root:1e8,1e8,1e8:0.1:10 --mass cable=tip:0.05:0.1:10 --candidate cable \\
       -o updated.rom.npz
   rom update test.uff --family panel.rom.npz --averages 50 --residual equations --prior core=0.3
-  rom update test.h5 --family frame=frame.rom.npz --family arm=arm.rom.npz --fixed frame.root \
+  rom update test.h5 --family frame=frame.rom.npz --family arm=arm.rom.npz --fixed frame.root \\
       --joint bolts=frame.tip,arm.root:4e8,4e8,4e8,2e5,1e5,1e5:0.1:10
   rom update --plan 8,1 --lines 20:800 --family panel.rom.npz --fixed root -o plan.csv
   rom update --plan --lines 20:800 --family panel.rom.npz --fixed root -o plan.png
