@@ -17,10 +17,10 @@ from rom.body.recovery import StressRecovery
 from rom.eigen.supports import DIRECTIONS, Fixed, held_coordinates, supports
 from rom.errors import InterfaceError, ModelError
 from rom.model import Array, Index, Report
-from rom.names import check_text, named, offered
+from rom.names import check_known, check_text, named
 
 Provenance = dict[str, Any]  # JSON: how something was made
-Loads = Mapping[str, npt.ArrayLike]  # {interface: (6,) force [N] and moment [N m]}
+Loads = Mapping[str, npt.ArrayLike]  # {interface: (6,) force and moment [N, N m]}, axes of body
 REPEATED_ROW_RTOL = 1e-7  # singular value of rows that repeat others; modes are as accurate as 1e-8
 
 
@@ -155,12 +155,7 @@ class BodyData:
         return bool(self.provenance.get("reduction", {}).get("static shapes", True))
 
     def check_support(self, fixed: Fixed) -> None:
-        """Refuse to hold interfaces that do not exist, or any of a basis of free-free modes alone.
-
-        Raises:
-            InterfaceError: if an interface is unknown.
-            ModelError: naming the interface.
-        """
+        """Refuse to hold unknown interfaces, or any of a basis of free-free modes alone."""
         held = supports(fixed, self.markers, f"body {self.name!r}")
         if held and not self.has_static_shapes:
             raise ModelError(
@@ -170,21 +165,13 @@ class BodyData:
             )
 
     def held_rows(self, fixed: Fixed) -> Array:
-        """(h, 6 + r) interface coordinates that supports hold, as in `Marker.hold`.
-
-        Raises:
-            ConfigError, InterfaceError: see `rom.eigen.supports`.
-        """
+        """(h, 6 + r) interface coordinates that supports hold, as in `Marker.hold`."""
         held = supports(fixed, self.markers, f"body {self.name!r}")
         rows = [rows_held(self.markers[name], of) for name, of in held.items()]
         return np.vstack([np.zeros((0, 6 + self.n_modes)), *rows])
 
     def mean_rows(self, fixed: Fixed) -> Array:
-        """(h, r) elastic part of the mean motion of interfaces in the directions that are held.
-
-        Raises:
-            ConfigError, InterfaceError: see `rom.eigen.supports`.
-        """
+        """(h, r) elastic part of the mean motion of interfaces in the directions that are held."""
         rows = [np.zeros((0, self.n_modes))]
         for name, directions in supports(fixed, self.markers, f"body {self.name!r}").items():
             at = [DIRECTIONS.index(d) for d in directions or DIRECTIONS]
@@ -192,14 +179,7 @@ class BodyData:
         return np.vstack(rows)
 
     def forces_on(self, loads: Loads) -> Array:
-        """(r,) forces on the elastic coordinates, SI or units of the body.
-
-        Args:
-            loads: {interface: (6,) force [N] and moment [N m]}, axes of the body frame.
-
-        Raises:
-            ConfigError, InterfaceError: for loads that are none, or on interfaces unknown.
-        """
+        """(r,) forces of loads on the elastic coordinates, SI or units of the body."""
         force = np.zeros(self.n_modes)
         for name, load in loads.items():
             six, marker = finite(f"loads[{name!r}]", load, (6,)), self.marker(name)
@@ -224,10 +204,8 @@ class BodyData:
             >>> float(rom.load("beam.rom.npz").marker("tip").point[0])  # the beam is 1 m long
             1.0
         """
-        if name not in self.markers:
-            raise InterfaceError(
-                f"body {self.name!r} has no interface {name!r}; it has {offered(self.markers)}."
-            )
+        text = f"body {self.name!r} has no interface {name!r}; it has"
+        check_known(name, self.markers, text, InterfaceError)
         return self.markers[name]
 
     @property

@@ -44,14 +44,9 @@ class StressRecovery:
     inertial: Array | None = None
 
     def field(self, q: Array, accelerations: Array | None = None) -> Array:
-        """(p, 6) stress for elastic coordinates q [Pa].
+        """(p, 6) stress for elastic coordinates q (r,) [Pa].
 
-        Args:
-            q: (r,) elastic coordinates.
-            accelerations: (12 + r,) what `accelerations` returns; None for statics.
-
-        Raises:
-            ConfigError: if q has another length, or the modes left out are not known.
+        Accelerations (12 + r,) are what `accelerations` returns; None for statics.
         """
         q = finite("q", q, self.operator.shape[1:])
         found: Array = self.operator @ q

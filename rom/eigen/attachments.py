@@ -12,6 +12,7 @@ from rom.arguments import positive
 from rom.eigen.verbs import coupled, mean_motion, rigid_motions
 from rom.errors import InterfaceError, MaterialError
 from rom.model import Array, Attachment, FEModel
+from rom.names import check_known
 from rom.plausible import REACH, warn_outside
 
 
@@ -35,12 +36,10 @@ def point_masses(attachment: Attachment, origin: Array) -> tuple[Array, Array]:
 
 def carried_displacements(attachment: Attachment, model: FEModel) -> tuple[Array, Array, Array]:
     """Points (6, 3), masses (6,) and the map (18, 3k) from interface dofs to their motion."""
-    if attachment.interface not in model.interfaces:
-        raise InterfaceError(
-            f"an attachment names the interface {attachment.interface!r}; "
-            f"the model has {sorted(model.interfaces)}."
-        )
-    interface = model.interfaces[attachment.interface]
+    name = attachment.interface
+    text = f"an attachment names the interface {name!r}; the model has"
+    check_known(name, model.interfaces, text, InterfaceError)
+    interface = model.interfaces[name]
     points, masses = point_masses(attachment, interface.origin)
     reach, size = np.abs(points - interface.origin).max(), np.ptp(model.points, axis=0).max()
     warn_outside(REACH, float(reach / size), f"the attachment on {interface.name!r}")

@@ -24,15 +24,10 @@ LEAST_PART = 1e-10  # of rigid motions seen by the interfaces, below which one i
 
 @dataclass(frozen=True, slots=True)
 class Condensed:
-    """Constraint modes Psi and the stiffness S = Psi^T K Psi between the interface coordinates.
+    """Constraint modes Psi (n_local, n_b) and the stiffness S = Psi^T K Psi between interfaces.
 
-    Attributes:
-        ops: the body in interface coordinates.
-        held: the same with its whole boundary held, factored.
-        boundary: (n_b,) dof numbers of the interface coordinates.
-        Psi: (n_local, n_b) constraint modes.
-        S: (n_b, n_b) condensed stiffness.
-        alone: (n_b,) stiffness of each coordinate while nothing else moves.
+    ``held`` is the body ``ops`` with its whole boundary (n_b,) held, factored; ``alone`` (n_b,) the
+    stiffness of each coordinate while nothing else moves.
     """
 
     ops: Operators

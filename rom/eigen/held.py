@@ -19,13 +19,9 @@ MOVING_RATIO = 1e-3  # of the largest motion: less is that of a part at rest
 class HeldBody:
     """A body with some dofs held, its stiffness factored for many answers; call it to solve.
 
-    Attributes:
-        held: the dofs held, global numbers.
-        mine: rows of this rank that are free.
-        n_free: number of free dofs.
-        inner: operators on them, None when there are none.
-        factor: of their stiffness, or of K - shift M; None while nobody needs it.
-        make: factors it.
+    Of the dofs held, global numbers, ``mine`` are the rows of this rank that are free, ``inner``
+    the operators on them, None when there are none; ``make`` makes the factor of their stiffness,
+    or of K - shift M, which is None while nobody needs it.
     """
 
     make: Callable[[], None]

@@ -27,7 +27,7 @@ class BlockLanczos:
     """Krylov space of (K - sigma M)^-1 M, orthogonal to M-orthonormal modes, deflated (n_local, d).
 
     The shift lies below all eigenvalues sought, ``factor`` solves with K - sigma M for as many
-    columns at once as there are random ones to start from (n_local, p); ``tolerance`` (k,) allows
+    columns at once as there are random ones to start from (n_local, p); ``tol`` (k,) allows
     residuals of the modes sought, over the inverse's eigenvalues.
 
     Source:
@@ -37,16 +37,10 @@ class BlockLanczos:
     """
 
     def __init__(
-        self,
-        ops: Searched,
-        factor: Factor,
-        sigma: float,
-        deflated: Array,
-        start: Array,
-        tolerance: Array,
+        self, ops: Searched, factor: Factor, sigma: float, deflated: Array, start: Array, tol: Array
     ):
         self.ops, self.factor, self.sigma = ops, factor, sigma
-        self.k, self.tolerance = tolerance.size, tolerance
+        self.k, self.tolerance = tol.size, tol
         self.n_deflated, self.width = deflated.shape[1], start.shape[1]
         shape = (ops.n_local, self.n_deflated + capacity(self.k))
         self.V, self.MV = np.empty(shape, order="F"), np.empty(shape, order="F")

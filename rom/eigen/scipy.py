@@ -103,16 +103,9 @@ class HeldSciPy(HeldBody):
 class SciPyOperators(ModeSearch):
     """Stiffness and mass of one body, all rows in this process.
 
-    Args:
-        K: (n, n) stiffness [N/m], symmetric.
-        M: (n, n) mass [kg], symmetric positive definite.
-        rigid: (n, 6) rigid motions, or None when there is no geometry.
-        T: (n_parent, n) map to the coordinates these came from.
-
-    Raises:
-        ConfigError: if the shapes do not fit.
-        SolverError: if an entry is not finite.
-        QualityGateError: if a matrix is not symmetric, or M has a diagonal that is not positive.
+    Stiffness K (n, n) [N/m] is symmetric, mass M (n, n) [kg] positive definite; ``rigid`` (n, 6) is
+    None when there is no geometry, T (n_parent, n) the map to the coordinates these came from.
+    Entries that are not finite, and a diagonal of M that is not positive, are refused.
     """
 
     first = 0

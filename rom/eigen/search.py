@@ -91,12 +91,7 @@ class ModeSearch(Searched):
         return float(max(self.from_all(ratio.max(initial=0.0))))
 
     def modes(
-        self,
-        held: Any,
-        m: int,
-        sigma: float | None = None,
-        *,
-        finished: bool = False,
+        self, held: Any, m: int, sigma: float | None = None, *, finished: bool = False
     ) -> tuple[Array, Array]:
         """Lowest m modes, mass-normalised: omega (m,) [rad/s] and Phi (n_local, m)."""
         if isinstance(held, Supported):

@@ -25,17 +25,10 @@ Supports = dict[str, tuple[str, ...]]  # {interface: directions held}; none: all
 
 
 def supports(fixed: Fixed, known: Iterable[str], owner: str = "the model") -> Supports:
-    """What is held, read from the argument ``fixed``.
+    """What is held, read from the argument ``fixed``, of all interfaces known of their owner.
 
-    Args:
-        fixed: names of interfaces held wholly, or {name: directions}, e.g. {"root": "yz",
-            "tip": "x rz"}; "root:yz" among names says the same.
-        known: names of all interfaces.
-        owner: whose they are, for messages.
-
-    Raises:
-        ConfigError: for a wrong direction, or an interface held twice.
-        InterfaceError: if an interface is unknown.
+    Names of interfaces held wholly, or {name: directions}, e.g. {"root": "yz", "tip": "x rz"};
+    "root:yz" among names says the same.
     """
     known = list(known)
     if isinstance(fixed, Mapping):
@@ -97,15 +90,8 @@ Springs = Mapping[str, Any]  # {interface: (3,), (6,) or (6, 6) stiffness to the
 def spring_matrices(springs: Springs | None, known: Iterable[str], owner: str) -> dict[str, Array]:
     """{interface: (6, 6)} stiffness of springs to the ground, translations first [N/m, N m/rad].
 
-    Args:
-        springs: (3,) translations, (6,) with rotations, or a symmetric (6, 6), at the origin of
-            each interface, axes of the geometry.
-        known: names of all interfaces.
-        owner: whose they are, for messages.
-
-    Raises:
-        ConfigError: for a wrong shape, a spring that does nothing or one that pushes away.
-        InterfaceError: if an interface is unknown.
+    Each is (3,) translations, (6,) with rotations, or a symmetric (6, 6), at the origin of its
+    interface, axes of the geometry.
     """
     supports(tuple(springs or ()), known, owner)
     found = {}
@@ -117,10 +103,10 @@ def spring_matrices(springs: Springs | None, known: Iterable[str], owner: str) -
             )
         k = np.diag(np.pad(k, (0, 6 - k.size))) if k.ndim == 1 else k
         lam = np.linalg.eigvalsh(0.5 * (k + k.T))
-        if np.abs(k - k.T).max() > 1e-10 * np.abs(k).max() or lam[0] < -1e-10 * lam[-1]:
-            raise ConfigError(f"springs[{name!r}] must be symmetric, and positive or zero.")
-        if not k.any():
-            raise ConfigError(f"springs[{name!r}] needs a stiffness that is not zero.")
+        uneven = np.abs(k - k.T).max() > 1e-10 * np.abs(k).max()
+        if uneven or lam[0] < -1e-10 * lam[-1] or not k.any():
+            what = "be symmetric, and positive or zero" if k.any() else "not be zero"
+            raise ConfigError(f"springs[{name!r}] must {what}.")
         found[name] = 0.5 * (k + k.T)
     return found
 

@@ -79,13 +79,7 @@ class Operators(Mass, Protocol):
         """K X, (n_local, k), in units of K times those of X (n_local, k)."""
 
     def comparison_pays(self, n_supports: int, n_interface: int, n_modes: int) -> bool:
-        """Whether full modes in so many supports cost less than the reduction did, or little.
-
-        Args:
-            n_supports: in which a reduced body would be compared.
-            n_interface: interface coordinates of the reduction.
-            n_modes: its modes.
-        """
+        """Whether full modes in so many supports cost less than this reduction did, or little."""
 
     def hold(self, dofs: npt.ArrayLike, shift: float = 0.0) -> Held:
         """Eliminate the held dofs (global numbers, equal on all ranks) and factor the rest.
@@ -106,21 +100,13 @@ class Operators(Mass, Protocol):
         *,
         finished: bool = False,
     ) -> tuple[Array, Array]:
-        """Lowest m modes with the given dofs held.
+        """Lowest m modes with dofs (k,) held, or by what `hold` returned, to use its factor again.
 
-        Accepts what `hold` returned, to use its factor again; with ``finished`` nobody else will,
-        and its memory may be used for counting. With nothing held the six rigid motions come first
-        with omega exactly zero.
-
-        Args:
-            held: (k,) dof numbers, what `hold` returned, or a support of a condensed body.
-            m: number of modes.
-            sigma: shift [rad^2/s^2]; chosen from the model when not given.
-            finished: nobody else will use the factor.
-
-        Returns:
-            omega (m,) [rad/s], ascending, and Phi (n_local, m), mass-normalised, largest entry
-            positive [kg^-1/2].
+        A support of a condensed body serves as well. With ``finished`` nobody else will use the
+        factor, and its memory may be used for counting; a shift sigma [rad^2/s^2] is chosen where
+        none is given. With nothing held the six rigid motions come first, omega exactly zero.
+        Returned are omega (m,) [rad/s], ascending, and Phi (n_local, m), mass-normalised, largest
+        entry positive [kg^-1/2].
 
         Raises:
             ModesMissedError: if an inertia count says a mode was skipped.
@@ -129,44 +115,19 @@ class Operators(Mass, Protocol):
     def transform(self, T: Matrix, rigid: Array) -> "Operators":
         """The same body in new coordinates u = T a, with K_a = T^T K T and M_a = T^T M T.
 
-        Args:
-            T: sparse (n_local, n_a) rows of this process, global columns. Columns of kept dofs
-                stay on the rank that owns them, in their order; further columns come last, on the
-                last rank.
-            rigid: (n_local_a, 6) the rigid motions in a, in units of a; its length is the size of
-                this rank.
+        T has the rows (n_local, n_a) of this process, sparse, global columns: those of kept dofs
+        stay on the rank that owns them, in their order; further ones come last, on the last rank.
+        ``rigid`` (n_local_a, 6) has the rigid motions in units of a, all rows of this rank.
         """
 
     def expand(self, A: Array) -> Array:
-        """T A, in units of the parent: from the coordinates of `transform` back to it.
-
-        Args:
-            A: (n_local, k) in the coordinates of `transform`, in units of these.
-
-        Returns:
-            (n_parent, k) rows of this rank, in units of the parent.
-        """
+        """T A (n_parent, k), in units of the parent, of A (n_local, k) behind `transform`."""
 
     def restrict(self, F: Array) -> Array:
-        """T^T F: loads in the coordinates of `transform`.
-
-        Args:
-            F: (n_parent, k) loads on the rows of the parent, in units of any kind.
-
-        Returns:
-            (n_local, k), in units of F times those of T.
-        """
+        """T^T F (n_local, k), in units of F times those of T, of loads F (n_parent, k)."""
 
     def rows(self, X: Array, dofs: npt.ArrayLike) -> Array:
-        """X[dofs] (k, l) for global dof numbers (k,), equal on all ranks.
-
-        Args:
-            X: (n_local, l) rows of this rank, in units of any kind.
-            dofs: (k,) global dof numbers.
-
-        Returns:
-            (k, l), in units of X.
-        """
+        """X[dofs] (k, l), in units of X (n_local, l), of global dofs (k,) equal on all ranks."""
 
     def plus_mass(self, dM: Matrix) -> "Operators":
         """The same body with more mass: M + dM, dM sparse (n_local, n) with global columns."""
@@ -185,21 +146,16 @@ class Operators(Mass, Protocol):
     ) -> "Operators":
         """Another body on the same dofs: K' = k K + sum k_i K_i, M' = m M + sum m_i M_i.
 
-        Args:
-            stiffness: (k, [(k_i, K_i), ...]), matrices with the layout of K.
-            mass: (m, [(m_i, M_i), ...]).
-            rigid: (n_local, 6) its rigid motions [1, m]; None if they are the same.
+        Given are (k, [(k_i, K_i), ...]), matrices with the layout of K, and the same of the mass;
+        ``rigid`` (n_local, 6) are its rigid motions [1, m], None if they are the same.
         """
 
 
 class Searched(Operators, Protocol):
     """What a search for modes knows of a body, beside the verbs.
 
-    Attributes:
-        fixed: (n_local,) numbers that depend on the place of a dof.
-        K, M: stiffness and mass.
-        T: the map to the coordinates they came from, or None.
-        like: other matrices in the same coordinates.
+    ``fixed`` (n_local,) are numbers that depend on the place of a dof, T is the map to the
+    coordinates that K and M came from, or None, ``like`` has other matrices in the same ones.
     """
 
     fixed: Array
@@ -232,11 +188,7 @@ class Searched(Operators, Protocol):
 def canonical_signs(Phi: Array) -> Array:
     """Turn each column so that its largest entry is positive; the first of equals decides.
 
-    Args:
-        Phi: (n, m) columns, in units of any kind; changed in place.
-
-    Returns:
-        The same array (n, m), in units of the one given.
+    Columns Phi (n, m), in units of any kind, are changed in place and returned.
     """
     for phi in Phi.T:
         size = np.abs(phi)
@@ -248,12 +200,8 @@ def canonical_signs(Phi: Array) -> Array:
 def count_shift(lam: Array, m: int) -> tuple[int, float]:
     """Where to count: the widest relative gap behind the m-th of some more eigenvalues.
 
-    Args:
-        lam: (k,) ascending eigenvalues [rad^2/s^2], k > m, not all zero.
-        m: number of modes wanted.
-
-    Returns:
-        The number of eigenvalues below the gap and a shift inside it [rad^2/s^2].
+    Of ascending lam (k,) [rad^2/s^2], k > m, not all zero: the number of eigenvalues below the gap
+    and a shift inside it [rad^2/s^2].
     """
     upper, lower = lam[m:], lam[m - 1 : -1]
     least = max(np.abs(lam[-1]) * 1e-12, np.finfo(float).tiny)
@@ -264,11 +212,8 @@ def count_shift(lam: Array, m: int) -> tuple[int, float]:
 def whole_clusters(lam: Array, m: int) -> int:
     """The least number of lowest modes, m or more, that cuts through no repeated eigenvalue.
 
-    One of two equal modes would prefer a direction that the structure does not have.
-
-    Args:
-        lam: (k,) ascending eigenvalues [rad^2/s^2].
-        m: number of modes wanted, 1 <= m <= k.
+    One of two equal modes would prefer a direction that the structure does not have. Of ascending
+    lam (k,) [rad^2/s^2], 1 <= m <= k.
     """
     while m < lam.size and lam[m] - lam[m - 1] <= CLUSTER_RTOL * lam[m]:
         m += 1
@@ -308,14 +253,9 @@ def static_shapes(ops: Operators, held: Held, E: Array) -> Array:
 
 
 def orthonormal(ops: Mass, X: Array) -> Array:
-    """M-orthonormal columns with the span of X, in the order given.
+    """M-orthonormal columns (n_local, l) [kg^-1/2] with the span of X (n_local, k), in its order.
 
-    Args:
-        ops: its mass is the weight.
-        X: (n_local, k) columns, in units of any kind: their lengths do not matter.
-
-    Returns:
-        (n_local, l) columns of mass one [kg^-1/2], l <= k.
+    The length of columns in units of any kind does not matter; the mass of ``ops`` is the weight.
     """
     return without_dependent(ops, X)[0]
 
@@ -326,14 +266,10 @@ def without_dependent(ops: Mass, X: Array) -> tuple[Array, list[int]]:
 
 
 def orthonormal_in(S: Matrix, V: Array) -> Array:
-    """S-orthonormal columns with the span of V, in the order given; sums over one process.
+    """S-orthonormal columns (n, l) with the span of V (n, k), in its order; sums over one process.
 
-    Args:
-        S: (n, n) symmetric positive weight.
-        V: (n, k) columns, in units of any kind: their lengths do not matter.
-
-    Returns:
-        (n, l) columns with V^T S V = 1, in units of S to the power -1/2; l <= k.
+    The length of columns in units of any kind does not matter; S (n, n) is a symmetric positive
+    weight.
     """
     return independent(V, lambda A, B: A.T @ (S @ B))[0]
 
@@ -421,11 +357,7 @@ def dofs_of(nodes: Index) -> Index:
 
 
 def rigid_motions(points: Array) -> Array:
-    """(3k, 6) displacements of k points: unit translations [1], rotations about the origin [m].
-
-    Args:
-        points: (k, 3) coordinates [m].
-    """
+    """(3k, 6) motions of points (k, 3) [m]: unit translations [1], rotations about zero [m]."""
     R = np.zeros((points.shape[0], 3, 6))
     R[:, :, :3] = np.eye(3)
     x, y, z = points.T
@@ -472,10 +404,7 @@ def mean_motion(interface: Interface) -> Array:
 def mac(ops: Operators, Phi: Array, Psi: Array) -> Array:
     """Modal assurance criterion with the mass as weight, (k, l) between 0 and 1 [1].
 
-    Args:
-        ops: operators of the model the shapes belong to.
-        Phi: (n_local, k) shapes, in units of any length, for each is normalised.
-        Psi: (n_local, l) shapes, likewise in units of any length.
+    Of shapes Phi (n_local, k) and Psi (n_local, l), in units of any length, as each is normalised.
     """
     cross = ops.gram(Phi, ops.apply_M(Psi))
     return cross**2 / np.outer(_squares(ops, Phi), _squares(ops, Psi))
@@ -486,14 +415,9 @@ def residual_errors(
 ) -> Array:
     """(k,) relative frequency errors [1] of modes of a basis, r^T K^-1 r / (2 x^T K x).
 
-    With the residual r = K x - lambda M x; asymptotically exact, not a bound.
-
-    Args:
-        ops: operators of the model the shapes belong to.
-        inverse: stiffness, factored, of the dofs on which the basis leaves a residual.
-        X: (n_local, k) shapes [m].
-        seen_in: other coordinates of the same model, in which equilibrium is asked for and those
-            of ``inverse``.
+    With the residual r = K x - lambda M x of shapes X (n_local, k) [m]; asymptotically exact, not a
+    bound. The inverse is of the dofs on which the basis leaves a residual; ``seen_in`` are other
+    coordinates of the same model, in which equilibrium is asked for and those of the inverse.
     """
     KX, MX = ops.apply_K(X), ops.apply_M(X)
     energy = np.diag(ops.gram(X, KX))

@@ -42,15 +42,10 @@ class Workers(Protocol):
     def each(
         self, function: Callable[[Item], Value], items: Sequence[Item], costs: Sequence[float]
     ) -> list[Value]:
-        """Values of a function of some items, in their order, on all ranks.
+        """Values of a function of items (k,), in their order, on all ranks, which all must call.
 
-        Each is found by one rank, so that the function must not wait for others; what it raises
-        is raised on all of them.
-
-        Args:
-            function: called once for each item.
-            items: (k,) the same on all ranks, which all must call.
-            costs: (k,) work that each of them makes, in a unit of any kind.
+        Each is found by one rank, so that the function must not wait for others; what it raises is
+        raised on all of them. Costs (k,) are the work that each makes, in units of any kind.
         """
 
 

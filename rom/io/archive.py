@@ -7,13 +7,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from tokenize import TokenError
-from typing import Any, NamedTuple
+from typing import IO, Any, NamedTuple
 
 import numpy as np
 from numpy.lib import format as npy
 
 from rom.errors import ConfigError, FileFormatError, QualityGateError, UnsafeFileError, in_file
-from rom.io.files import MAX_FILE_BYTES, check_readable, write_whole
+from rom.io.files import MAX_FILE_BYTES, check_readable, damaged, write_whole
 from rom.model import Array
 from rom.names import named
 
@@ -46,16 +46,8 @@ def write_archive(
 ) -> Path:
     """Write a file, whole or not at all; the same content gives the same bytes.
 
-    Args:
-        path: file name.
-        manifest: what a reader needs to know about the arrays.
-        arrays: {name: numbers}.
-        what: whose arrays they are, for messages.
-
-    Raises:
-        ConfigError: if the folder is missing or not writable.
-        QualityGateError: if an array holds a number that is not finite.
-        ResourceError: if the disk is full.
+    The manifest is what a reader needs to know about the arrays, messages say ``what`` they are of.
+    An array that holds a number that is not finite is refused.
     """
     for name, A in arrays.items():
         if not np.isfinite(A).all():
@@ -63,7 +55,7 @@ def write_archive(
     manifest = manifest | {"sha256": {name: digest(A) for name, A in arrays.items()}}
     text = np.frombuffer(json.dumps(manifest, sort_keys=True).encode(), dtype=np.uint8)
 
-    def write(file: Any) -> None:
+    def write(file: IO[bytes]) -> None:
         with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
             for name, A in {"manifest": text, **arrays}.items():
                 # a fixed date: the same content gives the same bytes
@@ -79,14 +71,7 @@ def read_archive(
 ) -> tuple[dict[str, Any], dict[str, Array]]:
     """Manifest and arrays of a file, its checksums compared.
 
-    Args:
-        path: file name.
-        kind: what it must be.
-        limit: bytes the arrays may take in memory.
-
-    Raises:
-        FileFormatError: if the file is missing, cut, changed, or of another kind.
-        UnsafeFileError: if it asks for more memory than the limit or holds anything but numbers.
+    One that is of another kind, or asks for more bytes of memory than the limit, is refused.
     """
     path = check_readable(path, max(limit, MAX_FILE_BYTES))
     with in_file(path):
@@ -172,11 +157,8 @@ def _read(archive: zipfile.ZipFile, name: str) -> Array:
         raise UnsafeFileError(
             f"the array {name!r} claims {n_bytes} bytes but has {info.file_size}."
         )
-    with archive.open(info) as member:
-        try:
-            return npy.read_array(member, allow_pickle=False)
-        except ValueError as error:
-            raise FileFormatError(f"the array {name!r} is cut: {error}.") from error
+    with archive.open(info) as member, damaged(f"the array {name!r} is cut"):
+        return npy.read_array(member, allow_pickle=False)
 
 
 def _read_manifest(archive: zipfile.ZipFile, kind: Kind) -> dict[str, Any]:

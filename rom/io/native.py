@@ -146,8 +146,8 @@ def body_manifest(body: FlexibleBody) -> dict[str, Any]:
 
 def body_of(manifest: dict[str, Any], arrays: dict[str, Array]) -> FlexibleBody:
     """The body that a file describes."""
-    _refuse_missing(manifest, arrays)
-    _check_words(manifest, arrays["K"].shape[-1])
+    for fault in _faults(manifest, arrays):
+        raise ValueError(fault)
     markers = {
         m["name"]: Marker(
             name=m["name"],
@@ -206,40 +206,35 @@ def _stress(arrays: dict[str, Array]) -> StressRecovery | CauchyRecovery | None:
     )
 
 
-def _refuse_missing(manifest: dict[str, Any], arrays: dict[str, Array]) -> None:
-    """All arrays that the words of the manifest promise."""
-    needed = [
-        f"marker/{i}/{part}" for i in range(len(manifest["markers"])) for part in MARKER_ARRAYS
-    ]
-    needed += [f"K_geo/{name}" for name in manifest["geometric_stiffness"]]
+def _faults(manifest: dict[str, Any], arrays: dict[str, Array]) -> Iterator[str]:
+    """Arrays that are promised and missing, and words of another type or meaning; see `stated`."""
+    markers, loads = manifest["markers"], manifest["geometric_stiffness"]
+    needed = [f"marker/{i}/{part}" for i in range(len(markers)) for part in MARKER_ARRAYS]
+    needed += [f"K_geo/{name}" for name in loads]
     needed += [f"surface/{part}" for part in SURFACE_ARRAYS] if manifest["surface"] else []
-    if missing := [name for name in needed if name not in arrays]:
-        raise ConfigError(f"the file needs the array {named(missing)}; write it again by rom.save.")
-
-
-def _check_words(manifest: dict[str, Any], r: int) -> None:
-    """Types of what the manifest says in words, r labels among them; see `stated`."""
+    yield from (f"the array {name!r}" for name in needed if name not in arrays)
     wanted = {"name": str, "reference": str, "labels": list, "surface": bool, "provenance": dict}
-    wrong = [name for name, kind in wanted.items() if not isinstance(manifest[name], kind)]
-    labels = manifest["labels"]
-    if wrong or len(labels) != r or not all(isinstance(label, str) for label in labels):
-        name = (wrong or ["labels"])[0]
-        raise ValueError(f"{name} = {manifest[name]!r}")
-    made = manifest["provenance"].get("reduction", {})
-    if type(made.get("static shapes", True)) is not bool:
-        raise ValueError(f"static shapes = {made['static shapes']!r}")
-    names, reference = [m["name"] for m in manifest["markers"]], manifest["reference"]
-    loads = manifest["geometric_stiffness"]
+    for name, kind in wanted.items():
+        if not isinstance(manifest[name], kind):
+            yield f"{name} = {manifest[name]!r}"
+    labels, r = manifest["labels"], arrays["K"].shape[-1]
+    if len(labels) != r or not all(isinstance(label, str) for label in labels):
+        yield f"labels = {labels!r}"
+    still = manifest["provenance"].get("reduction", {}).get("static shapes", True)
+    if type(still) is not bool:
+        yield f"static shapes = {still!r}"
+    names, reference = [m["name"] for m in markers], manifest["reference"]
     for known in (names, loads):
         if len(set(known)) < len(known) or not all(isinstance(name, str) for name in known):
-            raise ValueError(f"names {known!r}")
+            yield f"names {known!r}"
     if reference not in (*FRAMES, *names) and not any(
         reference.startswith(word) and _are_names(reference.removeprefix(word), n, names)
         for word, n in (("pins ", 2), ("3-2-1 ", 3))
     ):
-        raise ConfigError(f"reference = {reference!r} must be {named(FRAMES)}, or of {names}.")
-    if wrong := [m["kind"] for m in manifest["markers"] if m["kind"].split(":")[0] not in KINDS]:
-        raise ConfigError(f"the kind of interface {named(wrong)} is none of {', '.join(KINDS)}.")
+        yield f"reference = {reference!r}, which must be {named(FRAMES)}, or of {names}"
+    for kind in (m["kind"] for m in markers):
+        if kind.split(":")[0] not in KINDS:
+            yield f"the kind of interface {kind!r}, none of {', '.join(KINDS)}"
 
 
 def _are_names(text: str, n: int, names: list[str]) -> bool:

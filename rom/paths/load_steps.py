@@ -4,24 +4,16 @@ from collections.abc import Callable
 from typing import TypeVar
 
 State = TypeVar("State")
+Ahead = Callable[[State, float], State | None]
 
 
 def load_steps(
-    ahead: Callable[[State, float], State | None],
-    at: State,
-    *,
-    least: float,
-    first: float = 1.0,
-    growth: float = 1.0,
+    ahead: Ahead[State], at: State, *, least: float, first: float = 1.0, growth: float = 1.0
 ) -> tuple[float, State]:
     """How much of a load was reached, one for all of it, and the solution there.
 
-    Args:
-        ahead: of a solution and a larger share of the load; the solution there, None if not found.
-        at: the solution without load.
-        least: step at which it is given up.
-        first: step that is tried first.
-        growth: factor of the step after one that was found.
+    From a solution without load ``ahead`` goes to a larger share; None where it finds none. A step
+    grows where it was found; at the least one it is given up.
     """
     share, step = 0.0, first
     while share < 1.0 and step > least:

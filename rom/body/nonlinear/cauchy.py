@@ -51,16 +51,9 @@ class CauchyRecovery:
         return self.gradient.shape[1]
 
     def field(self, q: Array, accelerations: Array | None = None) -> Array:
-        """(p, 6) stress xx, yy, zz, yz, xz, xy in the deformed body, axes of its frame [Pa].
+        """(p, 6) stress xx, yy, zz, yz, xz, xy [Pa] in the deformed body for coordinates q (r,).
 
-        Args:
-            q: (r,) elastic coordinates.
-            accelerations: None; a body of large deflection has no correction for modes left out.
-
-        Raises:
-            ConfigError: if q has another length or holds a number that is not finite, or
-                accelerations are given.
-            ModelError: if q turns the material inside out.
+        Axes are those of its frame; no correction by accelerations is known at large deflection.
         """
         if accelerations is not None:
             raise ConfigError(
@@ -81,14 +74,7 @@ class CauchyRecovery:
         return self._at_points(sigma)
 
     def second_piola(self, q: Array) -> Array:
-        """(p, 6) second Piola-Kirchhoff stress xx, yy, zz, yz, xz, xy [Pa], which rotation leaves.
-
-        Args:
-            q: (r,) elastic coordinates.
-
-        Raises:
-            ConfigError: if q has another length or holds a number that is not finite.
-        """
+        """(p, 6) second Piola-Kirchhoff stress xx, yy, zz, yz, xz, xy [Pa], left by rotation."""
         return self._at_points(self._second_piola(self._gradient(q)))
 
     def von_mises(self, q: Array, accelerations: Array | None = None) -> Array:

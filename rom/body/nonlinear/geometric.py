@@ -74,13 +74,8 @@ ELLIPTIC_STRETCH = 3.0**-0.5
 class Bent:
     """A reduction under way, and the range of loads by which the body is to bend far.
 
-    Attributes:
-        geometric: the range.
-        model: the full model.
-        ops: its operators, in nodal dofs.
-        connection: the model in interface coordinates.
-        basis: constraint and fixed-interface modes, and the factor of K_ii.
-        reference: the interface from which the body is seen.
+    The basis has constraint and fixed-interface modes and the factor of K_ii; the body is seen from
+    the interface ``reference``.
     """
 
     geometric: Geometric
@@ -92,7 +87,7 @@ class Bent:
 
     @property
     def held(self) -> list[Load]:
-        """Each motion held beside the reference, as the load that would move it."""
+        """Each motion held beside the reference."""
         return held_motions(self.geometric, self.model.interfaces)
 
     def nodal(self, loads: list[Load]) -> Array:

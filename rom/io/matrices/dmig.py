@@ -19,6 +19,7 @@ from rom.names import ORIGIN_MARK, named
 
 SYMMETRIC_FORM, SQUARE_FORM = 6, 1
 Dofs = Index  # (n, 2) label and component, 1 to 6, or 0 for a scalar point
+Named = Mapping[str, Array | csr_matrix]
 Entry = tuple[int, int, int, int, float]  # node and component of row and column, value
 
 
@@ -66,11 +67,7 @@ def read_grids(path: str | Path) -> tuple[Index, Array]:
 
 
 def write_dmig(
-    matrices: Mapping[str, Array | csr_matrix],
-    dofs: Dofs,
-    path: str | Path,
-    *,
-    nodes: dict[int, Array] | None = None,
+    matrices: Named, dofs: Dofs, path: str | Path, *, nodes: dict[int, Array] | None = None
 ) -> Path:
     """Write symmetric matrices, ten digits each.
 

@@ -88,7 +88,7 @@ def write_abaqus_matrix(A: Array | csr_matrix, dofs: Dofs, path: str | Path) -> 
     """Write the lower triangle of a symmetric matrix as text that ``*MATRIX INPUT`` reads.
 
     Args:
-        A: (n, n) dense or sparse.
+        A: (n, n) dense or sparse, in units of any kind.
         dofs: (n, 2) node and component of each row.
         path: file to write.
 
@@ -112,7 +112,7 @@ def _all(path: Path) -> tuple[Matrices, dict[str, Dofs]]:
         return read_op4(path), {}
     pairs = _pairs(path)
     dofs = {name: dofs for name, (_, dofs) in pairs.items() if dofs is not None}
-    return Matrices(str(path), {name: A for name, (A, _) in pairs.items()}), dofs
+    return Matrices(str(path), {name: A for name, (A, _) in pairs.items()}, {}), dofs
 
 
 def _pairs(path: Path) -> Mapping[str, tuple[csr_matrix, Dofs | None]]:

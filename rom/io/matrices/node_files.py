@@ -22,7 +22,7 @@ def read_nodes(nodes: str | Path | tuple[npt.ArrayLike, npt.ArrayLike]) -> tuple
     """Ascending labels (k,) and positions (k, 3), in units of the file.
 
     Args:
-        nodes: both; or a file: ``.inp``, ``.bdf``, ``.dat`` or ``.csv``.
+        nodes: both, (k,) and (k, 3); or a file: ``.inp``, ``.bdf``, ``.dat`` or ``.csv``.
 
     Raises:
         ConfigError: for another ending.

@@ -66,19 +66,14 @@ class _Strings:
 
 
 class Matrices(dict[str, csr_matrix]):
-    """Matrices of a file by their names; ``NAME#1``, ``NAME#2`` where a name stands twice.
+    """Matrices of a file by their names, ``NAME#1``, ``NAME#2`` where a name stands twice.
 
-    Args:
-        where: the file.
-        found: {key: matrix}.
-        places: {key: where it stands in the file}.
+    Where is the file, and places say where in it each stands.
     """
 
-    def __init__(
-        self, where: str, found: dict[str, csr_matrix], places: dict[str, str] | None = None
-    ):
+    def __init__(self, where: str, found: Mapping[str, csr_matrix], places: Mapping[str, str]):
         super().__init__(found)
-        self.where, self.places = where, places or {}
+        self.where, self.places = where, places
 
     def __missing__(self, key: str) -> NoReturn:
         doubled = [k for k in self if k.rpartition("#")[0] == key] if key else []
@@ -141,7 +136,7 @@ def write_op4(matrices: Mapping[str, Array | csr_matrix], path: str | Path) -> P
     """Write matrices as text with 17 digits.
 
     Args:
-        matrices: {name of at most 8 characters: (n, m) dense or sparse matrix}.
+        matrices: {name of at most 8 characters: (n, m) matrix}, in units of any kind.
         path: file to write.
 
     Raises:

@@ -71,7 +71,7 @@ def write_user_element(
     """Write symmetric matrices as an element U1 between its nodes.
 
     Args:
-        matrices: {type, e.g. "STIFFNESS": (n, n)}.
+        matrices: {type, e.g. "STIFFNESS": (n, n)}, in units of any kind.
         dofs: (n, 2) label and component of each row, node by node; component 0 becomes 1.
         path: file to write.
         nodes: {label: (3,) position, in units of the matrices}; nodes without one, as those of

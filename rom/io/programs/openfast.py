@@ -88,8 +88,7 @@ def write_openfast(
         ModelError: if the shapes do not let the interfaces move one by one.
         ResourceError: if the disk is full.
     """
-    if version not in VERSIONS:
-        raise ConfigError(f"version {version!r} of OpenFAST is unknown; known: {VERSIONS}.")
+    check_known(version, VERSIONS, f"version {version!r} of OpenFAST is unknown; known:")
     found = superelement(body, held=held, gravity=gravity)
     lines = _current(found) if version == 5 else _old(found)
     return write_lines(path, [f"! {body.name}, {ORIGIN_MARK}", *lines])
