@@ -80,7 +80,7 @@ def test_pressure_follows_the_edges_of_a_square(element):
 def test_stiffness_of_turning_sides_is_the_derivative_of_their_forces(state):
     X, T = distorted((2, 2))
     body = sheet(X + np.array([0.5, 0.0]), T, state=state, thickness=0.7)
-    acts = Actions((), tractions=[Traction(outer_sides(body)[:5], 3.0, 2.0)])
+    acts = prepared(body, Actions((), tractions=[Traction(outer_sides(body)[:5], 3.0, 2.0)]))
     way, rng = _Way(body, Metal(1.0, 0.3), acts, None, 0.0), np.random.default_rng(0)
     x, K, now = body.points + 0.1 * rng.normal(size=X.shape), None, way.start(0.0, 0 * X)
     K = way.stiffness(now, way.trial(now, x, 0.0)).toarray()
