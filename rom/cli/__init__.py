@@ -1,6 +1,5 @@
 """The command line: `verbs`, each of which loads what it needs when it runs.
 
 `parser` is the grammar, of `options`, `matrices` and `described`; `main` runs one verb,
-`answer` and `schemas` are what comes back, `speech` says it,
-`ranks` lets one speak, `output` guards files that are there.
+`answer` and `schemas` are what comes back, `speech` says it, `output` guards files that are there.
 """

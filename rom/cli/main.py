@@ -9,7 +9,6 @@ from functools import partial
 
 from rom.cli.described import TOML_SUFFIX
 from rom.cli.parser import build_parser, given
-from rom.cli.ranks import ranks, stop_all
 from rom.cli.speech import OutputOptions, output_options, present, print_error, say, speaking
 from rom.errors import (
     ConfigError,
@@ -20,6 +19,7 @@ from rom.errors import (
     RomError,
 )
 from rom.process.interruption import Terminated, terminable
+from rom.process.launcher import ranks
 from rom.process.memory import free_bytes
 
 
@@ -49,7 +49,13 @@ def _run(argv: list[str], options: OutputOptions) -> int:
         if options.debug:
             traceback.print_exception(raised)
         error = translated(raised)
-        stop_all(error.exit_code, partial(_print_once, raised, error, options))
+        complain = partial(_print_once, raised, error, options)
+        if ranks()[1] == 1:
+            complain()
+        else:  # once, and every rank ends with the same exit code; MPI is loaded under mpirun only
+            from rom.fe.parallel import stop_all_ranks
+
+            stop_all_ranks(error.exit_code, complain)
         return error.exit_code
 
 

@@ -2,15 +2,26 @@
 
 import argparse
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
+from typing import TypeVar
 
 from rom.cli.options import option
-from rom.cli.ranks import on_first_rank
+from rom.process.launcher import ranks
 
+T = TypeVar("T")
 KIND_OF_ENDING = {"hdf5": "h5"}  # endings that are not the name of their kind
 OUTPUT_OPTIONS = ("output", "save")  # options that name what is written
 OTHER_OPTIONS = ("argv", "given", "run", "claims", "verb")
+
+
+def on_first_rank(look: Callable[[], T]) -> T:
+    """What one rank finds out for all of them, or its error on all of them."""
+    if ranks()[1] == 1:
+        return look()
+    from rom.fe.parallel import on_first_rank as on_first
+
+    return on_first(look)
 
 
 def add_force(parser: argparse.ArgumentParser) -> None:

@@ -14,10 +14,10 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
-from cases.answers import answer
 from cases.command import ROOT, environment, ran
 from cases.command import rom as command
 from cases.files.cells import solid
+from cases.files.schema import answer
 from cases.files.step_parts import step_box, step_plate
 from cases.long import few
 from cases.solid import block, reduced

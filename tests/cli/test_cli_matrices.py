@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
-from cases.answers import answer
+from cases.files.schema import answer
 from cases.paths import TESTS
 from rom.cli.main import main
 from rom.cli.matrices import labels

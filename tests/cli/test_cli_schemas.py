@@ -7,8 +7,7 @@ import pytest
 
 import rom
 from benchmarks.benchmarks import Figure
-from cases.answers import answer
-from cases.files.schema import errors
+from cases.files.schema import answer, errors
 from cases.files.toml_files import PENDULUM
 from cases.solid import block, reduced
 from rom.cli.main import main

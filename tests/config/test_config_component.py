@@ -7,8 +7,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
-from cases.answers import answer
 from cases.command import ROOT
+from cases.files.schema import answer
 from cases.files.toml_files import SOLID
 from cases.solid import block, reduced
 from rom.cli.main import main

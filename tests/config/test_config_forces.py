@@ -11,8 +11,8 @@ from scipy.interpolate import PchipInterpolator
 from scipy.special import ellipk
 
 import rom
-from cases.answers import answer
 from cases.command import ROOT
+from cases.files.schema import answer
 from cases.files.toml_files import PENDULUM
 from rom.cli.main import main
 from rom.config.mechanism import read_mechanism

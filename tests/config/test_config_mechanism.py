@@ -10,8 +10,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.special import ellipk
 
 import rom
-from cases.answers import answer
 from cases.command import ROOT, python
+from cases.files.schema import answer
 from cases.files.toml_files import ALL, CRANK, PENDULUM, laid_out
 from cases.long import few
 from cases.solid import block, reduced

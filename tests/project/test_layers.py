@@ -36,7 +36,7 @@ ORDERED = """
 rom: errors notebook rotation places fields lazy names readable process plausible arguments units
   material model rows paths decks eigen reduction body fe checks stages workflow assembly cyclic
   parametric updating prestress io mbs fmu view config report doctor cli components __main__
-cli: answer speech schemas options described ranks matrices output verbs parser main
+cli: answer speech schemas options described matrices output verbs parser main
 fe: costs parallel jit compat operators forms mesh elasticity probe
 fe.operators: solver memory disk aij foreseen factor substructures spectrum iterative workers
   petsc

@@ -15,10 +15,10 @@ from rom.cli.answer import Answer, failures, report_data
 from rom.cli.described import described, mechanism
 from rom.cli.options import OUTPUT_FLAG, add_meshing, option, positive, require, vector
 from rom.cli.output import add_force, check_encoder, checked, claim, files_in
-from rom.cli.ranks import ranks
 from rom.cli.verbs.swing import pendulum
 from rom.errors import ConfigError, ResourceError, RomError
 from rom.names import inside
+from rom.process.launcher import ranks
 
 if TYPE_CHECKING:
     from rom.body.flexible import FlexibleBody

@@ -1,5 +1,10 @@
 """A small checker of JSON Schemas, of the words that ours use and no others."""
 
+import json
+
+from rom.cli.main import main
+from rom.cli.schemas import schema as schema_of
+
 TYPES = {
     "string": lambda x: isinstance(x, str),
     "number": lambda x: isinstance(x, int | float) and not isinstance(x, bool),
@@ -46,4 +51,13 @@ def of_object(value, schema, at):
             found.append(f"{at} has {name!r} too much")
         else:
             found += errors(item, rest, f"{at}.{name}")
+    return found
+
+
+def answer(capsys, *words, codes=(0,)):
+    """The object that a verb prints with ``--json``, which is what its schema says."""
+    capsys.readouterr()
+    assert main([*map(str, words), "--json"]) in codes
+    found = json.loads(capsys.readouterr().out)
+    assert errors(found, schema_of(str(words[0]))) == []
     return found
