@@ -15,6 +15,7 @@ from pathlib import Path
 
 import pytest
 
+from cases.boxes import BOX_GEO
 from cases.command import alive, environment, wait_until
 from cases.long import ROM_LONG, few
 from rom.process import child
@@ -25,13 +26,7 @@ pytestmark = [
 ]
 INSTANTS = 10 if ROM_LONG else 1
 PATIENCE = 2.0  # seconds in which everything must be gone
-SLOW = """SetFactory("OpenCASCADE");
-Box(1) = {0, 0, 0, 1, 1, 1};
-Physical Volume("body", 1) = {1};
-Physical Surface("root", 11) = {1};
-Mesh.MeshSizeMin = 0.05; Mesh.MeshSizeMax = 0.05;
-Sleep 20;
-"""
+SLOW = BOX_GEO.replace("= 1;", "= 0.05;") + "Sleep 20;\n"
 FILM = """
 from rom.process.interruption import heed_lost_signals
 heed_lost_signals()

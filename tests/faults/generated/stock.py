@@ -6,6 +6,7 @@ from typing import Any
 from scipy.io import mmwrite
 
 import rom
+from cases.boxes import BOX_GEO
 from cases.files import damage
 from cases.files.cells import blocks_of, solid, write_msh
 from cases.solid import block
@@ -14,36 +15,30 @@ PLANTED = "pwned"  # part of the name of every file that planted code makes
 KINDS = {"root": "rbe2", "tip": "rbe2"}
 STEEL = "--E 210e9 --nu 0.3 --rho 7850"
 MATRICES = "K.mtx --mass M.mtx --nodes deck.inp -i root=rbe2 -i tip=rbe2 --no-certificate -m 4"
-GEO = """SetFactory("OpenCASCADE");
-DefineConstant[ lc = {1, Name "lc"} ];
-Box(1) = {0, 0, 0, 1, 1, 1};
-Physical Volume("body", 1) = {1};
-Physical Surface("root", 11) = {1};
-Mesh.MeshSizeMin = lc;
-Mesh.MeshSizeMax = lc;
-"""
+GEO = 'DefineConstant[ lc = {1, Name "lc"} ];\n' + BOX_GEO.replace("= 1;", "= lc;")
 BUILDER = """def build(gmsh, lc=1.0):
     gmsh.model.occ.addBox(0, 0, 0, 1, 1, 1)
     gmsh.model.occ.synchronize()
     gmsh.model.addPhysicalGroup(3, [1], 1)
     gmsh.option.setNumber("Mesh.MeshSizeMax", lc)
 """
-PART = """name = "part"
-[matrices]
-stiffness = "K.mtx"
-mass = "M.mtx"
-nodes = "deck.inp"
-[interfaces]
+REDUCED = """[interfaces]
 root = "rbe2"
 tip = "rbe2"
 [reduction]
 modes = 4
 reference = "root"
 certificate = false
-[damping]
+"""
+PART = f"""name = "part"
+[matrices]
+stiffness = "K.mtx"
+mass = "M.mtx"
+nodes = "deck.inp"
+{REDUCED}[damping]
 ratio = 0.01
 """
-SOLID = """name = "solid"
+SOLID = f"""name = "solid"
 [geometry]
 file = "box.msh"
 degree = 1
@@ -51,13 +46,7 @@ degree = 1
 E = "210 GPa"
 nu = 0.3
 rho = 7850.0
-[interfaces]
-root = "rbe2"
-tip = "rbe2"
-[reduction]
-modes = 4
-certificate = false
-"""
+{REDUCED}"""
 PENDULUM = """name = "pendulum"
 gravity = [0, -9.81, 0]
 [bodies.bob]
