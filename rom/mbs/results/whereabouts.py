@@ -131,7 +131,7 @@ class Whereabouts:
     def _frame(self, body: str) -> Marker | None:
         """Marker that is the frame of the body, where its motion is that of another frame."""
         self._number(body)
-        return self.mechanism.parts[body].own_frame
+        return self.mechanism.part(body).own_frame
 
     def _number(self, body: str) -> int:
         check_known(body, self.packed.names, f"no body {body!r}; the mechanism has")
