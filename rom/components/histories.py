@@ -12,12 +12,12 @@ Source:
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import finite, is_number, number, positive, typed
+from rom.arguments import Number, Positive, is_number, typed
 from rom.errors import ConfigError, FileFormatError
 from rom.model import Array
 
@@ -116,7 +116,13 @@ def read_record(path: str | Path, *, scale: float = 1.0) -> Table:
 
 
 @typed
-def sine(amplitude: float, period: float, *, cycles: float = np.inf, phase: float = 0.0) -> History:
+def sine(
+    amplitude: float,
+    period: Annotated[float, Positive("s")],
+    *,
+    cycles: float = np.inf,
+    phase: Annotated[float, Number("rad")] = 0.0,
+) -> History:
     """Harmonic motion, or a pulse of some cycles of it: half a one, one, ten.
 
     Args:
@@ -128,8 +134,6 @@ def sine(amplitude: float, period: float, *, cycles: float = np.inf, phase: floa
     Raises:
         ConfigError: if there is no such motion.
     """
-    finite("amplitude and phase", [amplitude, phase], (2,))
-    positive("period", period)
     if not cycles > 0:
         raise ConfigError(f"cycles = {cycles} must be positive.")
 
@@ -141,26 +145,22 @@ def sine(amplitude: float, period: float, *, cycles: float = np.inf, phase: floa
 
 
 @typed
-def rectangle(amplitude: float, duration: float) -> History:
+def rectangle(amplitude: float, duration: Annotated[float, Positive("s")]) -> History:
     """A value that stays for a time [s] and ends.
 
     Raises:
         ConfigError: if there is no such pulse.
     """
-    number("amplitude", amplitude)
-    positive("duration", duration)
     return lambda t: np.where(np.asarray(t) < duration, amplitude, 0.0)
 
 
 @typed
-def ramp(duration: float) -> History:
+def ramp(duration: Annotated[float, Positive("s")]) -> History:
     """From 0 to 1 along half a cosine in a time [s], and 1 from there on.
 
     Raises:
         ConfigError: if the time is not positive.
     """
-    if not 0 < duration < np.inf:
-        raise ConfigError(f"no ramp takes {duration} s.")
     return lambda t: (1 - np.cos(np.pi * np.clip(np.asarray(t) / duration, 0.0, 1.0))) / 2
 
 

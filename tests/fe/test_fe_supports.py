@@ -177,7 +177,7 @@ WRONG = [
     ({"springs": {"tip": [1.0, 2.0]}}, ConfigError, r"shape \(2,\): it takes 3 or 6"),
     ({"springs": {"tip": [1.0, -2.0, 0.0]}}, ConfigError, "and positive or zero"),
     ({"springs": {"tip": np.eye(6) + np.eye(6, k=1)}}, ConfigError, "must be symmetric"),
-    ({"springs": {"tip": np.zeros(3)}}, ConfigError, "needs a stiffness that is not zero"),
+    ({"springs": {"tip": np.zeros(3)}}, ConfigError, r"springs\['tip'\] must not be zero"),
     ({"springs": {"tip": [np.nan, 1.0, 1.0]}}, ConfigError, "springs"),
     ({"springs": {"foot": np.ones(3)}}, InterfaceError, "no interface 'foot'"),
     ({"fixed": {"root": "w"}}, ConfigError, "'root' is held in 'w'"),

@@ -6,6 +6,7 @@ import inspect
 import json
 import re
 from functools import cache
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -70,8 +71,7 @@ MESHED = [name for name, text in EXAMPLES.items() if "rom.fe." in text]
 )
 def test_example_runs(name, models, beam, tmp_path, monkeypatch):
     if name in MESHED:
-        import rom.fe.elasticity
-
+        import_module("rom.fe.elasticity")
         monkeypatch.setattr(rom.fe, "model", models, raising=False)
     (tmp_path / "meshes").symlink_to(ROOT / "meshes")
     (tmp_path / "beam.rom.npz").symlink_to(beam)

@@ -186,7 +186,7 @@ compiled_law(law)
 
 
 def test_it_plants_one_sign_or_factor_of_compiled_functions_alone():
-    signs, factors = plant.places(PLANTED_IN)
+    signs, factors, _ = plant.places(PLANTED_IN)
     found = [[ast.unparse(node) for node in nodes] for nodes in (signs, factors)]
     assert found == [
         ["out[k + 1] += 2.0 * x - x[k - 1] / 3.0", "2.0 * x - x[k - 1] / 3.0", "x - 0.5"],

@@ -12,7 +12,7 @@ import numpy as np
 from rom.arguments import between, number, one_of, typed
 from rom.errors import ParameterError, warn
 from rom.model import Array
-from rom.names import check_known, check_text
+from rom.names import check_text, named
 from rom.plausible import FACTOR, warn_outside
 
 MAX_CORNER_PARAMETERS = 3  # all corners of the range are visited up to here
@@ -146,8 +146,9 @@ def complete(
 
     Those outside a range are refused, or announced where one extrapolates.
     """
-    for name in values:
-        check_known(name, parameters, f"no parameter {name!r}; the family has", ParameterError)
+    if unknown := sorted(set(values) - set(parameters)):
+        text = f"there is no parameter {named(unknown)}; the family has {sorted(parameters)}."
+        raise ParameterError(text)
     each = parameters.items()
     return {name: _checked(name, p, values.get(name, 1.0), extrapolate) for name, p in each}
 

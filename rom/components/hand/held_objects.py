@@ -51,7 +51,7 @@ class Held:
 
     @property
     def inertia(self) -> Array:
-        """(3, 3) of an even ball, or of an even cylinder as long as the bar with its ends."""
+        """(3, 3) of an even ball, or even cylinder as long as the bar with its ends [kg m^2]."""
         if self.axis is None:
             return 0.4 * self.mass * self.radius**2 * np.eye(3)
         e = unit_vector("axis", self.axis)

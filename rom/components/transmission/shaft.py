@@ -54,7 +54,10 @@ class Disc:
         return cls(node, m, m * (squares / 16 + width**2 / 12), m * squares / 8)
 
     def add_to(self, M: Array, G: Array, R: Array) -> None:
-        """Add its mass and gyroscopic matrix to those of a shaft whose seat moves by R (6, n)."""
+        """Add its mass to M [kg, kg m^2] and its gyroscopic matrix to G [kg m^2] of a shaft.
+
+        Its seat moves by R (6, n) [m, rad].
+        """
         M += R.T @ np.diag([*[self.mass] * 3, *[self.diametral] * 2, self.polar]) @ R
         G += self.polar * (np.outer(R[3], R[4]) - np.outer(R[4], R[3]))
 

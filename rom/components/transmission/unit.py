@@ -210,7 +210,9 @@ class Transmission:
         *,
         seen: Array | None = None,
     ) -> Forces:
-        """Forces of films and teeth at q (n,) with rates v (n,), the drive turned by theta [rad].
+        """Forces of films and teeth at q (n,) [m, rad] with rates v (n,) [m/s, rad/s].
+
+        The drive is turned by ``theta`` [rad].
 
         Films of a position nearby, ``warm``, save iterations; ``seen`` (bearings, 4) are motions of
         the journals in their bushes [m, rad], None to the first order of turns.

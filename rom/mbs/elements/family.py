@@ -155,7 +155,7 @@ class Places:
         return self._own(owner).start
 
     def before(self, base: Array) -> Array:
-        """(n_t, c + p) the same over time, what settles as it was at the instant before.
+        """(n_t, c + p) coordinates [rad, m] and memory over time; what settles is one instant late.
 
         Evaluated again with that, it does what it did on the way from there.
         """
@@ -172,7 +172,7 @@ class Places:
         return slice(first, first + self.remembered[owner].size)
 
     def settled(self, base: Array) -> Array:
-        """(c + p,) joint coordinates and memory, the latter as an equilibrium starts from it."""
+        """(c + p,) joint coordinates [rad, m] and memory, which begins as in an equilibrium."""
         base, c = base.copy(), len(self.coordinates)
         for owner, numbers in self.settling.items():
             base[c:][self._own(owner)] = numbers

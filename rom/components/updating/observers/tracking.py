@@ -147,7 +147,7 @@ class Tracker:
         """Filter a record that begins at rest.
 
         Args:
-            samples: (n_t, n_y), in the order of the sensors; NaN where one is missing.
+            samples: (n_t, n_y) in the order of the sensors [m/s^2 or 1]; NaN where one is missing.
             times: (n_t,) of the samples, to see that their steps are dt [s]; None to trust.
 
         Raises:
