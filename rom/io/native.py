@@ -212,7 +212,8 @@ def _faults(manifest: dict[str, Any], arrays: dict[str, Array]) -> Iterator[str]
     needed = [f"marker/{i}/{part}" for i in range(len(markers)) for part in MARKER_ARRAYS]
     needed += [f"K_geo/{name}" for name in loads]
     needed += [f"surface/{part}" for part in SURFACE_ARRAYS] if manifest["surface"] else []
-    yield from (f"the array {name!r}" for name in needed if name not in arrays)
+    if missing := [name for name in needed if name not in arrays]:
+        yield f"the array {named(missing)}"
     wanted = {"name": str, "reference": str, "labels": list, "surface": bool, "provenance": dict}
     for name, kind in wanted.items():
         if not isinstance(manifest[name], kind):

@@ -221,7 +221,7 @@ MISTAKES = {  # what stands in the file, or nothing; what instead, or behind it;
     "axis of two": ("[0, 0, 1]", "[0, 1]", "needed is a list 3"),
     "no length": ("[0, 0, 1]", "[0, 0, 0]", "p.toml:10: axis of pivot has length zero"),
     "inertia": ('["0.01 kg m^2", 0.02, 0.025]', "[1, 1, 9]",
-                "p.toml:4: bob: the largest principal moment"),
+                "p.toml:4: bob: inertia has principal moments"),
     "name with a dot": ("[bodies.bob]", '[bodies."b.c"]', "'b.c' is no name for a body"),
     "rho": ("rho_inf = 1", "rho_inf = 7", "rho_inf"),
     "unknown section": ("[simulation]", "[springy.x]\n[simulation]", "Did you mean springs?"),

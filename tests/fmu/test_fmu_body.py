@@ -134,7 +134,7 @@ def test_small_motions_are_those_of_the_multibody_integrator(body, free, tmp_pat
         found, place = motion(one, name), sol.position("one", name)
         moved = place[-1] - place[0]
         assert_allclose(found[:3], moved, atol=2e-5 * abs(moved).max())
-        spun = sol._track("one", name).twist[-1]
+        spun = sol._seen("one", name).twist[-1]
         assert_allclose(found[6:], spun, atol=1e-3 * abs(spun).max())
 
 

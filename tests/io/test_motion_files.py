@@ -289,7 +289,7 @@ def test_upright_becomes_y(up):
 def test_quaternions_in_a_film_never_jump_to_the_other_sign(motion, tmp_path):
     """Players interpolate the four numbers: a jump would turn the body once around."""
     signs = np.where(np.arange(len(motion.t)) % 3 == 1, -1.0, 1.0)[:, None]
-    at = motion._start_of("rod") + 3
+    at = motion.packed.system.bodies.q_at[motion._number("rod")] + 3
     q = motion.q.copy()
     q[:, at : at + 4] *= signs
     film, data = chunks(rom.write_animation(replace(motion, q=q), tmp_path / "m.glb"))

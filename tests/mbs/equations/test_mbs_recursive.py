@@ -201,7 +201,7 @@ def test_the_smallest_pivot_of_a_joint_is_looked_at():
     W.S[:] = 0.0
     for row in packed.system.graph.x[packed.system.graph.own]:
         W.S[row : row + 6] = np.eye(6)
-    passed = [factorised(packed.system, W, pivot) for pivot in (0.0, 1e-3, 0.999, 1e3)]
+    passed = [factorised(packed, W, pivot) for pivot in (0.0, 1e-3, 0.999, 1e3)]
     assert passed == [True, True, False, False]
 
 
