@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from rom.config.mechanism import MechanismFile
 
 TOML_SUFFIX = ".toml"
-COMMON_OPTIONS = "verb file run output force json quiet verbose strict debug version resume parser"
-UNSAID_OPTIONS = "trust time_limit memory_limit"  # no file may say them
+COMMON_OPTIONS = set("verb file run output force json quiet verbose strict debug version".split())
+COMMON_OPTIONS |= set("resume parser trust time_limit memory_limit".split())  # no file may say them
 Changes = dict[tuple[str, ...], Any]
 SECTION_KEYS = {  # section: keys whose options are called as they are
     "material": "E nu rho",
@@ -107,7 +107,7 @@ def changes(given: dict[str, Any], places: dict[str, tuple[str, ...]], extra: An
     """What options say, by the keys of the file."""
     found: Changes = {}
     for name, value in given.items():
-        if name in (*COMMON_OPTIONS.split(), *UNSAID_OPTIONS.split(), *extra):
+        if name in COMMON_OPTIONS or name in extra:
             continue
         if name in places:
             found |= dict.fromkeys(REPLACED_KEYS.get(name, ()))
