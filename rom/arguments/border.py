@@ -32,6 +32,7 @@ BY_PLACE = (Parameter.POSITIONAL_ONLY, Parameter.POSITIONAL_OR_KEYWORD)
 def typed(public: Public) -> Public:
     """Check the arguments of a public function, or of all public methods of a class, at each call.
 
+    Methods that a class inherits are checked where it shows them, not in the class they are from.
     Booleans are no numbers, numbers are finite, whole numbers fit eight bytes, paths are no
     numbers and no bytes. What stands for the same thing becomes it: scalars of NumPy, one name
     where names are wanted, any iterable for a tuple, lists for arrays. Missing and unknown
@@ -48,8 +49,11 @@ def typed(public: Public) -> Public:
         return _typed_function(public)  # type: ignore[return-value]
     if "__getattr__" not in vars(public):
         public.__getattr__ = _unknown  # type: ignore[attr-defined]
-    for name, member in list(vars(public).items()):
-        if name.startswith("_") and name != "__init__":
+    members = {name: member for base in public.__mro__[::-1] for name, member in vars(base).items()}
+    for name, member in members.items():
+        if name.startswith("_") and (name != "__init__" or name not in vars(public)):
+            continue
+        if name not in vars(public) and hasattr(member, "__wrapped__"):  # checked already
             continue
         if isinstance(member, types.FunctionType):
             setattr(public, name, _typed_function(member))

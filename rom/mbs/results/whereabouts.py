@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 
-from rom.arguments import typed
 from rom.errors import ConfigError
 from rom.mbs.equations.packing import Packed
 from rom.mbs.mechanism import Mechanism
@@ -16,7 +15,6 @@ from rom.names import check_known
 from rom.rotation import continuous, matrix, quaternion
 
 
-@typed
 class Whereabouts:
     """What `Solution` and the `Instant` of an event answer alike; the latter has no rows n_t."""
 
