@@ -5,7 +5,7 @@ changes one operator or number at a time in compiled functions of the copy, and 
 belong to the file until one fails. Survivors are listed at the end with their lines; exit code 1 if
 there are any. Hours for all files, minutes for one. ``--draw N`` plants N mistakes instead, in
 kernels, formulas, readers and solvers in turn, each in a file drawn at random; transposed matrices
-too.
+too; ``--skip N`` goes on behind the first N, where a run of hours was ended.
 """
 
 import argparse
@@ -223,8 +223,9 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0, help="of the choice of places")
     parser.add_argument("--per-file", type=int, default=1, help="signs and factors in each file")
     parser.add_argument("--draw", type=int, default=0, help="mistakes drawn over all areas")
+    parser.add_argument("--skip", type=int, default=0, help="mistakes that have been tried")
     given, survivors = parser.parse_args(), []
-    chosen = drawn(given.draw, given.seed) if given.draw else listed(given)
+    chosen = (drawn(given.draw, given.seed) if given.draw else listed(given))[given.skip :]
     for name, kind, node in chosen:
         alive = survives(name, planted((ROOT / name).read_text(), node))
         line = f"{name}:{node.lineno}: {kind} of {ast.unparse(node)}"
