@@ -14,7 +14,7 @@ from itertools import combinations
 import numpy as np
 
 from rom.body.records import Marker
-from rom.body.recovery import CENTRIFUGAL_LOADS, centrifugal
+from rom.body.recovery import CENTRIFUGAL_LOADS, centrifugal, refuse_without_elements
 from rom.body.stiffening import elastic_loads, interface_loads
 from rom.eigen.attachments import carried_displacements
 from rom.eigen.connection import Connection
@@ -27,7 +27,6 @@ from rom.eigen.verbs import (
     pins,
     rigid_motions,
 )
-from rom.errors import ConfigError
 from rom.model import Array, FEModel, Index, Interface
 
 Felt = Callable[[Array], Array]  # at points (p, 3), (3 p, k)
@@ -61,11 +60,8 @@ class UnitLoads:
     connection: Connection
 
     def __post_init__(self) -> None:
-        if self.model.stresses is None:
-            raise ConfigError(
-                "the model has no finite elements, from which alone geometric stiffness follows.",
-                hint="Make it with rom.fe.model, or reduce with stiffening=False.",
-            )
+        otherwise = ", or reduce with stiffening=False"
+        refuse_without_elements(self.model, "geometric stiffness", otherwise)
 
     def geometric_stiffness(self, E: Array, markers: dict[str, Marker]) -> dict[str, Array]:
         """{load: (r, r)} of the shapes E (n_local, r) in their mean-axis frame."""

@@ -10,7 +10,7 @@ from rom.body.flexible import FlexibleBody
 from rom.body.inertia import InertiaIntegrals, fields_of, inertia_integrals, point_integrals
 from rom.body.nonlinear.cauchy import CauchyRecovery
 from rom.body.records import Marker, Patch, Provenance, Surface
-from rom.body.recovery import StressRecovery
+from rom.body.recovery import StressRecovery, refuse_without_elements
 from rom.eigen.attachments import carried_displacements
 from rom.eigen.connection import Tie
 from rom.eigen.verbs import (
@@ -23,7 +23,7 @@ from rom.eigen.verbs import (
     quadratic,
     rigid_motions,
 )
-from rom.errors import ConfigError, ModelError
+from rom.errors import ModelError
 from rom.model import Array, FEModel, Index, Interface
 
 NEGATIVE_STIFFNESS_RTOL = 1e-9  # of the largest eigenvalue of K; round-off is smaller
@@ -166,9 +166,6 @@ def cauchy_recovery(model: FEModel, E: Array) -> CauchyRecovery:
 
 def stressed_nodes(model: FEModel) -> Index:
     """(p,) nodes of the surface, at which stress is recovered."""
-    if model.stresses is None or model.surface is None:
-        raise ConfigError(
-            "the model has no finite elements, from which alone stress follows.",
-            hint="Make it with rom.fe.model, or reduce with stress=False.",
-        )
-    return model.surface.nodes
+    refuse_without_elements(model, "stress", ", or reduce with stress=False")
+    nodes: Index = model.surface.nodes
+    return nodes

@@ -79,7 +79,10 @@ def certify(draft: Draft) -> None:
     rigid = rigid_rows(ops, body, draft.elastic)
     for support, table in comparison.items():
         if table["full"]:
-            round_off = _round_off(rigid[-1].value, body, table["full"])
+            # round-off is the energy of rigid motions over that of the first mode; a slender body
+            # that is held bends with far less than when it is free
+            softer = (body.omega[0] / (2 * np.pi * min(table["full"]))) ** 2
+            round_off = max(BELOW_FULL_RTOL, float(SHAPES_RATIO * rigid[-1].value * softer))
             rows += frequency_rows(support, table, round_off=round_off)
         rows += _estimate_rows(support, table)
     rows += [*static, *rigid, *_matrix_rows(connection, basis, body, matrices)]
@@ -94,16 +97,6 @@ def attach(draft: Draft, report: Report, comparison: Provenance, of: str) -> Non
     report.warn_of_failures(f"the certificate of {of}")
     provenance = draft.body.provenance | {"comparison": comparison}
     draft.body = replace(draft.body, certificate=report, provenance=provenance)
-
-
-def _round_off(rigid_energy: float, body: FlexibleBody, full: list[float]) -> float:
-    """By which frequencies may differ where rigid motions have energy, over that of the first mode.
-
-    That energy is round-off, of which shapes have more. A slender body that is held bends with far
-    less energy than when it is free.
-    """
-    softer = (body.omega[0] / (2 * np.pi * min(full))) ** 2
-    return max(BELOW_FULL_RTOL, float(SHAPES_RATIO * rigid_energy * softer))
 
 
 def compared(

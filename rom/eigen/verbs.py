@@ -407,7 +407,7 @@ def mac(ops: Operators, Phi: Array, Psi: Array) -> Array:
     Of shapes Phi (n_local, k) and Psi (n_local, l), in units of any length, as each is normalised.
     """
     cross = ops.gram(Phi, ops.apply_M(Psi))
-    return cross**2 / np.outer(_squares(ops, Phi), _squares(ops, Psi))
+    return cross**2 / np.outer(*(np.diag(ops.gram(X, ops.apply_M(X))) for X in (Phi, Psi)))
 
 
 def residual_errors(
@@ -425,7 +425,3 @@ def residual_errors(
     if seen_in is not None:
         ops, residual = seen_in, seen_in.restrict(residual)
     return np.diag(ops.gram(residual, inverse(residual))) / (2 * energy)
-
-
-def _squares(ops: Operators, Phi: Array) -> Array:
-    return np.diag(ops.gram(Phi, ops.apply_M(Phi)))
