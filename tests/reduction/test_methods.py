@@ -12,7 +12,7 @@ from cases.solid import block
 from rom.eigen.scipy import SciPyOperators
 from rom.eigen.verbs import rigid_motions
 from rom.errors import ConfigError, InterfaceError
-from rom.reduction.bases.enhanced import projected
+from rom.reduction.bases.fixed_interface import projected
 
 METHODS = [rom.CraigBampton, rom.EnhancedCraigBampton, rom.Rubin, rom.Herting]
 

@@ -177,15 +177,10 @@ def at_once(ops, held, boundary):
 
 
 test_messages_for_wrong_kinds = refused(
-    (lambda: rom.Polynomial(0), "ball joint"),
-    (lambda: rom.Polynomial(1.5), r"order = 1\.5"),
-    (lambda: rom.Polynomial(True), "order = True"),
-    (lambda: rom.FourierLegendre(0, 1), "harmonics = 0"),
-    (lambda: rom.FourierLegendre(1, -1), "order = -1"),
     (lambda: tie(surface("plane"), "polynomial"), "on 'plane' is open"),
     (lambda: tie(surface("plane"), "polynomial:x"), "known kinds"),
     (lambda: tie(surface("plane"), "fourier:2"), "known kinds"),
-    (lambda: tie(surface("plane"), "polynomial:0"), "ball joint"),
+    (lambda: tie(surface("plane"), "polynomial:0"), "order = 0"),
     error=ConfigError,
 )
 

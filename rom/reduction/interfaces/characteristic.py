@@ -2,13 +2,13 @@
 
 import logging
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from scipy.linalg import eigh, null_space, orth
 from scipy.sparse import identity, kron
 
-from rom.arguments import typed, whole
+from rom.arguments import Count, typed, whole
 from rom.eigen.connection import Connection
 from rom.eigen.verbs import (
     Operators,
@@ -49,10 +49,7 @@ class Characteristic:
     """
 
     method: Method
-    n: int
-
-    def __post_init__(self) -> None:
-        whole("n", self.n, 6, reason="the rigid motions count")
+    n: Annotated[int, Count(6)]
 
     def kinds(self, connection: Connection, interfaces: dict[str, Any]) -> dict[str, object]:
         """The kinds of all interfaces, functions in the place of "full".

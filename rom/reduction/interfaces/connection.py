@@ -5,6 +5,7 @@ modes, certificate) sees an ordinary model whose interface coordinates are dofs 
 """
 
 from collections.abc import Iterable
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -32,7 +33,13 @@ def connect(ops: Operators, model: FEModel, interfaces: dict[str, Any]) -> Conne
     `Polynomial`, `FourierLegendre` and `Snapshots` let the surface follow orthogonal functions.
     """
     chosen = found(model, interfaces)
-    _refuse_shared_nodes(chosen)
+    for other, one in combinations(chosen, 2):
+        if shared := np.intersect1d(one.nodes, other.nodes).size:
+            raise InterfaceError(
+                f"interfaces {other.name!r} and {one.name!r} share {shared} nodes; "
+                "two rigid or averaged surfaces cannot both rule one node.",
+                hint="Leave a gap between the surfaces, or make them one physical surface.",
+            )
     ties = {i.name: tie(i, interfaces[i.name]) for i in chosen}
     if not any(t.removed.size for t in ties.values()):
         return _connection(ops, ties, [interface.dofs for interface in chosen])
@@ -54,18 +61,6 @@ def found(model: FEModel, names: Iterable[str]) -> list[Interface]:
             hint="Rename it as well: dataclasses.replace(interface, name=...).",
         )
     return [model.interfaces[name] for name in names]
-
-
-def _refuse_shared_nodes(interfaces: list[Interface]) -> None:
-    for i, one in enumerate(interfaces):
-        for other in interfaces[:i]:
-            shared = np.intersect1d(one.nodes, other.nodes).size
-            if shared:
-                raise InterfaceError(
-                    f"interfaces {other.name!r} and {one.name!r} share {shared} nodes; "
-                    "two rigid or averaged surfaces cannot both rule one node.",
-                    hint="Leave a gap between the surfaces, or make them one physical surface.",
-                )
 
 
 def _transform(ops: Operators, chosen: list[Interface], ties: dict[str, Tie]) -> Operators:
