@@ -30,7 +30,7 @@ from rom.fe.operators.memory import give_back
 from rom.fe.operators.petsc import PETScOperators
 from rom.fe.operators.solver import DIRECT_SOLVER, parsed
 from rom.fe.parallel import collective, install_abort_hook, on_root
-from rom.model import Attachment, FEModel, Index, Interface, Material, Orthotropic
+from rom.model import Attachment, FEModel, Index, Material, Orthotropic
 from rom.names import check_known
 
 log = logging.getLogger("rom")
@@ -229,12 +229,17 @@ def _model(options: _Options, part: SolidMesh | None, head: _Head) -> FEModel:
     how, why = automatic(made.operators) if method.automatic else (method, options.solver)
     if comm.rank == 0 and how != DIRECT_SOLVER and method.automatic:
         log.info("solved %s", why)
+    interfaces = dict(made.interfaces)
+    for key in head.axes.keys() & interfaces.keys():  # of the CAD, which knows these
+        point, direction = head.axes[key].point, head.axes[key].direction
+        placed = {"origin": np.array(point), "axis": np.array(direction)}
+        interfaces[key] = replace(interfaces[key], **placed)
     provenance = head.origin | made.provenance | {"warnings": remarks, "solver": why}
     return replace(
         made,
         operators=made.operators.solved_by(how),
         provenance=provenance,
-        interfaces={key: _on_axis(x, head.axes.get(key)) for key, x in made.interfaces.items()},
+        interfaces=interfaces,
     )
 
 
@@ -247,13 +252,6 @@ def _advise(comm: MPI.Comm, n: int) -> None:
             f"is faster, and reduces them to {SOME_COORDINATES} interface coordinates and "
             f"{SOME_MODES} modes in about {max(seconds, 0.1):.1f} s."
         )
-
-
-def _on_axis(interface: Interface, axis: Axis | None) -> Interface:
-    """The interface with its origin and axis from the CAD where that knows them."""
-    if axis is None:
-        return interface
-    return replace(interface, origin=np.array(axis.point), axis=np.array(axis.direction))
 
 
 @typed

@@ -60,7 +60,11 @@ class Level:
         self.A, self.P = A, P
         self.R = PETSc.Mat()
         P.transpose(self.R)
-        self.scale = _inverse_diagonal(A)[:, None]
+        d = A.getDiagonal().array
+        largest = A.comm.tompi4py().allreduce(d.max(initial=0.0), op=MPI.MAX)
+        least = EMPTY_RTOL * largest
+        # zero where an aggregate of few nodes has less than six motions
+        self.scale = np.where(d > least, 1.0 / np.maximum(d, least), 0.0)[:, None]
         self.rho = BOUND_SAFETY * _largest(A, self.scale)
 
     def smoothed(self, R: Array, *, residual: bool) -> tuple[Array, Array]:
@@ -121,13 +125,6 @@ class Cycle:
         R -= dense_rows(level.A, E)
         X += level.smoothed(R, residual=False)[0]
         return X
-
-
-def _inverse_diagonal(A: PETSc.Mat) -> Array:
-    """(n_local,) of A; zero where an aggregate of few nodes has less than six motions."""
-    d = A.getDiagonal().array
-    largest = A.comm.tompi4py().allreduce(d.max(initial=0.0), op=MPI.MAX)
-    return np.where(d > EMPTY_RTOL * largest, 1.0 / np.maximum(d, EMPTY_RTOL * largest), 0.0)
 
 
 def _pseudo_inverse(A: Array) -> Array:
