@@ -33,7 +33,7 @@ LONGEST_FIRST = (
     "faults/test_generated.py",
     "mbs/published/test_mbs_crank.py",
     "mbs/analysis/test_mbs_equilibrium.py",
-    "fe/test_fe_body_mpi.py",
+    "fe/test_fe_mpi.py",
     "faults/test_kills.py",
     "faults/test_geometry_programs.py",
     "faults/test_run_kills.py",
