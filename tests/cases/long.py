@@ -12,7 +12,6 @@ SHARED_BY = (2, 3) if ROM_LONG else (2,)
 ONCE = (
     "components",
     "faults/test_archive_faults.py",
-    "fe/mesh/test_decks_card_by_card.py",
     "fe/mesh/test_mesh_decks.py",
     "mbs/elements/test_mbs_laws.py",
     "mbs/equations/test_mbs_cache.py",
