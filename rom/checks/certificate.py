@@ -134,7 +134,11 @@ def compared(
         table["estimated"] = found.tolist()
     if Phi is not None:
         Phi, shapes = (connection.ops.expand(X) for X in (Phi[:, n_rigid:], shapes))
-        table["mac"] = _cluster_mac(mac(ops, Phi, shapes), omega_r[: n + n_rigid]).tolist()
+        shares = mac(ops, Phi, shapes)
+        best = omega_r[np.argmax(shares, axis=1)][:, None]
+        # modes of nearly one frequency may rotate among themselves: they count together
+        near = np.abs(omega_r[: n + n_rigid] - best) <= CLUSTER_RTOL * best
+        table["mac"] = np.minimum((shares * near).sum(axis=1), 1.0).tolist()
     return table
 
 
@@ -194,16 +198,6 @@ def reduced_shapes(
     K, M = (scale[:, None] * (A + A.T) * (0.5 * scale) for A in (K, M))
     _, V = eigh(K, M, subset_by_index=(0, n - 1))
     return Psi @ (scale[:, None] * V)
-
-
-def _cluster_mac(table: Array, reduced: Array) -> Array:
-    """For each full mode the part of it spanned by its best partner and that one's neighbours.
-
-    Modes of nearly one frequency may rotate among themselves; they count together.
-    """
-    best = reduced[np.argmax(table, axis=1)]
-    near = np.abs(reduced[None, :] - best[:, None]) <= CLUSTER_RTOL * best[:, None]
-    return np.minimum((table * near).sum(axis=1), 1.0)
 
 
 def _estimate_rows(support: str, table: dict[str, list[float]]) -> list[Row]:

@@ -6,7 +6,6 @@ frequencies about that state, and how far each interface yields there to what el
 """
 
 from dataclasses import dataclass, replace
-from itertools import takewhile
 from typing import Any
 
 import numpy as np
@@ -89,7 +88,10 @@ def compare_deflections(draft: Draft) -> None:
                 step = replace(step, stress=float(gap))
             steps.append(step)
         rows += case_rows(name, steps)
-        n_held = len(list(takewhile(_holds, steps)))
+        held = [
+            x.displacement <= DISPLACEMENT_RTOL and x.frequencies <= TANGENT_RTOL for x in steps
+        ]
+        n_held = [*held, False].index(False)
         table[name] = {
             "case": case.tolist(),
             "share": list(STEP_SHARES[: len(steps)]),
@@ -152,10 +154,6 @@ def _compared(full: HeldSolid, body: "Tangent", F: Array, at: tuple[Array, ...])
         yields = np.abs(body.compliances(q) / full.compliances(soft, F) - 1)
     worst = float(gaps.max()), float(yields.max(initial=0.0))
     return Step(full.distance(u, a), full.reached(u, a), *worst)
-
-
-def _holds(step: Step) -> bool:
-    return step.displacement <= DISPLACEMENT_RTOL and step.frequencies <= TANGENT_RTOL
 
 
 def case_rows(name: str, steps: list[Step]) -> list[Row]:

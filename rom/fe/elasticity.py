@@ -93,7 +93,14 @@ def model(
     """
     options = _Options(path, material, degree, parameters, tuple(attachments), solver, comm)
     (made,) = _models(options, mesh_options, lambda mesh: {"": mesh}).values()
-    _advise(comm, made.n_dofs)
+    n = made.n_dofs
+    if comm.rank == 0 and comm.size > 1 and n < LEAST_SHARED_DOFS:
+        seconds = reduction_seconds(n, SOME_COORDINATES, SOME_MODES)
+        log.warning(
+            f"{n} dofs are shared by {comm.size} processes; below {LEAST_SHARED_DOFS} one process "
+            f"is faster, and reduces them to {SOME_COORDINATES} interface coordinates and "
+            f"{SOME_MODES} modes in about {max(seconds, 0.1):.1f} s."
+        )
     return made
 
 
@@ -241,17 +248,6 @@ def _model(options: _Options, part: SolidMesh | None, head: _Head) -> FEModel:
         provenance=provenance,
         interfaces=interfaces,
     )
-
-
-def _advise(comm: MPI.Comm, n: int) -> None:
-    """Say where a model is too small to be shared."""
-    if comm.rank == 0 and comm.size > 1 and n < LEAST_SHARED_DOFS:
-        seconds = reduction_seconds(n, SOME_COORDINATES, SOME_MODES)
-        log.warning(
-            f"{n} dofs are shared by {comm.size} processes; below {LEAST_SHARED_DOFS} one process "
-            f"is faster, and reduces them to {SOME_COORDINATES} interface coordinates and "
-            f"{SOME_MODES} modes in about {max(seconds, 0.1):.1f} s."
-        )
 
 
 @typed
