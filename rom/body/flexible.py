@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import eigh
 
 from rom.arguments import finite, typed, whole
 from rom.body.conversion import converted
@@ -26,6 +25,7 @@ from rom.body.rotating import rotating_frequencies
 from rom.body.stiffening import SecondOrder
 from rom.body.surface import Where, point_areas
 from rom.eigen.supports import Fixed, Springs, spring_matrices
+from rom.eigen.verbs import modes_within
 from rom.errors import ConfigError, ModelError, warn
 from rom.model import Array, Modes
 from rom.notebook import html_table, listed
@@ -215,11 +215,11 @@ class FlexibleBody(BodyData):
             whole("n", n, 0, 6 + self.n_modes, reason="rigid and elastic coordinates")
         if not N.size:  # everything is held
             return Modes(np.zeros(0), N)
-        lam, V = eigh(N.T @ K @ N, N.T @ M @ N)
+        lam, V = modes_within(N, K, M)
         omega = np.sqrt(np.maximum(lam, 0.0))
         pulls = [(k @ H[:, :6]) / np.abs(k).max() for H, k in pulled]
         omega[: n_rigid_motions([held[:, :6], *pulls], self.size)] = 0.0
-        return Modes(omega[:n], (N @ V)[:, :n])
+        return Modes(omega[:n], V[:, :n])
 
     def effective_mass(self, *, fixed: Fixed = ()) -> Array:
         """(m, 6) share of the rigid body inertia each mode carries when its supports shake.

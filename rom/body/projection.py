@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import eigh, null_space
+from scipy.linalg import null_space
 from scipy.sparse import csr_matrix
 
 from rom.body.flexible import FlexibleBody
@@ -18,6 +18,7 @@ from rom.eigen.verbs import (
     dofs_of,
     given_rigid_motions,
     mean_motion,
+    modes_within,
     orthonormal,
     own_points,
     quadratic,
@@ -67,16 +68,14 @@ def elastic_part(ops: Operators, Psi: Array) -> Elastic:
             f"the basis misses a rigid motion by {residual:.1e}: the body could not move freely.",
             hint="Hold interfaces that stop all rigid motions, or add rigid modes to the basis.",
         )
-    Z = null_space(B.T @ M)
-    lam, Y = eigh(Z.T @ K @ Z, Z.T @ M @ Z)
+    lam, V = modes_within(null_space(B.T @ M), K, M)
     if negative := np.count_nonzero(lam < -NEGATIVE_STIFFNESS_RTOL * lam.max(initial=0.0)):
         raise ModelError(
             f"{negative} shapes of the free body have negative stiffness: without its supports it "
             "would buckle under the stress it carries.",
             hint="Heat it less; rom.modes takes it with its supports held.",
         )
-    V = scale[:, None] * (Z @ Y)
-    return Elastic(V, np.sqrt(np.maximum(lam, 0.0)), scale[:, None] * B, residual)
+    return Elastic(scale[:, None] * V, np.sqrt(np.maximum(lam, 0.0)), scale[:, None] * B, residual)
 
 
 def flexible_body(

@@ -88,10 +88,9 @@ def compare_deflections(draft: Draft) -> None:
                 step = replace(step, stress=float(gap))
             steps.append(step)
         rows += case_rows(name, steps)
-        held = [
-            x.displacement <= DISPLACEMENT_RTOL and x.frequencies <= TANGENT_RTOL for x in steps
-        ]
-        n_held = [*held, False].index(False)
+        gaps = ((step.displacement, step.frequencies) for step in steps)
+        holds = [u <= DISPLACEMENT_RTOL and f <= TANGENT_RTOL for u, f in gaps]
+        n_held = [*holds, False].index(False)
         table[name] = {
             "case": case.tolist(),
             "share": list(STEP_SHARES[: len(steps)]),

@@ -9,7 +9,7 @@ from typing import Any, Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import qr
+from scipy.linalg import eigh, qr
 from scipy.sparse import csr_matrix, identity, kron
 
 from rom.errors import InterfaceError, ModelError
@@ -365,6 +365,15 @@ def rigid_motions(points: Array) -> Array:
     R[:, 0, 4], R[:, 2, 4] = z, -x
     R[:, 0, 5], R[:, 1, 5] = -y, x
     return R.reshape(-1, 6)
+
+
+def modes_within(N: Array, K: Array, M: Array) -> tuple[Array, Array]:
+    """Eigenvalues (m,) [rad^2/s^2], ascending, and modes (k, m) of small matrices (k, k).
+
+    Among the motions N (k, m) alone, which constraints leave, in units of any kind.
+    """
+    lam, V = eigh(N.T @ K @ N, N.T @ M @ N)
+    return lam, N @ V
 
 
 def pins(motions: Array) -> Index:

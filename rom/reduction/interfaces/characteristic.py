@@ -5,13 +5,14 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
-from scipy.linalg import eigh, null_space, orth
+from scipy.linalg import null_space, orth
 from scipy.sparse import identity, kron
 
 from rom.arguments import Count, typed, whole
 from rom.eigen.connection import Connection
 from rom.eigen.verbs import (
     given_rigid_motions,
+    modes_within,
     orthonormal_in,
     rigid_motions,
     whole_clusters,
@@ -77,9 +78,8 @@ class Characteristic:
         Psi = basis.Psi[:, full]
         K, M = ops.gram(Psi, ops.apply_K(Psi)), ops.gram(Psi, ops.apply_M(Psi))
         # motions of the interfaces that are M-orthogonal to rigid ones
-        Z = null_space(orth(rigid / np.linalg.norm(rigid, axis=0), rcond=1e-9).T @ M)
-        lam, V = eigh(Z.T @ K @ Z, Z.T @ M @ Z)
-        chi = Z @ V
+        R = orth(rigid / np.linalg.norm(rigid, axis=0), rcond=1e-9)
+        lam, chi = modes_within(null_space(R.T @ M), K, M)
         ends, found = np.cumsum(sizes)[:-1], {}
         for name, part, R in zip(names, np.split(chi, ends), np.split(rigid, ends), strict=True):
             m = self._number(part, R)
