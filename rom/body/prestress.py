@@ -14,7 +14,7 @@ from itertools import combinations
 import numpy as np
 
 from rom.body.records import Marker
-from rom.body.recovery import CENTRIFUGAL_LOADS, centrifugal, refuse_without_elements
+from rom.body.recovery import CENTRIFUGAL_LOADS, centrifugal, with_elements
 from rom.body.stiffening import elastic_loads, interface_loads
 from rom.eigen.attachments import carried_displacements
 from rom.eigen.connection import Connection
@@ -60,8 +60,7 @@ class UnitLoads:
     connection: Connection
 
     def __post_init__(self) -> None:
-        otherwise = ", or reduce with stiffening=False"
-        refuse_without_elements(self.model, "geometric stiffness", otherwise)
+        with_elements(self.model, "geometric stiffness", ", or reduce with stiffening=False")
 
     def geometric_stiffness(self, E: Array, markers: dict[str, Marker]) -> dict[str, Array]:
         """{load: (r, r)} of the shapes E (n_local, r) in their mean-axis frame."""

@@ -10,7 +10,7 @@ from rom.body.flexible import FlexibleBody
 from rom.body.inertia import InertiaIntegrals, fields_of, inertia_integrals, point_integrals
 from rom.body.nonlinear.cauchy import CauchyRecovery
 from rom.body.records import Marker, Patch, Provenance, Surface
-from rom.body.recovery import StressRecovery, refuse_without_elements
+from rom.body.recovery import StressRecovery, with_elements
 from rom.eigen.attachments import carried_displacements
 from rom.eigen.connection import Tie
 from rom.eigen.verbs import (
@@ -165,6 +165,4 @@ def cauchy_recovery(model: FEModel, E: Array) -> CauchyRecovery:
 
 def stressed_nodes(model: FEModel) -> Index:
     """(p,) nodes of the surface, at which stress is recovered."""
-    refuse_without_elements(model, "stress", ", or reduce with stress=False")
-    nodes: Index = model.surface.nodes
-    return nodes
+    return with_elements(model, "stress", ", or reduce with stress=False").nodes

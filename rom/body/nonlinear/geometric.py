@@ -35,7 +35,7 @@ from rom.body.nonlinear.ranges import (
     nodal_forces,
 )
 from rom.body.nonlinear.statics import Held, free_motions, newton, passages
-from rom.body.recovery import refuse_without_elements
+from rom.body.recovery import with_elements
 from rom.eigen.connection import Connection, Tie
 from rom.eigen.verbs import (
     Operators,
@@ -173,7 +173,7 @@ def _refuse(bent: Bent) -> None:
     """Say what does not go together with large deflection."""
     geometric, model, connection = bent.geometric, bent.model, bent.connection
     basis, reference = bent.basis, bent.reference
-    refuse_without_elements(model, "large strain")
+    with_elements(model, "large strain")
     modes_held = basis.held is not None
     if modes_held and basis.omega.size:
         K = quadratic(connection.ops, connection.ops.apply_K, _normal(basis))
