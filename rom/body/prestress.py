@@ -77,7 +77,9 @@ class UnitLoads:
             np.hstack([balanced(c.points), -c.N @ self.mesh.rows(E, c.interface.dofs)])
             for c in carried
         ]
-        U = self._answer(forces + wrenches + self._carried_load(carried, felt, len(names)))
+        F = forces + wrenches + self._carried_load(carried, felt, len(names))
+        ops = self.connection.ops  # the free body answers balanced loads, up to rigid motion
+        U = ops.expand(ops.hold(self._six_dofs())(ops.restrict(F)))
         K = self.model.stresses.geometric_stiffness(U, E)
         K += self._surfaces(U, forces, E, markers, carried)
         for c, accelerations in zip(carried, felt, strict=True):
@@ -148,12 +150,6 @@ class UnitLoads:
         at = interface.dofs - self.mesh.first
         mine = (at >= 0) & (at < self.mesh.n_local)
         out[at[mine]] += rows[mine]
-
-    def _answer(self, F: Array) -> Array:
-        """(n_local, k) displacement of the free body under balanced loads, up to rigid motion."""
-        ops = self.connection.ops
-        held = ops.hold(self._six_dofs())
-        return ops.expand(held(ops.restrict(F)))
 
     def _six_dofs(self) -> Index:
         """Six dofs that stop every rigid motion and, as loads are balanced, carry nothing."""

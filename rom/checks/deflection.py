@@ -189,12 +189,9 @@ def load_cases(geometric: Geometric) -> dict[str, Array]:
 
 
 class Tangent:
-    """Small vibrations of a body about states on its supports.
+    """Small vibrations of a body of large deflection about states on its supports.
 
-    Args:
-        body: of large deflection.
-        held: (h, r) motions that vanish.
-        F: (r, k) forces under which it yields.
+    Held are motions (h, r); under forces F (r, k) it yields.
     """
 
     def __init__(self, body: FlexibleBody, held: Array, F: Array):
