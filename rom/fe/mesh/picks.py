@@ -44,7 +44,7 @@ class Pick:
 
 
 def picks(wanted: object) -> tuple[Pick, ...]:
-    """What a face is picked by: text as above, a number, a point (3), a box (6), or a list of these.
+    """What a face is picked by: text as above, a number, a point (3), a box (6), or a list of all.
 
     ConfigError where it is none of them.
     """
