@@ -238,9 +238,8 @@ def _model(options: _Options, part: SolidMesh | None, head: _Head) -> FEModel:
         log.info("solved %s", why)
     interfaces = dict(made.interfaces)
     for key in head.axes.keys() & interfaces.keys():  # of the CAD, which knows these
-        point, direction = head.axes[key].point, head.axes[key].direction
-        placed = {"origin": np.array(point), "axis": np.array(direction)}
-        interfaces[key] = replace(interfaces[key], **placed)
+        point, along = np.array(head.axes[key].point), np.array(head.axes[key].direction)
+        interfaces[key] = replace(interfaces[key], origin=point, axis=along)
     provenance = head.origin | made.provenance | {"warnings": remarks, "solver": why}
     return replace(
         made,
