@@ -20,7 +20,7 @@ from rom.assembly.condensed import (
 )
 from rom.assembly.coupling import Place, coupled_rows, rows_of_parts
 from rom.body.flexible import FlexibleBody
-from rom.body.records import Marker, still_motions
+from rom.body.records import Marker, n_rigid_motions, still_motions
 from rom.errors import ConfigError, warn
 from rom.model import Array, Modes, Report
 from rom.names import check_known, named
@@ -28,11 +28,6 @@ from rom.rows import N_COMPARED, frequency_rows, row
 
 AT_MOST = "coordinates of the coupled interfaces"
 GAP_RTOL = 1e-9  # of the motion of the coupled interfaces
-
-
-def _corrected_alone(body: FlexibleBody) -> bool:
-    """Whether the shapes of a body hold a correction made for itself, interfaces free."""
-    return "EnhancedCraigBampton" in str(body.provenance.get("reduction", {}).get("method"))
 
 
 @typed
@@ -75,7 +70,8 @@ class Assembly:
                 f"{named(far)} has the energy of large deflection, and an assembly is linear.",
                 hint="Reduce without nonlinear.",
             )
-        if own := [name for name, body in self.bodies.items() if _corrected_alone(body)]:
+        made = {name: body.provenance.get("reduction", {}) for name, body in self.bodies.items()}
+        if own := [n for n, how in made.items() if "EnhancedCraigB" in str(how.get("method"))]:
             warn(
                 f"{named(own)} has enhanced Craig-Bampton modes, whose correction takes the "
                 "interfaces for free: frequencies of an assembly are off by per cents. Take "
@@ -267,11 +263,8 @@ class Assembly:
     def _free(self, fixed: tuple[Place, ...]) -> Array:
         """(n, m) motions of all bodies that satisfy couplings and supports."""
         size = max(body.size for body in self.bodies.values())
-        scales = (
-            np.r_[np.ones(3), np.full(3, 1 / size), np.ones(b.n_modes)]
-            for b in self.bodies.values()
-        )
-        scale = np.concatenate(list(scales))
+        six = np.r_[np.ones(3), np.full(3, 1 / size)]
+        scale = np.concatenate([np.r_[six, np.ones(b.n_modes)] for b in self.bodies.values()])
         return scale[:, None] * still_motions(self.conditions(fixed) * scale)
 
     def _placed(self, term: tuple[tuple[Place, Array, float], ...]) -> Array:
@@ -286,6 +279,4 @@ class Assembly:
     def _n_rigid(self, fixed: tuple[Place, ...]) -> int:
         """Rigid motions of the whole that supports leave free."""
         size = max(body.size for body in self.bodies.values())
-        held = [self._marker(place).hold[:, :6] for place in fixed]
-        rows = np.vstack([np.zeros((1, 6)), *held]) * np.r_[np.ones(3), np.full(3, 1 / size)]
-        return 6 - int(np.linalg.matrix_rank(rows, tol=1e-9))
+        return n_rigid_motions((self._marker(place).hold[:, :6] for place in fixed), size)

@@ -20,7 +20,7 @@ import numpy as np
 from scipy.linalg import block_diag, eigh
 
 from rom.arguments import lowest
-from rom.eigen.verbs import whole_clusters
+from rom.eigen.verbs import modes_within, whole_clusters
 from rom.model import Array, Modes, Report
 from rom.reduction.bases.selection import reduced_modes
 
@@ -113,8 +113,7 @@ def partition(M: Array, K: Array, N: Array, H: Array, n_rigid: int) -> Partition
     c = int(np.count_nonzero(spectrum > RANK_RTOL * spectrum[0]))
     C, F = N @ Vt[:c].T, N @ Vt[c:].T
     if F.shape[1]:
-        lam, Phi = eigh(F.T @ K @ F, F.T @ M @ F)
-        F = F @ Phi
+        lam, F = modes_within(F, K, M)
         stiff = lam > RIGID_RTOL * lam[-1]
         C = C - F[:, stiff] @ ((F[:, stiff].T @ K @ C) / lam[stiff, None])
     lam, chi = eigh(C.T @ K @ C, C.T @ M @ C)

@@ -203,7 +203,10 @@ class DualAssembly:
         """
         one_of("kind", kind, KINDS)
         Lam, Psi, Gamma, H = self._coupled(fixed)
-        hard = self._hard(Lam, Psi, Gamma)
+        elastic = np.diag(Lam) > 0
+        by_modes = Psi[:, elastic] / np.sqrt(np.diag(Lam)[elastic])
+        whole = np.linalg.norm(by_modes @ by_modes.T + Gamma, 2) if Gamma.size else 0.0
+        hard = np.linalg.eigvalsh(Gamma) < FLEXIBILITY_RTOL * whole  # no flexibility beside modes
         if kind == "dual":
             if hard.any():
                 raise InterfaceError(
@@ -246,13 +249,6 @@ class DualAssembly:
                 columns = first[place[0]] + self._rows(place)
                 blocks[-1][np.arange(columns.size), columns] = sign
         return np.vstack(blocks)
-
-    def _hard(self, Lam: Array, Psi: Array, Gamma: Array) -> Array:
-        """Which eigenvectors of Gamma have no flexibility beside that of the modes."""
-        elastic = np.diag(Lam) > 0
-        by_modes = Psi[:, elastic] / np.sqrt(np.diag(Lam)[elastic])
-        whole = np.linalg.norm(by_modes @ by_modes.T + Gamma, 2) if Gamma.size else 0.0
-        return np.asarray(np.linalg.eigvalsh(Gamma) < FLEXIBILITY_RTOL * whole)
 
     def _n_rigid(self, fixed: tuple[Place, ...]) -> int:
         """Rigid motions that couplings and supports leave free."""

@@ -154,12 +154,6 @@ class Repeated:
                 return cls(name, shift, same)
         return None
 
-    def named_as(self, body: FlexibleBody, key: str) -> FlexibleBody:
-        """The other body under the names of this piece."""
-        own = {old: name for name, old in self.interfaces.items()}
-        markers = {name: replace(body.markers[old], name=name) for old, name in own.items()}
-        return replace(body, name=key, markers=markers, reference=own[body.reference])
-
 
 def _equal(A: Any, B: Any) -> bool:
     """Whether two sparse matrices of one process are the same but for round-off."""
@@ -349,7 +343,10 @@ def reduce_pieces(
         bodies[name] = reduced(
             models[name], name=name, reference=seen_from, nonlinear=loads, interfaces=own
         )
-    bodies |= {key: one.named_as(bodies[one.of], key) for key, one in repeated.items()}
+    for key, one in repeated.items():
+        body, own = bodies[one.of], {old: name for name, old in one.interfaces.items()}
+        markers = {name: replace(body.markers[old], name=name) for old, name in own.items()}
+        bodies[key] = replace(body, name=key, markers=markers, reference=own[body.reference])
     places = {key: one.shift for key, one in repeated.items()}
     return Pieces({name: bodies[name] for name in models}, tree.joints, places)
 

@@ -5,13 +5,13 @@ from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import eigh
 
 from rom.arguments import NotNegative, one_each, typed
 from rom.body.flexible import FlexibleBody
 from rom.body.records import still_motions
 from rom.body.reference import rigid_elastic, rigid_mass
 from rom.eigen.supports import Fixed
+from rom.eigen.verbs import modes_within
 from rom.model import Array, Row
 from rom.plausible import DAMPING_RATIO, check_damping_ratio, warn_outside
 
@@ -99,9 +99,8 @@ class ModalDamping:
             one_each("ratios of ModalDamping", zeta.shape, "elastic coordinates", (body.n_modes,))
         omega, B = _vibrations(body, self.fixed)
         if omega.size < body.n_modes:  # then the deformations that loads on held interfaces cause
-            C = still_motions(B.T @ body.K)
-            lam, W = eigh(C.T @ body.K @ C, C.T @ _deformation_mass(body) @ C)
-            omega, B = np.concatenate([omega, np.sqrt(lam)]), np.hstack([B, C @ W])
+            lam, W = modes_within(still_motions(B.T @ body.K), body.K, _deformation_mass(body))
+            omega, B = np.concatenate([omega, np.sqrt(lam)]), np.hstack([B, W])
         shares = np.linalg.inv(B)
         return shares.T @ ((2 * zeta * omega)[:, None] * shares)
 

@@ -1,11 +1,9 @@
 """The flexible body: everything a floating-frame integrator needs, independent of the mesh."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import eigh
 
 from rom.arguments import finite, typed, whole
 from rom.body.conversion import converted
@@ -13,12 +11,21 @@ from rom.body.frame import on_mean_axes, seen_from
 from rom.body.nonlinear.quartic import Quartic
 from rom.body.nonlinear.sampled import Sampled
 from rom.body.nonlinear.statics import critical_shares, follow
-from rom.body.records import BodyData, Loads, Marker, Patch, Surface, still_motions
+from rom.body.records import (
+    BodyData,
+    Loads,
+    Marker,
+    Patch,
+    Surface,
+    n_rigid_motions,
+    still_motions,
+)
 from rom.body.reference import marker_motion, rigid_elastic, rigid_mass
 from rom.body.rotating import rotating_frequencies
 from rom.body.stiffening import SecondOrder
 from rom.body.surface import Where, point_areas
 from rom.eigen.supports import Fixed, Springs, spring_matrices
+from rom.eigen.verbs import modes_within
 from rom.errors import ConfigError, ModelError, warn
 from rom.model import Array, Modes
 from rom.notebook import html_table, listed
@@ -196,18 +203,23 @@ class FlexibleBody(BodyData):
         """
         self.check_support(fixed)
         M, K = self.full_matrices()
-        pulled = self._on_springs(springs)
+        of, held = f"body {self.name!r}", self.held_rows(fixed)
+        pulled = [
+            (np.hstack(marker_motion(self.markers[name], self.n_modes)), k)
+            for name, k in spring_matrices(springs, self.markers, of).items()
+        ]
         K = K + sum(H.T @ k @ H for H, k in pulled)
-        N = self._supported(fixed)
+        scale = np.r_[np.ones(3), np.full(3, 1 / self.size), np.ones(self.n_modes)]
+        N = scale[:, None] * still_motions(held * scale)  # rigid ones first
         if n is not None:
             whole("n", n, 0, 6 + self.n_modes, reason="rigid and elastic coordinates")
         if not N.size:  # everything is held
             return Modes(np.zeros(0), N)
-        lam, V = eigh(N.T @ K @ N, N.T @ M @ N)
+        lam, V = modes_within(N, K, M)
         omega = np.sqrt(np.maximum(lam, 0.0))
-        n_rigid = 6 - np.linalg.matrix_rank(self._rigid_rows(fixed, pulled), tol=1e-9)
-        omega[:n_rigid] = 0.0
-        return Modes(omega[:n], (N @ V)[:, :n])
+        pulls = [(k @ H[:, :6]) / np.abs(k).max() for H, k in pulled]
+        omega[: n_rigid_motions([held[:, :6], *pulls], self.size)] = 0.0
+        return Modes(omega[:n], V[:, :n])
 
     def effective_mass(self, *, fixed: Fixed = ()) -> Array:
         """(m, 6) share of the rigid body inertia each mode carries when its supports shake.
@@ -351,22 +363,3 @@ class FlexibleBody(BodyData):
         K = np.zeros_like(M)
         K[6:, 6:] = self.K
         return M, K
-
-    def _supported(self, fixed: Fixed) -> Array:
-        """(6 + r, m) basis of the motions that keep the interfaces still, rigid ones first."""
-        scale = np.r_[np.ones(3), np.full(3, 1 / self.size), np.ones(self.n_modes)]
-        return scale[:, None] * still_motions(self.held_rows(fixed) * scale)
-
-    def _on_springs(self, springs: Springs | None) -> list[tuple[Array, Array]]:
-        """Motions (6, 6 + r) of interfaces, and stiffness (6, 6) to the ground there."""
-        pulled = spring_matrices(springs, self.markers, f"body {self.name!r}")
-        return [
-            (np.hstack(marker_motion(self.markers[name], self.n_modes)), k)
-            for name, k in pulled.items()
-        ]
-
-    def _rigid_rows(self, fixed: Fixed, pulled: Sequence[tuple[Array, Array]] = ()) -> Array:
-        """Rigid motions (h, 6) of what is held or pulled."""
-        pulls = [(k @ H[:, :6]) / np.abs(k).max() for H, k in pulled]
-        rows = np.vstack([np.zeros((1, 6)), self.held_rows(fixed)[:, :6], *pulls])
-        return rows * np.r_[np.ones(3), np.full(3, 1 / self.size)]

@@ -45,9 +45,7 @@ def _moves_around_rest(body: Body) -> bool:
 
 def seen_from(body: Body, reference: object) -> Body:
     """The body in another frame, see `FlexibleBody.with_reference`."""
-    moved = moved_to(body, reference)
-    omega, V = _normal_modes(moved.K, moved.M)
-    return _recombined(moved, V, omega, reference_label(reference))
+    return _on_normal_modes(moved_to(body, reference))[0]
 
 
 def at_large_deflection(
@@ -57,11 +55,9 @@ def at_large_deflection(
 
     Shapes E (n_local, r) are those of the old frame; operators are those of nodal dofs.
     """
-    moved, X = moved_to(body, reference), reference_motion(body, reference)
-    omega, V = _normal_modes(moved.K, moved.M)
+    X, (found, V) = reference_motion(body, reference), _on_normal_modes(moved_to(body, reference))
     shapes = (E - rigid_motions(own_points(ops, model.points)) @ X) @ V
-    found = _recombined(moved, V, omega, reference_label(reference))
-    energy = Quartic.from_gram(model.stresses.large_strain().gram(shapes), omega.size)
+    energy = Quartic.from_gram(model.stresses.large_strain().gram(shapes), found.n_modes)
     markers = {
         name: replace(marker, covariance=_covariance(ops, model.interfaces[name], shapes))
         for name, marker in found.markers.items()
@@ -100,21 +96,18 @@ def reference_label(reference: object) -> str:
     return "mean-axis" if reference == "free" else str(reference)
 
 
-def _normal_modes(K: Array, M: Array) -> tuple[Array, Array]:
-    smallest = np.linalg.eigvalsh(M).min(initial=np.inf)
+def _on_normal_modes(body: Body) -> tuple[Body, Array]:
+    """The body with its normal modes as elastic coordinates, q = V q_new, and V (r, r)."""
+    smallest = np.linalg.eigvalsh(body.M).min(initial=np.inf)
     if smallest <= 0:
         raise ModelError(
             f"the elastic mass matrix has the eigenvalue {smallest:.3g}: the elastic coordinates "
             "contain a rigid motion, which the floating frame already describes.",
             hint="Choose a reference condition that stops all six rigid motions.",
         )
-    lam, V = eigh(K, M)
-    signs = np.sign(V[np.argmax(np.abs(V), axis=0), np.arange(V.shape[1])])
-    return np.sqrt(np.maximum(lam, 0.0)), V * signs
-
-
-def _recombined(body: Body, V: Array, omega: Array, reference: str) -> Body:
-    """New elastic coordinates q = V q_new."""
+    lam, V = eigh(body.K, body.M)
+    omega = np.sqrt(np.maximum(lam, 0.0))
+    V = V * np.sign(V[np.argmax(np.abs(V), axis=0), np.arange(V.shape[1])])
     markers = {
         name: replace(
             m,
@@ -130,7 +123,7 @@ def _recombined(body: Body, V: Array, omega: Array, reference: str) -> Body:
     stress = body.stress.recombined(V) if isinstance(body.stress, StressRecovery) else None
     S_kl = np.einsum("abkl,km,ln->abmn", body.S_kl, V, V, optimize=True)
     D = V.T @ body.D @ V
-    return replace(
+    found = replace(
         body,
         S=body.S @ V,
         Ibar_kl=body.Ibar_kl @ V,
@@ -142,6 +135,6 @@ def _recombined(body: Body, V: Array, omega: Array, reference: str) -> Body:
         surface=surface,
         stress=stress,
         omega=omega,
-        labels=tuple(f"mode {k + 1}, {reference} frame" for k in range(omega.size)),
-        reference=reference,
+        labels=tuple(f"mode {k + 1}, {body.reference} frame" for k in range(omega.size)),
     )
+    return found, V

@@ -14,7 +14,7 @@ from itertools import combinations
 import numpy as np
 
 from rom.body.records import Marker
-from rom.body.recovery import CENTRIFUGAL_LOADS, centrifugal
+from rom.body.recovery import CENTRIFUGAL_LOADS, centrifugal, with_elements
 from rom.body.stiffening import elastic_loads, interface_loads
 from rom.eigen.attachments import carried_displacements
 from rom.eigen.connection import Connection
@@ -27,7 +27,6 @@ from rom.eigen.verbs import (
     pins,
     rigid_motions,
 )
-from rom.errors import ConfigError
 from rom.model import Array, FEModel, Index, Interface
 
 Felt = Callable[[Array], Array]  # at points (p, 3), (3 p, k)
@@ -61,11 +60,7 @@ class UnitLoads:
     connection: Connection
 
     def __post_init__(self) -> None:
-        if self.model.stresses is None:
-            raise ConfigError(
-                "the model has no finite elements, from which alone geometric stiffness follows.",
-                hint="Make it with rom.fe.model, or reduce with stiffening=False.",
-            )
+        with_elements(self.model, "geometric stiffness", ", or reduce with stiffening=False")
 
     def geometric_stiffness(self, E: Array, markers: dict[str, Marker]) -> dict[str, Array]:
         """{load: (r, r)} of the shapes E (n_local, r) in their mean-axis frame."""
@@ -82,7 +77,9 @@ class UnitLoads:
             np.hstack([balanced(c.points), -c.N @ self.mesh.rows(E, c.interface.dofs)])
             for c in carried
         ]
-        U = self._answer(forces + wrenches + self._carried_load(carried, felt, len(names)))
+        F = forces + wrenches + self._carried_load(carried, felt, len(names))
+        ops = self.connection.ops  # the free body answers balanced loads, up to rigid motion
+        U = ops.expand(ops.hold(self._six_dofs())(ops.restrict(F)))
         K = self.model.stresses.geometric_stiffness(U, E)
         K += self._surfaces(U, forces, E, markers, carried)
         for c, accelerations in zip(carried, felt, strict=True):
@@ -153,12 +150,6 @@ class UnitLoads:
         at = interface.dofs - self.mesh.first
         mine = (at >= 0) & (at < self.mesh.n_local)
         out[at[mine]] += rows[mine]
-
-    def _answer(self, F: Array) -> Array:
-        """(n_local, k) displacement of the free body under balanced loads, up to rigid motion."""
-        ops = self.connection.ops
-        held = ops.hold(self._six_dofs())
-        return ops.expand(held(ops.restrict(F)))
 
     def _six_dofs(self) -> Index:
         """Six dofs that stop every rigid motion and, as loads are balanced, carry nothing."""

@@ -3,14 +3,14 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import eigh, null_space
+from scipy.linalg import null_space
 from scipy.sparse import csr_matrix
 
 from rom.body.flexible import FlexibleBody
 from rom.body.inertia import InertiaIntegrals, fields_of, inertia_integrals, point_integrals
 from rom.body.nonlinear.cauchy import CauchyRecovery
 from rom.body.records import Marker, Patch, Provenance, Surface
-from rom.body.recovery import StressRecovery
+from rom.body.recovery import StressRecovery, with_elements
 from rom.eigen.attachments import carried_displacements
 from rom.eigen.connection import Tie
 from rom.eigen.verbs import (
@@ -18,12 +18,13 @@ from rom.eigen.verbs import (
     dofs_of,
     given_rigid_motions,
     mean_motion,
+    modes_within,
     orthonormal,
     own_points,
     quadratic,
     rigid_motions,
 )
-from rom.errors import ConfigError, ModelError
+from rom.errors import ModelError
 from rom.model import Array, FEModel, Index, Interface
 
 NEGATIVE_STIFFNESS_RTOL = 1e-9  # of the largest eigenvalue of K; round-off is smaller
@@ -67,16 +68,14 @@ def elastic_part(ops: Operators, Psi: Array) -> Elastic:
             f"the basis misses a rigid motion by {residual:.1e}: the body could not move freely.",
             hint="Hold interfaces that stop all rigid motions, or add rigid modes to the basis.",
         )
-    Z = null_space(B.T @ M)
-    lam, Y = eigh(Z.T @ K @ Z, Z.T @ M @ Z)
+    lam, V = modes_within(null_space(B.T @ M), K, M)
     if negative := np.count_nonzero(lam < -NEGATIVE_STIFFNESS_RTOL * lam.max(initial=0.0)):
         raise ModelError(
             f"{negative} shapes of the free body have negative stiffness: without its supports it "
             "would buckle under the stress it carries.",
             hint="Heat it less; rom.modes takes it with its supports held.",
         )
-    V = scale[:, None] * (Z @ Y)
-    return Elastic(V, np.sqrt(np.maximum(lam, 0.0)), scale[:, None] * B, residual)
+    return Elastic(scale[:, None] * V, np.sqrt(np.maximum(lam, 0.0)), scale[:, None] * B, residual)
 
 
 def flexible_body(
@@ -166,9 +165,4 @@ def cauchy_recovery(model: FEModel, E: Array) -> CauchyRecovery:
 
 def stressed_nodes(model: FEModel) -> Index:
     """(p,) nodes of the surface, at which stress is recovered."""
-    if model.stresses is None or model.surface is None:
-        raise ConfigError(
-            "the model has no finite elements, from which alone stress follows.",
-            hint="Make it with rom.fe.model, or reduce with stress=False.",
-        )
-    return model.surface.nodes
+    return with_elements(model, "stress", ", or reduce with stress=False").nodes

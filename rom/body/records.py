@@ -1,6 +1,6 @@
 """What a flexible body consists of; the functions that make and move one take this."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
@@ -34,6 +34,12 @@ def still_motions(H: Array) -> Array:
         return np.eye(H.shape[1])
     sizes = np.maximum(np.linalg.norm(H, axis=1, keepdims=True), 1e-300)
     return null_space(H / sizes, rcond=REPEATED_ROW_RTOL)
+
+
+def n_rigid_motions(held: Iterable[Array], size: float) -> int:
+    """How many of six rigid motions are left by rows (h, 6) that are held, of a size [m]."""
+    rows = np.vstack([np.zeros((1, 6)), *held]) * np.r_[np.ones(3), np.full(3, 1 / size)]
+    return 6 - int(np.linalg.matrix_rank(rows, tol=1e-9))
 
 
 @dataclass(frozen=True, slots=True)

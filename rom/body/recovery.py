@@ -8,7 +8,7 @@ from rom.arguments import finite
 from rom.eigen.connection import Connection
 from rom.eigen.verbs import Operators, own_points
 from rom.errors import ConfigError
-from rom.model import Array, Basis
+from rom.model import Array, Basis, FEModel, SurfaceMesh
 
 PRODUCTS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))  # of two angular velocities
 AXIS_NAMES = "xyz"
@@ -95,6 +95,16 @@ class StressRecovery:
         if A is not None:
             A = np.hstack([A[:, :N_FRAME_LOADS], A[:, N_FRAME_LOADS:] @ V])
         return StressRecovery(self.points, self.operator @ V, A)
+
+
+def with_elements(model: FEModel, what: str, otherwise: str = "") -> SurfaceMesh:
+    """The surface of a model of finite elements, from which alone something follows."""
+    if model.stresses is None or model.surface is None:
+        raise ConfigError(
+            f"the model has no finite elements, from which alone {what} follows.",
+            hint=f"Make it with rom.fe.model{otherwise}.",
+        )
+    return model.surface
 
 
 def von_mises(stress: Array) -> Array:

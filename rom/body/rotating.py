@@ -2,11 +2,11 @@
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import eigvals, null_space
+from scipy.linalg import eigvals
 
 from rom.arguments import finite, unit_vector
 from rom.body.frame import seen_from
-from rom.body.records import REPEATED_ROW_RTOL, BodyData, rows_held
+from rom.body.records import BodyData, rows_held, still_motions
 from rom.body.stiffening import SecondOrder
 from rom.eigen.supports import Fixed, supports
 from rom.errors import ConfigError, ModelError, warn
@@ -24,22 +24,7 @@ def rotating_frequencies(
     fixed: Fixed,
     at: npt.ArrayLike = (0.0, 0.0, 0.0),
 ) -> Array:
-    """(k,) frequencies [Hz] seen in the rotating frame, see `FlexibleBody.rotating_frequencies`.
-
-    Args:
-        body: the body, in SI.
-        speed: angular speed [rad/s].
-        axis: (3,) direction of the axis of rotation [1].
-        fixed: interfaces that rotate with the frame, see `FlexibleBody.modes`; the first is held
-            wholly.
-        at: (3,) a point of the axis [m].
-
-    Raises:
-        ConfigError: if no interface is held, or the first in part; if the axis has no direction.
-        InterfaceError: if an interface is unknown.
-        ModelError: for a body of large deflection, and if an interface of a basis of free-free
-            modes alone is held.
-    """
+    """(k,) frequencies [Hz] of a body in SI, as `FlexibleBody.rotating_frequencies` explains."""
     if body.quartic is not None:
         raise ModelError(
             f"body {body.name!r} is one of large deflection, which rotation bends and stretches "
@@ -59,7 +44,7 @@ def rotating_frequencies(
     seen = seen_from(body, first)  # in its frame the first support is at rest
     held = {name: rows_held(seen.marker(name), directions) for name, directions in others}
     H = np.vstack([_held(seen, rows) for rows in (seen.marker(first).hold, *held.values())])
-    N = null_space(H, rcond=REPEATED_ROW_RTOL) if H.size else np.eye(seen.n_modes)
+    N = still_motions(H)
     K, G = rotating_matrices(seen, w, arm, held)
     M, K, G = (N.T @ A @ N for A in (seen.M, K, G))
     return _frequencies(M, K, G, f"body {body.name!r} at {speed:g} rad/s")
@@ -70,7 +55,7 @@ def _held(body: BodyData, rows: Array) -> Array:
     rigid = np.abs(rows[:, :6] * np.r_[np.ones(3), np.full(3, 1 / body.size)]).max()
     size = np.linalg.norm(rows[:, 6:] / np.sqrt(np.diag(body.M) / body.mass), axis=1)
     H: Array = rows[size > 1e-9 * rigid, 6:]
-    return H / np.linalg.norm(H, axis=1, keepdims=True)
+    return H
 
 
 def rotating_matrices(

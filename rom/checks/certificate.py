@@ -79,7 +79,10 @@ def certify(draft: Draft) -> None:
     rigid = rigid_rows(ops, body, draft.elastic)
     for support, table in comparison.items():
         if table["full"]:
-            round_off = _round_off(rigid[-1].value, body, table["full"])
+            # round-off is the energy of rigid motions over that of the first mode; a slender body
+            # that is held bends with far less than when it is free
+            softer = (body.omega[0] / (2 * np.pi * min(table["full"]))) ** 2
+            round_off = max(BELOW_FULL_RTOL, float(SHAPES_RATIO * rigid[-1].value * softer))
             rows += frequency_rows(support, table, round_off=round_off)
         rows += _estimate_rows(support, table)
     rows += [*static, *rigid, *_matrix_rows(connection, basis, body, matrices)]
@@ -94,16 +97,6 @@ def attach(draft: Draft, report: Report, comparison: Provenance, of: str) -> Non
     report.warn_of_failures(f"the certificate of {of}")
     provenance = draft.body.provenance | {"comparison": comparison}
     draft.body = replace(draft.body, certificate=report, provenance=provenance)
-
-
-def _round_off(rigid_energy: float, body: FlexibleBody, full: list[float]) -> float:
-    """By which frequencies may differ where rigid motions have energy, over that of the first mode.
-
-    That energy is round-off, of which shapes have more. A slender body that is held bends with far
-    less energy than when it is free.
-    """
-    softer = (body.omega[0] / (2 * np.pi * min(full))) ** 2
-    return max(BELOW_FULL_RTOL, float(SHAPES_RATIO * rigid_energy * softer))
 
 
 def compared(
@@ -141,7 +134,11 @@ def compared(
         table["estimated"] = found.tolist()
     if Phi is not None:
         Phi, shapes = (connection.ops.expand(X) for X in (Phi[:, n_rigid:], shapes))
-        table["mac"] = _cluster_mac(mac(ops, Phi, shapes), omega_r[: n + n_rigid]).tolist()
+        shares = mac(ops, Phi, shapes)
+        best = omega_r[np.argmax(shares, axis=1)][:, None]
+        # modes of nearly one frequency may rotate among themselves: they count together
+        near = np.abs(omega_r[: n + n_rigid] - best) <= CLUSTER_RTOL * best
+        table["mac"] = np.minimum((shares * near).sum(axis=1), 1.0).tolist()
     return table
 
 
@@ -201,16 +198,6 @@ def reduced_shapes(
     K, M = (scale[:, None] * (A + A.T) * (0.5 * scale) for A in (K, M))
     _, V = eigh(K, M, subset_by_index=(0, n - 1))
     return Psi @ (scale[:, None] * V)
-
-
-def _cluster_mac(table: Array, reduced: Array) -> Array:
-    """For each full mode the part of it spanned by its best partner and that one's neighbours.
-
-    Modes of nearly one frequency may rotate among themselves; they count together.
-    """
-    best = reduced[np.argmax(table, axis=1)]
-    near = np.abs(reduced[None, :] - best[:, None]) <= CLUSTER_RTOL * best[:, None]
-    return np.minimum((table * near).sum(axis=1), 1.0)
 
 
 def _estimate_rows(support: str, table: dict[str, list[float]]) -> list[Row]:

@@ -6,7 +6,6 @@ frequencies about that state, and how far each interface yields there to what el
 """
 
 from dataclasses import dataclass, replace
-from itertools import takewhile
 from typing import Any
 
 import numpy as np
@@ -89,7 +88,9 @@ def compare_deflections(draft: Draft) -> None:
                 step = replace(step, stress=float(gap))
             steps.append(step)
         rows += case_rows(name, steps)
-        n_held = len(list(takewhile(_holds, steps)))
+        gaps = ((step.displacement, step.frequencies) for step in steps)
+        holds = [u <= DISPLACEMENT_RTOL and f <= TANGENT_RTOL for u, f in gaps]
+        n_held = [*holds, False].index(False)
         table[name] = {
             "case": case.tolist(),
             "share": list(STEP_SHARES[: len(steps)]),
@@ -154,10 +155,6 @@ def _compared(full: HeldSolid, body: "Tangent", F: Array, at: tuple[Array, ...])
     return Step(full.distance(u, a), full.reached(u, a), *worst)
 
 
-def _holds(step: Step) -> bool:
-    return step.displacement <= DISPLACEMENT_RTOL and step.frequencies <= TANGENT_RTOL
-
-
 def case_rows(name: str, steps: list[Step]) -> list[Row]:
     """Lines of a load case, the worst of its steps; one more where the basis locks."""
     n = len(STEP_SHARES)
@@ -192,12 +189,9 @@ def load_cases(geometric: Geometric) -> dict[str, Array]:
 
 
 class Tangent:
-    """Small vibrations of a body about states on its supports.
+    """Small vibrations of a body of large deflection about states on its supports.
 
-    Args:
-        body: of large deflection.
-        held: (h, r) motions that vanish.
-        F: (r, k) forces under which it yields.
+    Held are motions (h, r); under forces F (r, k) it yields.
     """
 
     def __init__(self, body: FlexibleBody, held: Array, F: Array):

@@ -82,10 +82,6 @@ class GluedSolid:
         interface = self.models[key].interfaces[name]
         return TurningSection.of(interface, self.dofs[key][interface.dofs])
 
-    def nodal_force(self, load: Load) -> Array:
-        """(n,) forces of a load at its largest [N]."""
-        return load.largest * self.motion(load)
-
     @cached_property
     def _solids(self) -> dict[str, Any]:
         return {key: model.stresses.finite_strain() for key, model in self.models.items()}

@@ -29,7 +29,7 @@ SETTINGS = ("method", "modes", *OWN_SETTINGS, "characteristic", "gravity_shapes"
 
 def chosen(settings: Values, *, full: bool) -> "Method | Characteristic":
     """The method of a table [reduction], by the keys of `SETTINGS` that somebody chose."""
-    from rom.reduction.bases.loads import WithLoads
+    from rom.reduction.bases.method import WithLoads
     from rom.reduction.interfaces.characteristic import Characteristic
 
     method = _plain(settings)

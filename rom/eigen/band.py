@@ -81,7 +81,13 @@ def modes_up_to(ops: Any, held: Any, f_max: float, tol: float) -> Modes:
         return modes_up_to(
             SciPyOperators(K, M, ops.rigid), () if still else support.held, f_max, tol
         )
-    _refuse_beyond_memory(n_below, body.n)
+    need, there = 8.0 * body.n * (2 * capacity(n_below) + 3 * n_below), free_bytes()
+    if need > there:  # of the space of the search
+        raise ResourceError(
+            f"finding {n_below} modes of {body.n} dofs takes {need / 2**30:.3g} GiB; "
+            f"{there / 2**30:.3g} GiB are free.",
+            hint="Ask for modes up to a lower frequency, or use a coarser mesh.",
+        )
     omega, Phi = ops.modes(support, n_below, finished=not made)
     lam = omega[still:] ** 2
     n_found = still + int(np.count_nonzero(lam < rho))
@@ -111,17 +117,6 @@ def _residual(body: Any, lam: Array, Phi: Array) -> Array:
         R[:, some] = body.apply_K(Phi[:, some]) - body.apply_M(Phi[:, some]) * lam[some]
         MR[:, some] = mass.solve(R[:, some])
     return R.T @ MR
-
-
-def _refuse_beyond_memory(k: int, n: int) -> None:
-    """Raise ResourceError where the space of a search takes more memory than there is."""
-    need, there = 8.0 * n * (2 * capacity(k) + 3 * k), free_bytes()
-    if need > there:
-        raise ResourceError(
-            f"finding {k} modes of {n} dofs takes {need / 2**30:.3g} GiB; "
-            f"{there / 2**30:.3g} GiB are free.",
-            hint="Ask for modes up to a lower frequency, or use a coarser mesh.",
-        )
 
 
 def lehmann_bounds(theta: Array, residual: Array, rho: float) -> Array:

@@ -18,7 +18,6 @@ Source:
 """
 
 import numpy as np
-import numpy.typing as npt
 from scipy.special import gammainc
 
 from rom.eigen.verbs import Searched
@@ -47,17 +46,13 @@ def gaussian_block(ops: Searched, k: int, n_before: int = 0) -> Array:
     """
     key = np.round(ops.fixed * PLACE_SCALE).astype(np.int64).view(np.uint64)
     numbers = np.arange(1 + 2 * n_before, 1 + 2 * (n_before + k), dtype=np.uint64)
-    counter = key[:, None] + COUNTER_STEP * numbers
-    u = (_mixed(counter) >> np.uint64(11)).astype(float) * 2.0**-53 + 2.0**-54
+    bits = key[:, None] + COUNTER_STEP * numbers
+    for shift, factor in MIXING_STEPS:  # the finaliser of SplitMix64
+        bits = (bits ^ (bits >> shift)) * factor
+    bits ^= bits >> np.uint64(31)
+    u = (bits >> np.uint64(11)).astype(float) * 2.0**-53 + 2.0**-54
     normal = np.sqrt(-2.0 * np.log(u[:, :k])) * np.cos(2.0 * np.pi * u[:, k:])  # Box and Muller
     return normal / np.sqrt(np.maximum(ops.mass_diagonal, np.finfo(float).tiny))[:, None]
-
-
-def _mixed(x: npt.NDArray[np.uint64]) -> npt.NDArray[np.uint64]:
-    """64 bits of which each depends on all those given: the finaliser of SplitMix64."""
-    for shift, factor in MIXING_STEPS:
-        x = (x ^ (x >> shift)) * factor
-    return x ^ (x >> np.uint64(31))
 
 
 def miss_probability(T: Array, start: Array, residual: Array, m: int) -> float:
@@ -85,7 +80,10 @@ def unseen_part(T: Array, start: Array, residual: Array, m: int) -> tuple[int, f
     apart = np.maximum(theta[m - 1] - theta, CLUSTER_RTOL * theta)
     inaccurate = np.flatnonzero(residual * theta > ACCURATE_RTOL * apart)
     k = int(inaccurate[0]) if inaccurate.size else theta.size
-    if not m <= k < theta.size or theta[k] <= 0.0 or _repeated(theta[:k]):
+    if not m <= k < theta.size or theta[k] <= 0.0:
+        return k, np.inf
+    first, last = theta[:k][: 1 - N_TOGETHER], theta[:k][N_TOGETHER - 1 :]
+    if (first - last <= CLUSTER_RTOL * first).any():  # they share one frequency
         return k, np.inf
     ratio = float(theta[m - 1] / theta[k])
     if ratio <= 1.0 + CLUSTER_RTOL:
@@ -96,12 +94,6 @@ def unseen_part(T: Array, start: Array, residual: Array, m: int) -> tuple[int, f
     growth = log_chebyshev(n_blocks - 1 - powers, 2.0 * ratio - 1.0)
     log_c2 = np.min(2.0 * np.log(left) - 2.0 * growth) - np.log(ratio - 1.0)
     return k, float(np.exp(min(log_c2, 0.0)))
-
-
-def _repeated(theta: Array) -> bool:
-    """Whether three neighbours or more share one frequency."""
-    width = theta[: 1 - N_TOGETHER] - theta[N_TOGETHER - 1 :]
-    return bool((width <= CLUSTER_RTOL * theta[: 1 - N_TOGETHER]).any())
 
 
 def log_chebyshev(degree: Array, x: float) -> Array:

@@ -109,7 +109,10 @@ class BlockLanczos:
         W, MW, R, share = self._normalised(W, self.ops.apply_M(W), R, length)
         if share.min() < CANCELLED_RTOL:
             spent = share == 0.0
-            W[:, spent] = self._random(np.count_nonzero(spent))
+            n_before = self.width * self.n_deflated + self.size
+            X = gaussian_block(self.ops, np.count_nonzero(spent), n_before)
+            X = np.asfortranarray(self.factor.solve(self.ops.apply_M(X)))  # held rows are zero
+            W[:, spent] = X / np.sqrt(np.diag(self.ops.gram(X, self.ops.apply_M(X))))
             for _ in range(2):
                 W = self._beside(W, H, R)
             MW = self.ops.apply_M(W)
@@ -137,12 +140,6 @@ class BlockLanczos:
         root[root < SPENT_RTOL * whole] = 0.0
         T = U / np.where(root > 0.0, root, whole)
         return _combined(W, T), _combined(MW, T), (U * root).T @ R, root / whole
-
-    def _random(self, k: int) -> Array:
-        """(n_local, k) random columns, zero where a support holds."""
-        X = gaussian_block(self.ops, k, self.width * self.n_deflated + self.size)
-        X = np.asfortranarray(self.factor.solve(self.ops.apply_M(X)))
-        return X / np.sqrt(np.diag(self.ops.gram(X, self.ops.apply_M(X))))
 
     def prove(self, m: int) -> bool:
         """Go on until surely none of the lowest m modes is missing; False if that stays open."""

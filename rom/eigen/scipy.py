@@ -119,7 +119,13 @@ class SciPyOperators(ModeSearch):
         self.K, self.M = _symmetric("K", K), _symmetric("M", M)
         if self.K.shape != self.M.shape:
             raise ConfigError(f"K is {self.K.shape} and M is {self.M.shape}; they must be equal.")
-        _refuse_massless(self.M)
+        diagonal = self.M.diagonal()
+        if (massless := np.flatnonzero(diagonal <= 0.0)).size:
+            raise QualityGateError(
+                f"M has {diagonal[massless[0]]:.3g} on the diagonal of dof {massless[0]}; every "
+                "dof needs a positive mass.",
+                hint="Condense dofs without mass statically before you reduce.",
+            )
         self.n = self.n_local = self.K.shape[0]
         self.rigid, self.T, self.fixed = rigid, T, np.sin(1.0 + np.arange(self.n))
 
@@ -230,17 +236,6 @@ def _symmetric(name: str, A: Matrix) -> csr_matrix:
         raise SolverError(f"{name} has an entry that is not finite in row {bad}.", hint=ENTRY_HINT)
     symmetric(name, A, 1e-10)
     return A
-
-
-def _refuse_massless(M: csr_matrix) -> None:
-    diagonal = M.diagonal()
-    wrong = np.flatnonzero(diagonal <= 0.0)
-    if wrong.size:
-        raise QualityGateError(
-            f"M has {diagonal[wrong[0]]:.3g} on the diagonal of dof {wrong[0]}; every dof needs a "
-            "positive mass.",
-            hint="Condense dofs without mass statically before you reduce.",
-        )
 
 
 def negative_count(A: Matrix) -> int:

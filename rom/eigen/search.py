@@ -99,7 +99,11 @@ class ModeSearch(Searched):
         in_blocks = isinstance(held, HeldBody)
         if not isinstance(held, HeldBody):
             if np.size(held) == 0:
-                return self._free_modes(m, sigma)
+                whole("n_modes", m, 0, self.n, reason="the dofs of the model")
+                R = self._rigid_modes()
+                lam, Phi = self._elastic_modes(R, max(m - R.shape[1], 0), sigma)
+                omega = np.concatenate([np.zeros(R.shape[1]), np.sqrt(lam)])
+                return omega[:m], np.hstack([R, self.signed(Phi)])[:, :m]
             held, finished = self.hold(held), True
         reason = f"{self.n} dofs without {held.held.size} boundary dofs leave no more"
         whole("n_modes", m, 0, held.n_free, reason=reason)
@@ -145,13 +149,6 @@ class ModeSearch(Searched):
         lam, Phi = lam[:n_elastic], settled(self, lam, Phi)[:, :n_elastic]
         omega = np.concatenate([np.zeros(R.shape[1]), np.sqrt(lam)])
         return omega, np.hstack([R, self.signed(Phi)])
-
-    def _free_modes(self, m: int, sigma: float | None) -> tuple[Array, Array]:
-        whole("n_modes", m, 0, self.n, reason="the dofs of the model")
-        R = self._rigid_modes()
-        lam, Phi = self._elastic_modes(R, max(m - R.shape[1], 0), sigma)
-        omega = np.concatenate([np.zeros(R.shape[1]), np.sqrt(lam)])
-        return omega[:m], np.hstack([R, self.signed(Phi)])[:, :m]
 
     def _rigid_modes(self) -> Array:
         """M-orthonormal rigid motions, from the geometry or, without one, none."""

@@ -9,7 +9,7 @@ from typing import Any, Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import qr
+from scipy.linalg import eigh, qr
 from scipy.sparse import csr_matrix, identity, kron
 
 from rom.errors import InterfaceError, ModelError
@@ -367,6 +367,15 @@ def rigid_motions(points: Array) -> Array:
     return R.reshape(-1, 6)
 
 
+def modes_within(N: Array, K: Array, M: Array) -> tuple[Array, Array]:
+    """Eigenvalues (m,) [rad^2/s^2], ascending, and modes (k, m) of small matrices (k, k).
+
+    Among the motions N (k, m) alone, which constraints leave, in units of any kind.
+    """
+    lam, V = eigh(N.T @ K @ N, N.T @ M @ N)
+    return lam, N @ V
+
+
 def pins(motions: Array) -> Index:
     """(p,) rows of motions (k, m) that, held at zero, stop all combinations of them."""
     if not motions.shape[1]:
@@ -407,7 +416,7 @@ def mac(ops: Operators, Phi: Array, Psi: Array) -> Array:
     Of shapes Phi (n_local, k) and Psi (n_local, l), in units of any length, as each is normalised.
     """
     cross = ops.gram(Phi, ops.apply_M(Psi))
-    return cross**2 / np.outer(_squares(ops, Phi), _squares(ops, Psi))
+    return cross**2 / np.outer(*(np.diag(ops.gram(X, ops.apply_M(X))) for X in (Phi, Psi)))
 
 
 def residual_errors(
@@ -425,7 +434,3 @@ def residual_errors(
     if seen_in is not None:
         ops, residual = seen_in, seen_in.restrict(residual)
     return np.diag(ops.gram(residual, inverse(residual))) / (2 * energy)
-
-
-def _squares(ops: Operators, Phi: Array) -> Array:
-    return np.diag(ops.gram(Phi, ops.apply_M(Phi)))

@@ -30,7 +30,7 @@ from rom.fe.operators.memory import give_back
 from rom.fe.operators.petsc import PETScOperators
 from rom.fe.operators.solver import DIRECT_SOLVER, parsed
 from rom.fe.parallel import collective, install_abort_hook, on_root
-from rom.model import Attachment, FEModel, Index, Interface, Material, Orthotropic
+from rom.model import Attachment, FEModel, Index, Material, Orthotropic
 from rom.names import check_known
 
 log = logging.getLogger("rom")
@@ -93,7 +93,14 @@ def model(
     """
     options = _Options(path, material, degree, parameters, tuple(attachments), solver, comm)
     (made,) = _models(options, mesh_options, lambda mesh: {"": mesh}).values()
-    _advise(comm, made.n_dofs)
+    n = made.n_dofs
+    if comm.rank == 0 and comm.size > 1 and n < LEAST_SHARED_DOFS:
+        seconds = reduction_seconds(n, SOME_COORDINATES, SOME_MODES)
+        log.warning(
+            f"{n} dofs are shared by {comm.size} processes; below {LEAST_SHARED_DOFS} one process "
+            f"is faster, and reduces them to {SOME_COORDINATES} interface coordinates and "
+            f"{SOME_MODES} modes in about {max(seconds, 0.1):.1f} s."
+        )
     return made
 
 
@@ -229,31 +236,17 @@ def _model(options: _Options, part: SolidMesh | None, head: _Head) -> FEModel:
     how, why = automatic(made.operators) if method.automatic else (method, options.solver)
     if comm.rank == 0 and how != DIRECT_SOLVER and method.automatic:
         log.info("solved %s", why)
+    interfaces = dict(made.interfaces)
+    for key in head.axes.keys() & interfaces.keys():  # of the CAD, which knows these
+        point, along = np.array(head.axes[key].point), np.array(head.axes[key].direction)
+        interfaces[key] = replace(interfaces[key], origin=point, axis=along)
     provenance = head.origin | made.provenance | {"warnings": remarks, "solver": why}
     return replace(
         made,
         operators=made.operators.solved_by(how),
         provenance=provenance,
-        interfaces={key: _on_axis(x, head.axes.get(key)) for key, x in made.interfaces.items()},
+        interfaces=interfaces,
     )
-
-
-def _advise(comm: MPI.Comm, n: int) -> None:
-    """Say where a model is too small to be shared."""
-    if comm.rank == 0 and comm.size > 1 and n < LEAST_SHARED_DOFS:
-        seconds = reduction_seconds(n, SOME_COORDINATES, SOME_MODES)
-        log.warning(
-            f"{n} dofs are shared by {comm.size} processes; below {LEAST_SHARED_DOFS} one process "
-            f"is faster, and reduces them to {SOME_COORDINATES} interface coordinates and "
-            f"{SOME_MODES} modes in about {max(seconds, 0.1):.1f} s."
-        )
-
-
-def _on_axis(interface: Interface, axis: Axis | None) -> Interface:
-    """The interface with its origin and axis from the CAD where that knows them."""
-    if axis is None:
-        return interface
-    return replace(interface, origin=np.array(axis.point), axis=np.array(axis.direction))
 
 
 @typed

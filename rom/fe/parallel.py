@@ -91,19 +91,14 @@ def _raise_together(comm: MPI.Comm, error: Exception | None) -> None:
             raise error
         return
     meet(comm)
-    first_error = next(
-        (e for e in comm.allgather(_portable(error, comm.rank)) if e is not None), None
-    )
+    told = error
+    if error is not None and not isinstance(error, RomError):  # which travels between processes
+        text = "".join(traceback.format_exception_only(type(error), error)).strip()
+        told = ParallelError(f"rank {comm.rank} failed: {text}", hint="All ranks stop.")
+    first_error = next((e for e in comm.allgather(told) if e is not None), None)
     if first_error is not None:
         first_error.agreed = True  # rank 0 prints for all, see `install_abort_hook`
         raise first_error from error
-
-
-def _portable(error: Exception | None, rank: int) -> RomError | None:
-    if error is None or isinstance(error, RomError):
-        return error
-    text = "".join(traceback.format_exception_only(type(error), error)).strip()
-    return ParallelError(f"rank {rank} failed: {text}", hint="All ranks stop.")
 
 
 def install_abort_hook(comm: MPI.Comm = MPI.COMM_WORLD) -> None:

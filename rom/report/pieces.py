@@ -86,7 +86,7 @@ def _load(solid: GluedSolid, bent: list[str], load: Load) -> Array:
     if load.component > 2:
         moments[bent.index(load.interface), load.component - 3] = load.largest
         return np.r_[np.zeros(solid.n), moments.ravel()]
-    return np.r_[solid.nodal_force(load), moments.ravel()]
+    return np.r_[load.largest * solid.motion(load), moments.ravel()]
 
 
 class _AtRest:

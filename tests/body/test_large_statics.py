@@ -1,18 +1,36 @@
-"""Bodies of large deflection at rest: snap-through, buckling, and loads in space."""
+"""Bodies of large deflection at rest: snaps, buckling, loads in space, a guided leaf, refusals.
+
+A body of large deflection relies on two sets of numbers, those of third and of fourth order. Every
+factor and every index of the few lines that make and contract them is changed here, one at a time,
+and the elastica of a leaf that guides a stage must notice.
+"""
+
+import ast
+import inspect
+import textwrap
+import warnings
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.linalg import eigh, null_space
+from scipy.optimize import brentq
 
 import rom
+import rom.body.nonlinear.ranges
+from cases.beam import elastica, load_at
 from cases.long import COARSE, few
 from cases.mbs.slender import SYMMETRIC, Full, assembled, reduced, slender
 from cases.refusals import refuses
-from rom.errors import ConfigError, InterfaceError, ModelError
+from rom.body.nonlinear import quartic
+from rom.body.nonlinear.quartic import Quartic
+from rom.body.nonlinear.statics import follow
+from rom.errors import ConfigError, InterfaceError, ModelError, RomError, RomWarning
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = COARSE
+
+
 HALF, RISE, HEIGHT, PRESSED = 0.5, 0.03, 0.01, 600.0  # of a clamped arch [m], and its load [N]
 
 
@@ -160,3 +178,219 @@ def test_bodies_of_small_deflection_have_no_such_statics():
     for ask in (body.equilibria, body.critical_loads):
         refuses(ModelError, "small deflection", ask, {"tip": (1.0, 0, 0, 0, 0, 0)})
     refuses(ConfigError, "loads", body.forces_on, {"tip": (1.0, 2.0)})
+
+
+GUIDED = {"tip": "rxryrz"}
+STEEPEST = 0.5  # slope half way [rad]
+RTOL = 3e-3
+
+
+def exact_leaf(slope):
+    """Force times L^2 / EI, deflection and shortening over L of a guided leaf, by its slope.
+
+    Half of it is a cantilever under a force across its end.
+    """
+    load = load_at(slope)
+    _, along, across = elastica(load)
+    return 4 * load, across, 1 - along
+
+
+def stored(slope):
+    """Work of the force on the way, over EI / L."""
+    F, across, _ = np.array([exact_leaf(x) for x in np.linspace(1e-6, slope, 200)]).T
+    return np.sum(0.5 * (F[1:] + F[:-1]) * np.diff(across))
+
+
+@pytest.fixture(scope="module")
+def leaf():
+    """The body, what its energy was made from, and forces and known motions at two slopes."""
+    model, EI = slender(50, 32)
+    made = []
+    whole = Quartic.from_gram.__func__
+
+    def kept(cls, G, r):
+        made.append((G, r))
+        return whole(cls, G, r)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Quartic, "from_gram", classmethod(kept))
+        known = np.array([exact_leaf(slope) for slope in (STEEPEST / 2, STEEPEST)])
+        work = [EI * stored(slope) for slope in (STEEPEST / 2, STEEPEST)]
+        body = reduced(model, (0, known[-1, 0] * EI, 0, 0, 0, 0), n_modes=4, active=4,
+                       fixed=GUIDED, tol=1e-5)  # fmt: skip
+    return body, made[-1], known[:, 0] * EI, np.column_stack([known[:, 1:], work])
+
+
+def guided(leaf, law):
+    """(2, 3) deflection, shortening and energy at rest, the energy by a class."""
+    body, gram, forces, _ = leaf
+    energy = law.from_gram(*gram)
+    along, across = body.marker("tip").translation[:2]
+    q = follow(energy, np.outer(forces, across), body.mean_rows(GUIDED))
+    return np.column_stack([q @ across, -(q @ along), [energy.energy(x) for x in q]])
+
+
+def test_a_guided_leaf_hardens_and_comes_back_as_its_elastica_says(leaf):
+    found = guided(leaf, Quartic)
+    assert_allclose(found, leaf[3], rtol=RTOL)
+    linear = leaf[2] / 12 / leaf[2][0] * exact_leaf(STEEPEST / 2)[0]
+    assert linear[1] / found[1, 0] > 1.08  # a linear leaf is softer
+    slope = brentq(lambda s: exact_leaf(s)[1] - 1e-3, 1e-4, 0.1)
+    assert_allclose(exact_leaf(slope)[2], 0.6e-6, rtol=1e-4)
+
+
+class Change(ast.NodeTransformer):
+    """Changes one place: a factor is doubled or trebled, or an index becomes its neighbour."""
+
+    def __init__(self, which, times):
+        self.left, self.times, self.inside = which, times, 0
+
+    def visit_Subscript(self, node):
+        self.inside += 1
+        node.slice = self.visit(node.slice)
+        self.inside -= 1
+        return node
+
+    def visit_Call(self, node):
+        """Sizes of arrays are left as they are."""
+        return node if getattr(node.func, "id", "") == "entries" else self.generic_visit(node)
+
+    def visit_Name(self, node):
+        if self.inside and node.id in "ijkl" and self.times == 2 and self._here():
+            node.id = "ijkli"["ijkl".index(node.id) + 1]
+        return node
+
+    def visit_Constant(self, node):
+        number = isinstance(node.value, int | float) and not isinstance(node.value, bool)
+        if number and not self.inside and node.value and self.times and self._here():
+            node.value *= self.times
+        return node
+
+    def _here(self):
+        self.left -= 1
+        return self.left == -1
+
+
+def mutants(name):
+    """Laws in which one place of a method is changed, and what that reads like."""
+    method = inspect.getattr_static(Quartic, name)
+    text = textwrap.dedent(inspect.getsource(getattr(method, "__func__", method)))
+    for times in (2, 3):
+        for which in range(200):
+            change = Change(which, times)
+            tree = change.visit(ast.parse(text))
+            if change.left >= 0:
+                break
+            scope = dict(vars(quartic))
+            exec(compile(ast.fix_missing_locations(tree), name, "exec"), scope)
+            yield type("Changed", (Quartic,), {name: scope[name]}), ast.unparse(tree)
+
+
+@pytest.mark.parametrize("name", ["from_gram", "expansion"])
+def test_any_factor_or_index_that_is_wrong_is_noticed(leaf, name):
+    """Newton's method finds other states then, or none."""
+    survived = []
+    for law, text in mutants(name):
+        try:
+            found = guided(leaf, law)
+        except (ModelError, ArithmeticError, LookupError, NameError, ValueError):
+            continue
+        if np.allclose(found, leaf[3], rtol=RTOL, atol=0):
+            survived.append(text)
+    assert not survived, "\n\n".join(survived)
+
+
+@pytest.fixture(scope="module")
+def beam():
+    """A cantilever, its load, and where its finite elements are under it."""
+    model, EI = slender(20, 6)
+    load = np.array([0, EI, 0, 0, 0, 0])
+    return model, load, Full(model).under(load)[6:9]
+
+
+def snapshots(model):
+    """Functions found from one state of bending, in which the section turns."""
+    X = model.interfaces["tip"].points - model.interfaces["tip"].origin
+    return rom.Snapshots(np.cross([0, 0, 0.1], X).reshape(-1, 1), n=6)
+
+
+KINDS = {
+    "rbe3": "rbe3",
+    "full": "full",
+    "affine": rom.Polynomial(1),
+    "square": rom.Polynomial(2),
+    "rigid": "rbe2",
+    "found": snapshots,
+}
+WITH_MODES = (rom.CraigBampton, rom.BalancedTruncation, rom.Herting, rom.Rubin,
+              rom.EnhancedCraigBampton, rom.FreeFree, rom.AssumedModes)  # fmt: skip
+METHODS = {method.__name__: method(n_modes=4) for method in WITH_MODES}
+METHODS |= {"Guyan": rom.Guyan(), "MomentMatching": rom.MomentMatching(order=1)}
+FEW = {("rbe3", name) for name in METHODS} | {(name, "CraigBampton") for name in KINDS}
+
+
+@pytest.mark.parametrize("kind, method", sorted(FEW))
+def test_any_kind_of_interface_and_method_is_right_or_refused_by_name(beam, kind, method):
+    model, load, known = beam
+    of = KINDS[kind](model) if callable(KINDS[kind]) else KINDS[kind]
+    try:
+        body = reduced(model, load, method=METHODS[method], tip=of, active=2, n_steps=2)
+    except RomError as error:
+        assert any(word in str(error) for word in ("interface", "method", "coordinates")), error
+        assert "equilibrium" not in str(error)
+        assert (kind, method) not in {("rbe3", "CraigBampton"), ("affine", "CraigBampton")}
+        return
+    (q,) = body.equilibria({"tip": load})
+    assert_allclose(body.marker("tip").translation @ q, known, rtol=0, atol=1e-2)
+
+
+REFERENCES = ("free", "mean-axis", "buckens", ("root", "tip"), "hub", "")
+
+
+@pytest.mark.parametrize("reference", REFERENCES)
+def test_frames_that_are_no_interface_are_refused(beam, reference):
+    model, load, _ = beam
+    with pytest.raises((ConfigError, InterfaceError), match=r"reference|seen from|hub"):
+        reduced(model, load, method=rom.Guyan(), reference=reference)
+
+
+@pytest.mark.parametrize("size", [30.0, pytest.param(1e3, marks=pytest.mark.long), 1e5])
+@pytest.mark.parametrize("component", range(6))
+def test_a_load_beyond_what_one_body_carries_is_refused_or_fails_its_certificate(component, size):
+    """Whatever it is, the load is named, and what helps; nothing is borne that is not certified."""
+    model, EI = slender(20, 4)
+    load = np.zeros(6)
+    load[component] = size * EI
+    try:
+        options = {"active": 0, "n_steps": 2, "n_shapes": 6, "certify": True}
+        body = reduced(model, load, method=rom.Guyan(), **options)
+    except ModelError as error:
+        assert "of the range" in str(error) and "smaller loads" in str(error)
+        return
+    name = rom.body.nonlinear.ranges.FORCES[component]
+    failed = [row.quantity for row in body.certificate.failures if f"tip {name}" in row.quantity]
+    assert failed
+    table = body.provenance["large deflection"]
+    assert min(case["holds to"] for case in table.values()) < 1.0
+
+
+FAR = [((0, 0, 0, 0, 0, 3.0), 172), ((0, 25.0, 0, 0, 0, 0), 90), ((0, 0, 0, 0, 0, 1.3), 0)]
+
+
+@pytest.mark.parametrize("load, degrees", [*FAR, ((0, 2.0, 0, 0, 0, 0), 0)])
+def test_a_range_that_turns_farther_than_one_body_carries_names_pieces(load, degrees):
+    """A moment as far as M L / EI, a force towards a right angle as the elastica does."""
+    model, EI = slender(40, 5)
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always", RomWarning)
+        reduced(model, EI * np.array(load), n_modes=2, active=2)
+    turns = [str(w.message) for w in said if "turns by" in str(w.message)]
+    assert bool(turns) == bool(degrees)
+    assert all(f"turns by {degrees} degrees" in x and "rom.reduce_pieces" in x for x in turns)
+
+
+def test_models_without_finite_elements_are_refused():
+    model = assembled(cells=(2, 1, 1))
+    bare = rom.FEModel(model.K, model.M, model.points, model.interfaces)
+    with pytest.raises(ConfigError, match="no finite elements"):
+        reduced(bare, (0, 1.0, 0, 0, 0, 0), method=rom.Guyan())

@@ -12,7 +12,6 @@ SHARED_BY = (2, 3) if ROM_LONG else (2,)
 ONCE = (
     "components",
     "faults/test_archive_faults.py",
-    "fe/mesh/test_decks_card_by_card.py",
     "fe/mesh/test_mesh_decks.py",
     "mbs/elements/test_mbs_laws.py",
     "mbs/equations/test_mbs_cache.py",
@@ -33,7 +32,7 @@ LONGEST_FIRST = (
     "faults/test_generated.py",
     "mbs/published/test_mbs_crank.py",
     "mbs/analysis/test_mbs_equilibrium.py",
-    "fe/test_fe_body_mpi.py",
+    "fe/test_fe_mpi.py",
     "faults/test_kills.py",
     "faults/test_geometry_programs.py",
     "faults/test_run_kills.py",

@@ -1,4 +1,4 @@
-"""Moment matching: exact at the frequencies chosen, to twice the order; both implementations."""
+"""Moments, loads inside and balanced modes: exact where asked; both implementations."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ import rom
 from cases.operators import KINDS
 from cases.refusals import refused, refuses
 from cases.solid import block
-from rom.errors import ConfigError, InterfaceError, SolverError
+from rom.errors import ConfigError, InterfaceError, ModelError, ResourceError, SolverError
 from rom.reduction.interfaces.connection import connect
 
 INTERFACES = {"root": "rbe2", "tip": "rbe2"}
@@ -89,9 +89,10 @@ def test_frequencies_are_upper_bounds_and_converge(connection, model):
 
 
 def test_the_body_has_a_certificate(model):
-    method = rom.MomentMatching((0.0, 1500.0), 3)
-    body = rom.reduce(model, method=method, interfaces=INTERFACES)
-    assert body.certificate.ok, body.certificate
+    loaded = rom.WithLoads(rom.CraigBampton(25), pinch(model))
+    for method, kinds in ((rom.MomentMatching((0.0, 1500.0), 3), INTERFACES), (loaded, MIXED)):
+        body = rom.reduce(model, method=method, interfaces=kinds)
+        assert body.certificate.ok, body.certificate
 
 
 def test_enough_moments_are_the_whole_body():
@@ -122,5 +123,159 @@ test_wrong_frequencies_are_refused = refused(
 def test_messages_for_wrong_boundaries(connection):
     method = rom.MomentMatching()
     refuses(ConfigError, "none is given", method.basis, connection.ops, np.zeros(0, dtype=int), ())
-    with pytest.raises(InterfaceError, match="leave a rigid motion free"):
-        method.basis(connection.ops, connection.boundary[:3], ("",) * 3)
+    few, words = connection.boundary[:3], "leave a rigid motion free"
+    refuses(InterfaceError, words, method.basis, connection.ops, few, ("",) * 3)
+
+
+MIXED = {"root": "rbe2", "tip": "polynomial:1"}
+
+
+@pytest.fixture(params=KINDS)
+def mixed(request, model):
+    return connect(request.param(model), model, MIXED)
+
+
+def pinch(model):
+    """Two loads on nodes off the interfaces, and one along a whole row."""
+    F = np.zeros((model.n_dofs, 2))
+    F[3 * 40 + 1, 0], F[3 * 50 + 2, 0] = 1.0, -1.0
+    F[3 * np.arange(30, 60), 1] = 0.3
+    return F
+
+
+def static_error(mixed, method, F):
+    """Error of the static deflection with the root held, relative to the largest one."""
+    ops, root = mixed.ops, mixed.boundary[mixed.parts["root"]]
+    full = ops.hold(root)(F)
+    basis = method.basis(ops, mixed.boundary, mixed.labels)
+    free = np.setdiff1d(np.arange(basis.Psi.shape[1]), mixed.parts["root"])
+    Psi = basis.Psi[:, free]
+    reduced = Psi @ np.linalg.solve(Psi.T @ ops.apply_K(Psi), Psi.T @ F)
+    return np.abs(reduced - full).max() / np.abs(full).max()
+
+
+@pytest.mark.parametrize("method", [rom.Guyan(), rom.CraigBampton(3), rom.MomentMatching((0.0,))])
+def test_statics_under_the_loads_is_exact(mixed, model, method):
+    F = mixed.ops.restrict(pinch(model))
+    assert static_error(mixed, method, F) > 1e-4
+    assert static_error(mixed, rom.WithLoads(method, pinch(model)), F) < 1e-9
+
+
+def test_gravity_is_a_load(mixed):
+    F = mixed.ops.apply_M(mixed.ops.rigid[:, :3])
+    assert static_error(mixed, rom.Guyan(), F) > 1e-3
+    assert static_error(mixed, rom.WithLoads(rom.Guyan()), F) < 1e-9
+
+
+def test_restrict_is_the_adjoint_of_expand(mixed, model):
+    rng, ops = np.random.default_rng(2), mixed.ops
+    a, F = rng.normal(size=(ops.n, 3)), rng.normal(size=(model.n_dofs, 2))
+    assert_allclose(ops.expand(a).T @ F, a.T @ ops.restrict(F), rtol=1e-10)
+
+
+def test_what_the_basis_knows_is_not_added_again(mixed, model):
+    method = rom.WithLoads(rom.WithLoads(rom.CraigBampton(4), pinch(model)), pinch(model))
+    basis = method.basis(mixed.ops, mixed.boundary, mixed.labels)
+    assert sum(label.startswith("load") for label in basis.labels) == 2
+    assert basis.omega.size == 4
+    assert basis.labels[-4:] == tuple(f"fixed-interface {k}" for k in (1, 2, 3, 4))
+
+
+@pytest.mark.parametrize(
+    ("method", "loads", "words"),
+    [
+        (rom.Guyan(), "wind", "the only word known"),
+        (rom.Guyan(), np.zeros((5, 1)), r"shape \(5, 1\)"),
+        (rom.Guyan(), np.full((297, 1), np.nan), "finite forces"),
+        (rom.FreeFree(3), "gravity", "has no constraint modes"),
+    ],
+)
+def test_messages(mixed, method, loads, words):
+    basis = rom.WithLoads(method, loads).basis
+    refuses(ConfigError, words, basis, mixed.ops, mixed.boundary, mixed.labels)
+
+
+def chain(n=12):
+    K = 1e6 * (2 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1))
+    M = np.diag(np.random.default_rng(0).uniform(0.5, 2.0, n))
+    B = np.zeros((n, 1))
+    B[3] = 1.0
+    return K, M, 1e-4 * K + 0.1 * M, B, B.T
+
+
+def response(K, M, D, B, C, s):
+    return (C @ np.linalg.solve(K + 1j * s * D - s**2 * M, B))[0, 0]
+
+
+def test_one_oscillator_has_the_singular_value_of_its_impulse_response():
+    """The integral of its square is b^2 / (4 zeta omega^3)."""
+    omega, zeta = 100.0, 0.05
+    found = rom.second_order_balanced_truncation(
+        [[omega**2]], [[1.0]], [[2 * zeta * omega]], [[3.0]], [[2.0]], 1
+    )
+    assert_allclose(found.singular_values, 3.0 * 2.0 / (4 * zeta * omega**3), rtol=1e-10)
+    assert_allclose(found.K, omega**2)
+    assert_allclose(found.C @ found.B, 6.0)
+
+
+def test_light_damping_separates_the_modes():
+    omega, zeta = np.array([100.0, 250.0, 700.0, 2000.0]), 0.001
+    b, c = np.array([[1.0], [2.0], [0.5], [3.0]]), np.array([[1.0, 0.3, 2.0, 1.0]])
+    found = rom.second_order_balanced_truncation(
+        np.diag(omega**2), np.eye(4), np.diag(2 * zeta * omega), b, c, 4
+    )
+    exact = np.sort(b[:, 0] * c[0] / (4 * zeta * omega**3))[::-1]
+    assert_allclose(found.singular_values, exact, rtol=1e-4)
+
+
+def test_the_response_converges_and_is_exact_with_all_coordinates():
+    system, grid = chain(), np.linspace(10.0, 2500.0, 100)
+    full = np.array([response(*system, s) for s in grid])
+    worst = []
+    for r in (2, 6, 8, 10, 12):
+        f = rom.second_order_balanced_truncation(*system, r)
+        ours = np.array([response(f.K, f.M, f.D, f.B, f.C, s) for s in grid])
+        worst.append(np.abs(ours - full).max() / np.abs(full).max())
+        assert np.linalg.eigvals(f.K).real.min() > 0.0
+    assert (np.diff(worst) < 0).all()
+    assert worst[3] < 1e-5
+    assert worst[4] < 1e-11
+
+
+@pytest.mark.parametrize("make", KINDS)
+def test_frequencies_of_a_body_are_upper_bounds_and_statics_is_exact(make):
+    model = block(cells=(10, 2, 2))
+    connection = connect(make(model), model, INTERFACES)
+    ops = connection.ops
+    basis = rom.BalancedTruncation(6, pool=40).basis(ops, connection.boundary, connection.labels)
+    K, M = (ops.gram(basis.Psi, A(basis.Psi)) for A in (ops.apply_K, ops.apply_M))
+    inner = slice(12, 18)
+    assert np.abs(K[:12, inner]).max() < 1e-8 * np.abs(np.diag(K)).max()
+    exact, _ = ops.modes(connection.boundary, 6)
+    assert (basis.omega >= exact * (1 - 1e-9)).all()
+    assert_allclose(np.sqrt(np.diag(K)[inner]), basis.omega, rtol=1e-8)
+    assert_allclose(M[inner, inner], np.eye(6), atol=1e-9)
+
+
+def test_modes_that_interfaces_neither_move_nor_feel_leave_first():
+    """The pool in its own order, judged by what interfaces see: the sum of participations grows."""
+    model = block(cells=(10, 2, 2))
+    body, modal = (
+        rom.reduce(model, method=method, interfaces=INTERFACES, certify=False)
+        for method in (rom.BalancedTruncation(6, pool=40), rom.CraigBampton(6))
+    )
+    seen = [b.effective_mass(fixed=tuple(INTERFACES)).sum() for b in (body, modal)]
+    assert seen[0] > seen[1]
+
+
+def truncated(K, M, D, r=1):
+    rom.second_order_balanced_truncation(K, M, D, np.ones((len(K), 1)), np.ones((1, len(K))), r)
+
+
+test_wrong_systems_are_refused = refused(
+    (lambda: truncated(np.eye(2), np.eye(2), np.zeros((2, 2))), ModelError, "not stable"),
+    (lambda: truncated(np.eye(2), np.eye(3), np.eye(2)), ConfigError, "M has shape"),
+    (lambda: truncated(*[np.eye(2)] * 3, r=3), ConfigError, "r = 3"),
+    (lambda: truncated(*[np.eye(601)] * 3), ResourceError, "above 600"),
+    (lambda: truncated(*[np.eye(2)] * 3, r=2), ConfigError, "only 1 coordinates"),
+)

@@ -1,5 +1,6 @@
-"""From a model to a certified body: interfaces, reference conditions, integrals."""
+"""From a model to a certified body: interfaces, reference conditions, integrals, evidence."""
 
+import ast
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,8 @@ from scipy.linalg import eigh, null_space
 from scipy.sparse import diags
 
 import rom
+from cases.files import border_calls as made
+from cases.paths import ROOT
 from cases.refusals import refuses
 from cases.solid import block, reduced
 from rom.body.reference import rigid_elastic, rigid_mass
@@ -17,6 +20,7 @@ from rom.eigen.verbs import mean_motion, rigid_motions
 from rom.errors import ConfigError, InterfaceError, MaterialError, ModelError
 from rom.reduction.full_model import operators
 from rom.reduction.interfaces.connection import connect
+from rom.rows import N_COMPARED
 
 KINDS = {"root": "rbe2", "tip": "rbe2"}
 SUPPORTS = [(), ("root",), ("tip",)]
@@ -358,3 +362,68 @@ def test_operators_without_geometry_are_told_what_they_lack(model):
         lambda: rom.reduce(blind, method=rom.CraigBampton(2), interfaces=KINDS),
     ):
         refuses(ModelError, "do not know its rigid motions", ask)
+
+
+CB = rom.CraigBampton(12)
+
+
+def bodies():
+    return {name: rom.reduce(model, method=CB, interfaces=made.KINDS)
+            for name, model in (("a", made.model()), ("b", made.behind()))}  # fmt: skip
+
+
+def family():
+    E = rom.YoungsModulus("web", 0.9, 1.1)
+    return rom.reduce_parametric(made.regions(), parameters={"E": E}, method=CB, tol=0.1,
+                                 interfaces=made.KINDS)  # fmt: skip
+
+
+LIGHT = {  # class -> one of them
+    "Assembly": lambda: rom.Assembly(bodies(), made.TOGETHER),
+    "BodyFamily": family,
+    "CondensedAssembly": lambda: rom.Assembly(bodies(), made.TOGETHER).reduced(3),
+    "DualAssembly": lambda: rom.DualAssembly(made.free(), made.TOGETHER),
+    "FlexibleBody": lambda: bodies()["a"],
+    "FreeSubstructure": lambda: made.free()["a"],
+    "MistunedWheel": made.mistuned,
+}
+FROM_FINITE_ELEMENTS = {
+    "BladedWheel": made.bladed,
+    "ReducedSector": lambda: rom.reduce_sector(made.wheel().sector, n_modes=N_COMPARED),
+    "ReducedSpinUp": made.reduced_run_up,
+    "SubstructuredSector": lambda: made.wheel().parts,
+}
+CASES = [*LIGHT.items()] + [
+    pytest.param(
+        *case, marks=[pytest.mark.fenicsx, pytest.mark.skipif(not made.FENICSX, reason="")]
+    )
+    for case in FROM_FINITE_ELEMENTS.items()
+]
+
+
+@pytest.mark.filterwarnings("ignore::rom.errors.RomWarning")
+@pytest.mark.filterwarnings("ignore:Number of integration points")
+@pytest.mark.parametrize(("name", "make"), CASES)
+def test_what_was_reduced_says_how_far_to_trust_it(name, make):
+    reduced = make()
+    report = reduced.certificate
+    assert type(reduced).__name__ == name and isinstance(report, rom.Report)
+    words = [row.quantity for row in report.rows]
+    for said in ("worst error of", "reduced never below full"):  # of frequency_rows
+        assert any(said in quantity for quantity in words), f"{said}: {words}"
+    assert all(np.isfinite(row.value) and row.limit for row in report.rows)
+    assert report.ok == all(row.ok for row in report.rows)
+    assert str(report).startswith(f"{report.title}: {'ok' if report.ok else ''}")
+
+
+def test_every_class_with_a_certificate_is_tried_here():
+    found = set()
+    for path in (ROOT / "rom").rglob("*.py"):
+        for node in ast.parse(path.read_text()).body:
+            names = [getattr(getattr(one, "target", one), "id", getattr(one, "name", ""))
+                     for one in getattr(node, "body", ())]  # fmt: skip
+            if isinstance(node, ast.ClassDef) and "certificate" in names:
+                found.add(node.name)
+    found.remove("Pieces")  # certified on demand: tests/assembly/test_pieces.py
+    base = {"SubstructuredSector": "ReducedSector", "FlexibleBody": "BodyData"}
+    assert found == {base.get(name, name) for name in (*LIGHT, *FROM_FINITE_ELEMENTS)}

@@ -144,7 +144,10 @@ class HeldSolid:
             u, soft = self.T @ a, self.softness(a, W)
             if soft is None:
                 return None
-            gap = self.T.T @ (self._pushed(u, W) - self.solid.force(u))
+            pushed = W[: u.size].copy()
+            for section, moment in self._moments(u, W):
+                pushed[section.dofs] += section.force(section.covariance(u), moment)
+            gap = self.T.T @ (pushed - self.solid.force(u))
             step = soft(np.r_[gap, -self.C @ a])
             a, size = a + step, np.linalg.norm(step)
             if not np.isfinite(size):
@@ -152,13 +155,6 @@ class HeldSolid:
             if size <= INCREMENT_RTOL * np.linalg.norm(a):
                 return a
         return None
-
-    def _pushed(self, u: Array, W: Array) -> Array:
-        """(n,) nodal forces of a load at a displacement (n,)."""
-        found = W[: u.size].copy()
-        for section, moment in self._moments(u, W):
-            found[section.dofs] += section.force(section.covariance(u), moment)
-        return found
 
     def _moments(self, u: Array, W: Array | None) -> Iterator[tuple[TurningSection, Array]]:
         """Each section, and the moment on it."""

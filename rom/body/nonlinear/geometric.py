@@ -35,6 +35,7 @@ from rom.body.nonlinear.ranges import (
     nodal_forces,
 )
 from rom.body.nonlinear.statics import Held, free_motions, newton, passages
+from rom.body.recovery import with_elements
 from rom.eigen.connection import Connection, Tie
 from rom.eigen.verbs import (
     Operators,
@@ -172,12 +173,13 @@ def _refuse(bent: Bent) -> None:
     """Say what does not go together with large deflection."""
     geometric, model, connection = bent.geometric, bent.model, bent.connection
     basis, reference = bent.basis, bent.reference
-    if model.stresses is None:
-        raise ConfigError(
-            "the model has no finite elements, from which alone large strain follows.",
-            hint="Make it with rom.fe.model.",
-        )
-    if basis.held is None or not _held_modes(connection.ops, basis):
+    with_elements(model, "large strain")
+    modes_held = basis.held is not None
+    if modes_held and basis.omega.size:
+        K = quadratic(connection.ops, connection.ops.apply_K, _normal(basis))
+        expected = np.diag(basis.omega**2)
+        modes_held = bool(np.abs(K - expected).max() <= HELD_RTOL * expected.max())
+    if not modes_held:
         raise ConfigError(
             "large deflection takes constraint modes and modes with the interfaces held, which "
             "this method has not.",
@@ -225,16 +227,8 @@ def _turns(tie: Tie, interface: Interface) -> bool:
     return bool(np.linalg.norm(missed) <= AFFINE_RTOL * np.linalg.norm(affine))
 
 
-def _held_modes(ops: Operators, basis: Basis) -> bool:
-    """Whether the last columns are modes with the interfaces held, orthonormal in the mass."""
-    if not basis.omega.size:
-        return True
-    K, expected = quadratic(ops, ops.apply_K, _normal(basis)), np.diag(basis.omega**2)
-    return bool(np.abs(K - expected).max() <= HELD_RTOL * expected.max())
-
-
 def _normal(basis: Basis) -> Array:
-    """(n_local, m) the modes of a basis, its last columns."""
+    """(n_local, m) the modes of a basis with the interfaces held, its last columns."""
     return basis.Psi[:, basis.Psi.shape[1] - basis.omega.size :]
 
 

@@ -25,12 +25,7 @@ MAX_POINTS = 400  # of a path between two loads
 
 
 class Held(Energy):
-    """The strain energy of a body with some of its motions held.
-
-    Args:
-        whole: energy of all coordinates q (r,).
-        N: (r, m) motions that are left, q = N y.
-    """
+    """The strain energy of a body with motions N (r, m) left of all its coordinates, q = N y."""
 
     def __init__(self, whole: Energy, N: Array):
         self.whole, self.N, self.K = whole, N, N.T @ whole.K @ N

@@ -80,14 +80,10 @@ def _surface_mass(V: fem.FunctionSpace, facets: Integers, nodes: Index) -> csr_m
     keep = (values != 0.0) & (rows % 3 == 0)
     comm = V.mesh.comm
     i, j, values = (gathered(comm, part[keep]) for part in (rows // 3, columns // 3, values))
-    i, j = _positions(nodes, i), _positions(nodes, j)
+    order = np.argsort(nodes)
+    i, j = (order[np.searchsorted(nodes[order], numbers)] for numbers in (i, j))
     S = csr_matrix((values, (i, j)), shape=(nodes.size, nodes.size))
     return 0.5 * (S + S.T)
-
-
-def _positions(nodes: Index, numbers: Integers) -> Integers:
-    order = np.argsort(nodes)
-    return order[np.searchsorted(nodes[order], numbers)]
 
 
 def outer_surface(V: fem.FunctionSpace, points: Array, degree: int) -> SurfaceMesh:

@@ -83,7 +83,10 @@ class Stresses:
         cell of this rank. Returned are means (s, width, k), and number of the node, group, and
         number of cells of each of the s pairs, node by node; equal on all ranks.
         """
-        cells, table = self._cells_at(nodes)
+        local = cell_dofs(self.V)[: self.n_cells]
+        table = to_global(self.V.dofmap.index_map, local.ravel()).reshape(local.shape)
+        touching = np.isin(table, nodes).any(axis=1)
+        cells, table = np.flatnonzero(touching).astype(np.int32), table[touching]
         X = reference_points(self.V)
         order = self._order(cells, X)
         place = np.full(self.V.dofmap.index_map.size_global, -1)
@@ -191,13 +194,6 @@ class Stresses:
         for column in U.T:
             give_own(u, column)
             yield evaluated(expression, self.mesh, cells).reshape(cells.size, len(X), width)
-
-    def _cells_at(self, nodes: Index) -> tuple[Integers, Index]:
-        """Cells of this rank that touch the nodes, and the global numbers of their nodes."""
-        local = cell_dofs(self.V)[: self.n_cells]
-        table = to_global(self.V.dofmap.index_map, local.ravel()).reshape(local.shape)
-        touching = np.isin(table, nodes).any(axis=1)
-        return np.flatnonzero(touching).astype(np.int32), table[touching]
 
     def _order(self, cells: Integers, X: Array) -> Index:
         """(cells, k) which evaluated point is which node: edges may run either way."""

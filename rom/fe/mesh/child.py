@@ -24,7 +24,7 @@ from rom.errors import (
     in_file,
 )
 from rom.fe import GMSH_LIBRARIES
-from rom.fe.mesh.solid import GEOMETRIES, Notes, Read, Request
+from rom.fe.mesh.solid import GEOMETRIES, Read, Request
 from rom.fe.mesh.sources.builder import unmeshable
 from rom.process import child
 from rom.process.memory import total_bytes
@@ -157,11 +157,15 @@ def main(folder: str) -> None:
     request = json.loads(Path(folder, "request.json").read_text())
     try:
         arrays, notes = read(request)
-    except (RomError, MemoryError) as error:
-        _answer(folder, _described(error))
-        return
-    np.savez(Path(folder, "arrays.npz"), **arrays)
-    _answer(folder, notes)
+        np.savez(Path(folder, "arrays.npz"), **arrays)
+    except MemoryError:
+        notes = {"error": MemoryError.__name__}
+    except RomError as error:  # what the parent needs to raise it again
+        notes = {name: getattr(error, name) for name in ("message", "where", "hint")}
+        notes["error"] = type(error).__name__
+    part = Path(folder, "answer.part")
+    part.write_text(json.dumps(notes))
+    part.rename(Path(folder, "answer.json"))
 
 
 def read(request: Request) -> Read:
@@ -190,20 +194,6 @@ def read(request: Request) -> Read:
         raise FileFormatError(
             f"is not a readable {request['reader']} file ({type(error).__name__}: {error})."
         ) from error
-
-
-def _described(error: RomError | MemoryError) -> dict[str, str]:
-    """What the parent needs to raise the error again."""
-    if isinstance(error, MemoryError):
-        return {"error": MemoryError.__name__}
-    told = {name: getattr(error, name) for name in ("message", "where", "hint")}
-    return {"error": type(error).__name__, **told}
-
-
-def _answer(folder: str, notes: Notes) -> None:
-    part = Path(folder, "answer.part")
-    part.write_text(json.dumps(notes))
-    part.rename(Path(folder, "answer.json"))
 
 
 if __name__ == "__main__":

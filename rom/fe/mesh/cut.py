@@ -23,18 +23,9 @@ def cut(
     """{name: piece} of a mesh, cut into n along an axis, or by its regions.
 
     Where two pieces meet both have the surface, of one name: "cut 1" between the pieces "1" and
-    "2" of an axis, "hub-blade" between two regions.
-
-    Args:
-        mesh: the whole, in layers of cells where it is cut by planes.
-        n: number of pieces of about equal length, cut between layers of cells.
-        axis: (3,) direction of the cuts' normal [1]; None to make a piece of each region.
-
-    Raises:
-        ConfigError: for n or axis without the other, or out of range.
-        MeshError: if there are fewer layers than pieces, or they are not flat.
-        TagError: if there is one region only, a cut crosses a named surface, or a surface has the
-            name of a cut.
+    "2" of an axis, "hub-blade" between two regions. Pieces along an axis (3,) are about equally
+    long, and cut between layers of cells, which must be flat there; no cut may cross a named
+    surface.
     """
     normal = None if axis is None else finite("axis", axis, (3,))
     if (n is None) != (normal is None) or (normal is not None and not normal.any()):

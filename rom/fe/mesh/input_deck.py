@@ -78,11 +78,9 @@ def _of_degree(mesh: SolidMesh, degree: int) -> SolidMesh:
     whole("degree", degree, 1, 2, reason="decks have such elements")
     if degree == 1 and mesh.cell_type == "tet10":
         raise MeshError("the mesh has curved edges, which need degree=2.")
-    return _with_edges(mesh) if degree == 2 and mesh.cell_type == "tet4" else mesh
-
-
-def _with_edges(mesh: SolidMesh) -> SolidMesh:
-    """The same cells with a node amid each edge, numbered behind the corners."""
+    if degree == 1 or mesh.cell_type == "tet10":
+        return mesh
+    # a node amid each edge, numbered behind the corners
     supports = np.array(CELL_TYPES["tet10"].supports[4:])
     edges = np.sort(mesh.cells[:, supports], axis=2).reshape(-1, 2)
     ends, place = np.unique(edges, axis=0, return_inverse=True)

@@ -44,13 +44,9 @@ class Pick:
 
 
 def picks(wanted: object) -> tuple[Pick, ...]:
-    """What a face is picked by.
+    """What a face is picked by: text as above, a number, a point (3), a box (6), or a list of all.
 
-    Args:
-        wanted: text as above; or a number, a point (3), a box (6), or a list of all these.
-
-    Raises:
-        ConfigError: if it is none of them.
+    ConfigError where it is none of them.
     """
     if isinstance(wanted, str):
         return tuple(_of_text(part.strip(), wanted) for part in PLUS_PATTERN.split(wanted))

@@ -26,16 +26,13 @@ def check_shape(mesh: SolidMesh) -> list[str]:
     refuse_cells(
         mesh,
         np.abs(sampled) < FLAT_CELL_RTOL,
-        lambda k: f"{k} cells have no volume (quality {np.abs(sampled).min():.2g})",
+        f"cells have no volume (quality {np.abs(sampled).min():.2g})",
         "Mesh again; see gmsh's Mesh.Optimize.",
     )
     refuse_cells(
         mesh,
         quality < -FLAT_CELL_RTOL,
-        lambda k: (
-            f"{k} cells are inverted: the Jacobian changes sign inside "
-            f"(quality {quality.min():.2g})"
-        ),
+        f"cells are inverted: the Jacobian changes sign inside (quality {quality.min():.2g})",
         "Mid-side nodes are too far out or corners are crossed; use smaller elements, straight "
         "edges, or Mesh.HighOrderOptimize of gmsh.",
     )

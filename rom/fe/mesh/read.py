@@ -128,7 +128,12 @@ def read_mesh(  # noqa: PLR0913  limits and trust beside what is read
         mesh = mesh if order else without_middles(mesh)
         remarks = [*remarks, *straightened]
     if reader == "step" and scale != 1.0:
-        remarks = [*remarks, _scaled_twice(mesh.size, scale)]
+        twice = (
+            f"a STEP file says its own unit and was read in metres, {mesh.size / scale:.4g} m "
+            f"long; scale={scale:g} on top makes it {mesh.size:.4g} m. Leave scale out unless the "
+            "file is wrong."
+        )
+        remarks = [*remarks, twice]
     return checked(mesh, remarks)
 
 
@@ -199,42 +204,23 @@ def read_triangles(
     u, v = X[T[:, 1]] - X[T[:, 0]], X[T[:, 2]] - X[T[:, 0]]
     T = np.where((u[:, 0] * v[:, 1] < u[:, 1] * v[:, 0])[:, None], T[:, ::-1], T)
     sides = _tables(arrays, "facets", notes["facet_names"])
-    curves = {name: _with_solid_on_left(rows, T) for name, rows in sides.items()}
+    n, curves = T.max() + 1, {}
+    there = np.concatenate([n * T[:, k] + T[:, (k + 1) % 3] for k in range(3)])
+    for name, rows in sides.items():  # the solid on the left
+        known = np.isin(n * rows[:, 0] + rows[:, 1], there)
+        curves[name] = np.where(known[:, None], rows, rows[:, ::-1])
     surfaces = _tables(arrays, "surface", notes["surface_names"])
     return FlatMesh(X, T, curves, surfaces, provenance | notes["provenance"])
-
-
-def _with_solid_on_left(sides: Index, T: Index) -> Index:
-    """Sides (k, 2) turned as in the triangles that have them."""
-    n = T.max() + 1
-    there = np.concatenate([n * T[:, k] + T[:, (k + 1) % 3] for k in range(3)])
-    known = np.isin(n * sides[:, 0] + sides[:, 1], there)
-    return np.where(known[:, None], sides, sides[:, ::-1])
-
-
-def _scaled_twice(size: float, scale: float) -> str:
-    return (
-        f"a STEP file says its own unit and was read in metres, {size / scale:.4g} m long; "
-        f"scale={scale:g} on top makes it {size:.4g} m. Leave scale out unless the file is wrong."
-    )
 
 
 def to_dolfinx(
     mesh: SolidMesh | None, comm: "MPI.Comm"
 ) -> "tuple[Mesh, MeshTags, dict[str, MeshTags]]":
-    """Share a mesh among the ranks.
+    """Share the mesh of rank 0, checked if it was not, among the ranks, which all must call.
 
-    Args:
-        mesh: on rank 0; what other ranks give is ignored. One that was not checked is checked.
-        comm: communicator; all its ranks must call.
-
-    Returns:
-        The dolfinx mesh, MeshTags with the region number of each cell, and MeshTags of the facets
-        of each named surface. Node i of the dolfinx mesh on this rank is node
-        ``geometry.input_global_indices[i]`` of the record.
-
-    Raises:
-        MeshError, TagError: on all ranks.
+    Returned are the dolfinx mesh, MeshTags with the region number of each cell, and MeshTags of the
+    facets of each named surface. Node i of the dolfinx mesh on this rank is node
+    ``geometry.input_global_indices[i]`` of the record. Errors are raised on all ranks.
     """
     from rom.fe.compat import create_mesh, gmsh_order, tag_entities
     from rom.fe.parallel import on_root

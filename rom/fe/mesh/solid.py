@@ -1,6 +1,6 @@
 """The record of a solid mesh: plain NumPy arrays, on one process."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NotRequired, TypedDict
 
@@ -90,11 +90,11 @@ def shown(some: Sequence[object] | Index) -> str:
     return ", ".join(map(str, some[:MAX_SHOWN])) + (", ..." if len(some) > MAX_SHOWN else "")
 
 
-def refuse_cells(mesh: SolidMesh, bad: Mask, text: Callable[[int], str], hint: str) -> None:
-    """Raise a MeshError when any cell is bad, with their number and the first few."""
+def refuse_cells(mesh: SolidMesh, bad: Mask, what: str, hint: str = "") -> None:
+    """Raise a MeshError when any cell is bad: how many, what is wrong, and the first few."""
     cells = np.flatnonzero(bad)
     if cells.size:
-        raise MeshError(f"{text(cells.size)}: cells {cell_names(mesh, cells)}.", hint=hint)
+        raise MeshError(f"{cells.size} {what}: cells {cell_names(mesh, cells)}.", hint=hint)
 
 
 class Request(TypedDict):

@@ -65,21 +65,18 @@ def faces_of(cells: Index, kind: CellType, n_points: int) -> Faces:
     )
 
 
-def parts_by_face(faces: Faces) -> tuple[int, Index]:
-    """Number of parts whose cells hang together through faces, and the part of each cell."""
-    m, f = faces.of_cell.shape
-    return _parts(np.repeat(np.arange(m), f), faces.of_cell.ravel(), m)
+def parts(touched: Index) -> tuple[int, Index]:
+    """Number of parts that hang together, and the part of each cell.
+
+    Through faces or nodes (m, k) that the cells touch.
+    """
+    return parts_of(np.repeat(np.arange(len(touched)), touched.shape[1]), touched.ravel())
 
 
-def parts_by_node(corners: Index) -> tuple[int, Index]:
-    """Number of parts that share no node at all, and the part of each cell."""
-    m, c = corners.shape
-    return _parts(np.repeat(np.arange(m), c), corners.ravel(), m)
-
-
-def _parts(cell: Index, item: Index, m: int) -> tuple[int, Index]:
-    """Components of the graph whose edges join cells to the faces or nodes they touch."""
+def parts_of(cell: Index, item: Index) -> tuple[int, Index]:
+    """The same of cells (e,), all of them among these, that touch items (e,)."""
     used, item = np.unique(item, return_inverse=True)
+    m = int(cell.max(initial=-1)) + 1
     n = m + used.size
     graph = coo_matrix((np.ones(cell.size, dtype=np.int8), (cell, m + item)), shape=(n, n))
     count, label = connected_components(graph, directed=False)

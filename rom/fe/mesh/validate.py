@@ -16,7 +16,7 @@ from rom.fe.mesh.cell_types import CELL_TYPES
 from rom.fe.mesh.quality import check_shape
 from rom.fe.mesh.repair import repair
 from rom.fe.mesh.solid import SolidMesh, cell_names, refuse_cells, shown
-from rom.fe.mesh.topology import Faces, faces_of, parts_by_face, parts_by_node, row_ids
+from rom.fe.mesh.topology import Faces, faces_of, parts, row_ids
 from rom.names import check_text, named
 from rom.plausible import SIZE, far_doubt
 
@@ -25,18 +25,9 @@ COINCIDENT_RTOL = 1e-9  # of the mesh's size
 
 
 def validate(mesh: SolidMesh) -> list[str]:
-    """Check that a mesh is one solid of valid cells with valid names.
+    """Check that a mesh, repaired, is one solid of valid cells with valid names.
 
-    Args:
-        mesh: as read, after `rom.fe.mesh.repair.repair`.
-
-    Returns:
-        Warnings: what is legal, but a careful user wants to know.
-
-    Raises:
-        MeshError: numbers out of range or not finite, degenerate, doubled, flat, inverted or
-            overlapping cells, several bodies, parts that meet only in an edge or a point.
-        TagError: a surface whose facets are not faces of the cells, a region without cells.
+    Returned are warnings of what is legal, but a careful user wants to know.
     """
     for check in (_check_names, _check_tables, _check_numbers, _check_cells):
         check(mesh)
@@ -46,7 +37,12 @@ def validate(mesh: SolidMesh) -> list[str]:
     _check_connected(mesh, faces)
     _check_facets(mesh, faces)
     _check_regions(mesh)
-    return [*warnings, *_slits(mesh, faces), *_doubts(mesh)]
+    if same := _coincident_nodes(mesh, faces):
+        warnings.append(
+            f"{same} nodes of the surface lie at the same place as another: the body has a slit of "
+            "no width there. Merge the nodes if that is not meant."
+        )
+    return [*warnings, *_doubts(mesh)]
 
 
 def _check_tables(mesh: SolidMesh) -> None:
@@ -73,7 +69,7 @@ def _check_tables(mesh: SolidMesh) -> None:
 def _check_numbers(mesh: SolidMesh) -> None:
     n = mesh.points.shape[0]
     outside = ((mesh.cells < 0) | (mesh.cells >= n)).any(axis=1)
-    refuse_cells(mesh, outside, lambda k: f"{k} cells name nodes outside 0 to {n - 1}", "")
+    refuse_cells(mesh, outside, f"cells name nodes outside 0 to {n - 1}")
     bad = ~np.isfinite(mesh.points).all(axis=1)
     if bad.any():
         where, cells = mesh.points[bad.argmax()], np.flatnonzero(bad[mesh.cells].any(axis=1))
@@ -94,14 +90,14 @@ def _check_cells(mesh: SolidMesh) -> None:
     refuse_cells(
         mesh,
         (ordered[:, 1:] == ordered[:, :-1]).any(axis=1),
-        lambda k: f"{k} cells use a node twice",
+        "cells use a node twice",
         "Collapsed cells have no volume; mesh again.",
     )
     number, _ = row_ids(np.sort(mesh.corners, axis=1), mesh.points.shape[0])
     refuse_cells(
         mesh,
         np.bincount(number)[number] > 1,
-        lambda k: f"{k} cells have the same corners as another one",
+        "cells have the same corners as another one",
         "Part of the body is there twice; remove the copy.",
     )
 
@@ -110,7 +106,7 @@ def _check_faces(mesh: SolidMesh, faces: Faces) -> None:
     refuse_cells(
         mesh,
         (faces.count[faces.of_cell] > 2).any(axis=1),
-        lambda k: f"{k} cells share a face with more than one other cell",
+        "cells share a face with more than one other cell",
         "Cells overlap; fragment the volumes in the geometry.",
     )
     # at an inner face the two directions cancel when the cells lie on opposite sides
@@ -120,16 +116,16 @@ def _check_faces(mesh: SolidMesh, faces: Faces) -> None:
     refuse_cells(
         mesh,
         folded[faces.of_cell].any(axis=1),
-        lambda k: f"{k} cells lie on the same side of a common face: the mesh is folded",
+        "cells lie on the same side of a common face: the mesh is folded",
         "Mesh again with smaller elements, or repair the geometry.",
     )
 
 
 def _check_connected(mesh: SolidMesh, faces: Faces) -> None:
-    n_parts, part = parts_by_face(faces)
+    n_parts, part = parts(faces.of_cell)
     if n_parts == 1:
         return
-    n_loose = parts_by_node(mesh.corners)[0]
+    n_loose = parts(mesh.corners)[0]
     sizes = shown(np.sort(np.bincount(part))[::-1])
     if n_loose == 1:
         why, hint = "meet only in an edge or a point, like a hinge", "Let the parts share faces."
@@ -149,16 +145,6 @@ def _coincident_nodes(mesh: SolidMesh, faces: Faces) -> int:
     skin = np.unique(faces.corners[faces.count == 1])
     tree = cKDTree(mesh.points[skin])
     return int(np.unique(tree.query_pairs(COINCIDENT_RTOL * mesh.size, output_type="ndarray")).size)
-
-
-def _slits(mesh: SolidMesh, faces: Faces) -> list[str]:
-    same = _coincident_nodes(mesh, faces)
-    if not same:
-        return []
-    return [
-        f"{same} nodes of the surface lie at the same place as another: the body has a slit of no "
-        "width there. Merge the nodes if that is not meant."
-    ]
 
 
 def _doubts(mesh: SolidMesh) -> list[str]:

@@ -90,16 +90,11 @@ def without_zeros(A: PETSc.Mat) -> PETSc.Mat:
 def chosen(dofs: Index, n: int, comm: MPI.Comm) -> PETSc.IS:
     """Rows of this rank, by number, that a submatrix takes from one of n rows."""
     rows = PETSc.IS().createGeneral(dofs.astype(PETSc.IntType), comm=comm)
-    if n % 3 == 0 and _whole_nodes(dofs, comm):
+    whole = dofs.size % 3 == 0 and bool((dofs[::3] % 3 == 0).all())
+    whole = whole and all(bool((dofs[a::3] == dofs[::3] + a).all()) for a in (1, 2))
+    if n % 3 == 0 and comm.allreduce(whole, op=MPI.LAND):
         rows.setBlockSize(3)  # multigrid then aggregates nodes
     return rows
-
-
-def _whole_nodes(dofs: Index, comm: MPI.Comm) -> bool:
-    """True when, on every rank, the dofs are all three of their nodes."""
-    mine = dofs.size % 3 == 0 and bool((dofs[::3] % 3 == 0).all())
-    mine = mine and all(bool((dofs[a::3] == dofs[::3] + a).all()) for a in (1, 2))
-    return bool(comm.allreduce(mine, op=MPI.LAND))
 
 
 def gathered(A: PETSc.Mat) -> csr_matrix:

@@ -44,8 +44,9 @@ class HeldPETSc(HeldBody):
         super().__init__(ops, held, shift)
         self.factorable = not ops.solver.out_of_core
         if self.n_free:
-            if ops.solver.iterative:
-                self._refuse_loose()
+            R = ops.rigid if ops.solver.iterative else None  # which would only run on
+            if R is not None and np.linalg.matrix_rank(ops.rows(R, held), tol=1e-9) < R.shape[1]:
+                raise self.singular(np.zeros((self.mine.size, 1)))
             self.make()
             if not shift:
                 self.refuse_free_motion()
@@ -58,14 +59,6 @@ class HeldPETSc(HeldBody):
         near_null = None if self.ops.rigid is None else self.ops.rigid[self.mine]
         self.factor = self.inner.stiffness_inverse(near_null, self.held.size)
         self.ops.counted = getattr(self.factor, "counted", None)
-
-    def _refuse_loose(self) -> None:
-        """Iteration on a body that can move would only run on: judge the held dofs first."""
-        R = self.ops.rigid
-        if R is None:
-            return
-        if np.linalg.matrix_rank(self.ops.rows(R, self.held), tol=1e-9) < R.shape[1]:
-            raise self.singular(np.zeros((self.mine.size, 1)))
 
     def coarsely_solved(self, F: Array) -> Array:
         """K_ii^-1 F, by iteration only so well that motions without stiffness show."""

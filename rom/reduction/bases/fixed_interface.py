@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from rom.arguments import Modes, typed
 from rom.eigen.scipy import SciPyOperators
-from rom.eigen.verbs import Held, Operators, constraint_modes
+from rom.eigen.verbs import Held, Operators, constraint_modes, quadratic
 from rom.errors import ConfigError
 from rom.model import Array, Basis, Index
 
@@ -104,3 +104,15 @@ def check_interfaces(boundary: Index, n: int) -> None:
         )
     if boundary.ndim != 1 or boundary.min() < 0 or boundary.max() >= n:
         raise ConfigError(f"boundary must be a row of numbers from 0 to {n - 1}.")
+
+
+def residual_shapes(ops: Operators, held: Held, Psi_b: Array, omega: Array, Phi: Array) -> Array:
+    """(n_local, n_b) T_r = F_rs M Psi_b: answer of the modes left out to moving interfaces."""
+    MPsi = ops.apply_M(Psi_b)
+    return held(MPsi) - Phi @ (ops.gram(Phi, MPsi) / (omega**2)[:, None])
+
+
+def projected(ops: Operators, T: Array) -> tuple[Array, Array]:
+    """(r, r) stiffness and mass T^T K T and T^T M T, symmetric."""
+    K, M = quadratic(ops, ops.apply_K, T), quadratic(ops, ops.apply_M, T)
+    return 0.5 * (K + K.T), 0.5 * (M + M.T)

@@ -7,10 +7,17 @@ import numpy as np
 
 from rom.arguments import Between, Modes, Positive, typed, whole
 from rom.eigen.band import modes_up_to
-from rom.eigen.verbs import Held, Operators, whole_clusters
+from rom.eigen.verbs import Held, Operators, whole_clusters, without_dependent
 from rom.errors import ConfigError, warn
 from rom.model import Array, Basis, Index
-from rom.reduction.bases.fixed_interface import Columns, Constrained, numbered
+from rom.reduction.bases.fixed_interface import (
+    Columns,
+    Constrained,
+    Counted,
+    numbered,
+    projected,
+    residual_shapes,
+)
 from rom.reduction.bases.selection import Wanted, enough_modes
 from rom.rows import FREQUENCY_RTOL
 
@@ -118,6 +125,91 @@ class CraigBampton(Constrained):
             omega, Phi = ops.modes(held, m)
         keep = int(np.searchsorted(omega, limit, side="right"))
         return omega[:keep], Phi[:, :keep]
+
+
+@typed
+@dataclass(frozen=True, slots=True)
+class EnhancedCraigBampton(Counted, Constrained):
+    """Craig-Bampton of the same size, its columns corrected to first order in the eigenvalue.
+
+    With F_rs the flexibility of the fixed-interface modes left out and T_r = F_rs M Psi_b, the
+    substitution of the eigenvalue by H = M_0^-1 K_0 gives T_1 = T_0 + T_r H. Low frequencies of
+    the free body gain orders of magnitude; supports and statics under interface loads lose, and the
+    certificate says so. In an assembly or joints H had to be that of the whole, which a body made
+    by itself cannot know: its frequencies are off by per cents there, and `rom.Assembly` warns.
+    `MomentMatching` ``((0.0,), 2)`` has T_r as columns of their own, which serve everywhere.
+
+    Attributes:
+        n_modes: number of fixed-interface modes.
+
+    Raises:
+        ConfigError: if n_modes is no number of modes.
+
+    Source:
+        Kim and Lee, An enhanced Craig-Bampton method, Int. J. Numer. Meth. Eng. 103 (2015) 79.
+    """
+
+    def _completed(self, ops: Operators, held: Held, Psi_b: Array, boundary: Index) -> Columns:
+        omega, Phi = ops.modes(held, self.n_modes)
+        T0 = np.hstack([Psi_b, Phi])
+        K0, M0 = projected(ops, T0)
+        H = np.linalg.solve(M0, K0)
+        T0 += residual_shapes(ops, held, Psi_b, omega, Phi) @ H[: boundary.size]
+        return T0, omega, numbered("enhanced", omega.size)
+
+
+@typed
+@dataclass(frozen=True, slots=True)
+class WithLoads:
+    """A method whose basis also answers loads that do not come through the interfaces.
+
+    The answers with the interfaces held, K_ii^-1 F, join the basis as far as it does not contain
+    them; truncated modes then leave no static error under these loads (static correction).
+
+    Attributes:
+        method: a method with constraint modes, for example ``CraigBampton(20)``.
+        loads: (n_local, k) nodal forces [N], row 3*node + axis, the rows of this process; or
+            "gravity" for a uniform acceleration along each axis.
+
+    Source:
+        Wilson, Yuan and Dickens, Dynamic analysis by direct superposition of Ritz vectors,
+        Earthq. Eng. Struct. Dyn. 10 (1982) 813.
+    """
+
+    method: Method
+    loads: Any = "gravity"
+
+    def basis(self, ops: Operators, boundary: Index, labels: tuple[str, ...]) -> Basis:
+        """The basis: columns of the interface dofs (n_b,), answers to loads, columns of the method.
+
+        Raises:
+            ConfigError: if the loads do not fit the body, or it has no geometry to weigh.
+        """
+        F, n_b = self._forces(ops), boundary.size
+        basis = self.method.basis(ops, boundary, labels)
+        if basis.labels[:n_b] != labels:
+            raise ConfigError(f"{self.method!r} has no constraint modes; use rom.CraigBampton.")
+        outer, inner = basis.Psi[:, :n_b], basis.Psi[:, n_b:]
+        held = ops.hold(boundary) if basis.held is None else basis.held
+        both, kept = without_dependent(ops, np.hstack([inner, held(F)]))
+        new = both[:, [k >= inner.shape[1] for k in kept]]
+        names = (*labels, *numbered("load", new.shape[1]), *basis.labels[n_b:])
+        return Basis(np.hstack([outer, new, inner]), basis.omega, names, held)
+
+    def _forces(self, ops: Operators) -> Array:
+        if isinstance(self.loads, str):
+            if self.loads != "gravity":
+                raise ConfigError(f'loads = {self.loads!r}; the only word known is "gravity".')
+            if ops.rigid is None:
+                raise ConfigError("gravity needs the coordinates of the nodes.")
+            return ops.apply_M(ops.rigid[:, :3])
+        F = np.asarray(self.loads, dtype=float)
+        n = ops.expand(np.zeros((ops.n_local, 1))).shape[0]
+        if F.ndim != 2 or F.shape[0] != n or not np.isfinite(F).all():
+            raise ConfigError(
+                f"loads have the shape {F.shape}; needed are finite forces of the shape ({n}, k)."
+            )
+        return ops.restrict(F)
 
 
 def judged_in(method: Any, supports: tuple[Index, ...]) -> Any:

@@ -8,7 +8,7 @@ from scipy.linalg import eigh
 
 from rom.eigen.verbs import Held, Operators
 from rom.model import Array, Index
-from rom.reduction.bases.enhanced import projected, residual_shapes
+from rom.reduction.bases.fixed_interface import projected, residual_shapes
 from rom.rows import N_COMPARED
 
 # reduced frequencies up to so many times the band may approximate those inside it
@@ -69,7 +69,11 @@ def truncation_errors(
     def in_support(k: int, drop: Index) -> float:
         keep = np.setdiff1d(np.arange(n_b + k), drop)
         lam, V = reduced_modes(K[np.ix_(keep, keep)], M[np.ix_(keep, keep)])
-        near = _candidates(lam, wanted.omega_max)
+        near = np.flatnonzero(lam > 1e-9 * lam[-1])  # elastic ones that may be those wanted
+        if wanted.omega_max is None:
+            near = near[:N_COMPARED]
+        else:
+            near = near[lam[near] <= (BAND_FACTOR * wanted.omega_max) ** 2]
         if wanted.omega_max is None and near.size < N_COMPARED and k < m:
             return np.inf
         lam, V = lam[near], V[:, near]
@@ -77,7 +81,8 @@ def truncation_errors(
         t[keep] = V
         d[n_b + k : n_b + m] = moved[k:] @ t[:n_b]
         d[n_b + m :] = t[:n_b]
-        eta = np.abs(_eigenvalue_errors(K, M, t, d * lam, lam))
+        d = d * lam  # eta = 2 t^T A d + d^T A d with A = M - K / lam, column by column
+        eta = np.abs(np.einsum("ij,ij->j", 2 * t + d, M @ d - (K @ d) / lam))
         if wanted.omega_max is not None:  # the exact one may be inside, if eta is too small
             eta = eta[lam <= (1 + 2 * eta) * wanted.omega_max**2]
         return 0.5 * SAFETY_FACTOR * float(eta.max(initial=0.0))
@@ -85,22 +90,8 @@ def truncation_errors(
     return error
 
 
-def _candidates(lam: Array, omega_max: float | None) -> Index:
-    """Elastic modes that may approximate the frequencies wanted."""
-    elastic = np.flatnonzero(lam > 1e-9 * lam[-1])
-    if omega_max is None:
-        return elastic[:N_COMPARED]
-    return elastic[lam[elastic] <= (BAND_FACTOR * omega_max) ** 2]
-
-
 def reduced_modes(K: Array, M: Array) -> tuple[Array, Array]:
     """All eigenvalues of a reduced body and its mass-normalised modes."""
     scale = 1 / np.sqrt(np.diag(M))
     lam, V = eigh(scale[:, None] * K * scale, scale[:, None] * M * scale)
     return lam, scale[:, None] * V
-
-
-def _eigenvalue_errors(K: Array, M: Array, t: Array, d: Array, lam: Array) -> Array:
-    """Eta = 2 t^T A d + d^T A d with A = M - K / lam, column by column."""
-    Ad = M @ d - (K @ d) / lam
-    return np.einsum("ij,ij->j", 2 * t + d, Ad)

@@ -2,17 +2,17 @@
 
 import logging
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
-from scipy.linalg import eigh, null_space, orth
+from scipy.linalg import null_space, orth
 from scipy.sparse import identity, kron
 
-from rom.arguments import typed, whole
+from rom.arguments import Count, typed, whole
 from rom.eigen.connection import Connection
 from rom.eigen.verbs import (
-    Operators,
     given_rigid_motions,
+    modes_within,
     orthonormal_in,
     rigid_motions,
     whole_clusters,
@@ -49,10 +49,7 @@ class Characteristic:
     """
 
     method: Method
-    n: int
-
-    def __post_init__(self) -> None:
-        whole("n", self.n, 6, reason="the rigid motions count")
+    n: Annotated[int, Count(6)]
 
     def kinds(self, connection: Connection, interfaces: dict[str, Any]) -> dict[str, object]:
         """The kinds of all interfaces, functions in the place of "full".
@@ -78,7 +75,11 @@ class Characteristic:
         ops, full = connection.ops, np.concatenate([connection.parts[name] for name in names])
         basis = Guyan().basis(ops, connection.boundary, connection.labels)
         rigid = ops.rows(given_rigid_motions(ops), connection.boundary[full])
-        lam, chi = _interface_modes(ops, basis.Psi[:, full], rigid)
+        Psi = basis.Psi[:, full]
+        K, M = ops.gram(Psi, ops.apply_K(Psi)), ops.gram(Psi, ops.apply_M(Psi))
+        # motions of the interfaces that are M-orthogonal to rigid ones
+        R = orth(rigid / np.linalg.norm(rigid, axis=0), rcond=1e-9)
+        lam, chi = modes_within(null_space(R.T @ M), K, M)
         ends, found = np.cumsum(sizes)[:-1], {}
         for name, part, R in zip(names, np.split(chi, ends), np.split(rigid, ends), strict=True):
             m = self._number(part, R)
@@ -98,15 +99,6 @@ class Characteristic:
         while m < part.shape[1] and np.linalg.matrix_rank(X[:, : 6 + m], tol=1e-8) < self.n:
             m += 1
         return m
-
-
-def _interface_modes(ops: Operators, Psi: Array, rigid: Array) -> tuple[Array, Array]:
-    """Eigenvalues and modes (b, b - 6) of the interfaces that are M-orthogonal to rigid motion."""
-    K, M = ops.gram(Psi, ops.apply_K(Psi)), ops.gram(Psi, ops.apply_M(Psi))
-    R = orth(rigid / np.linalg.norm(rigid, axis=0), rcond=1e-9)
-    Z = null_space(R.T @ M)
-    lam, V = eigh(Z.T @ K @ Z, Z.T @ M @ Z)
-    return lam, Z @ V
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -5,6 +5,7 @@ modes, certificate) sees an ordinary model whose interface coordinates are dofs 
 """
 
 from collections.abc import Iterable
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -32,11 +33,18 @@ def connect(ops: Operators, model: FEModel, interfaces: dict[str, Any]) -> Conne
     `Polynomial`, `FourierLegendre` and `Snapshots` let the surface follow orthogonal functions.
     """
     chosen = found(model, interfaces)
-    _refuse_shared_nodes(chosen)
+    for other, one in combinations(chosen, 2):
+        if shared := np.intersect1d(one.nodes, other.nodes).size:
+            raise InterfaceError(
+                f"interfaces {other.name!r} and {one.name!r} share {shared} nodes; "
+                "two rigid or averaged surfaces cannot both rule one node.",
+                hint="Leave a gap between the surfaces, or make them one physical surface.",
+            )
     ties = {i.name: tie(i, interfaces[i.name]) for i in chosen}
     if not any(t.removed.size for t in ties.values()):
         return _connection(ops, ties, [interface.dofs for interface in chosen])
-    return _connection(_transform(ops, chosen, ties), ties, _numbers(ops.n, chosen, ties))
+    transformed, numbers = _transform(ops, chosen, ties)
+    return _connection(transformed, ties, numbers)
 
 
 def found(model: FEModel, names: Iterable[str]) -> list[Interface]:
@@ -56,29 +64,25 @@ def found(model: FEModel, names: Iterable[str]) -> list[Interface]:
     return [model.interfaces[name] for name in names]
 
 
-def _refuse_shared_nodes(interfaces: list[Interface]) -> None:
-    for i, one in enumerate(interfaces):
-        for other in interfaces[:i]:
-            shared = np.intersect1d(one.nodes, other.nodes).size
-            if shared:
-                raise InterfaceError(
-                    f"interfaces {other.name!r} and {one.name!r} share {shared} nodes; "
-                    "two rigid or averaged surfaces cannot both rule one node.",
-                    hint="Leave a gap between the surfaces, or make them one physical surface.",
-                )
+def _transform(
+    ops: Operators, chosen: list[Interface], ties: dict[str, Tie]
+) -> tuple[Operators, list[Index]]:
+    """The model in new coordinates, and the numbers that those of each interface have there.
 
-
-def _transform(ops: Operators, chosen: list[Interface], ties: dict[str, Tie]) -> Operators:
-    """Kept dofs keep their order and their rank; masters come last, on the last rank."""
+    Kept dofs keep their order and their rank; masters come last, on the last rank.
+    """
     removed = np.sort(np.concatenate([t.removed for t in ties.values()]))
     stays, first_master = ~held_rows(ops, removed), ops.n - removed.size
     n_columns = first_master + sum(t.n_masters for t in ties.values())
     kept = np.flatnonzero(stays)
     rows, columns, values = [kept], [_renumber(ops.first + kept, removed)], [np.ones(kept.size)]
-    for t in ties.values():
+    numbers = []
+    for interface in chosen:
+        t = ties[interface.name]
         here = owned(ops, t.removed)
         row = t.removed[here] - ops.first
         masters = first_master + np.arange(t.n_masters)
+        numbers.append(masters if masters.size else _renumber(interface.dofs, removed))
         for block, column in ((t.by_masters, masters), (t.by_kept, _renumber(t.kept, removed))):
             part = coo_matrix(block[here])
             rows.append(row[part.row])
@@ -92,25 +96,11 @@ def _transform(ops: Operators, chosen: list[Interface], ties: dict[str, Tie]) ->
     if ops.last:
         moved = [i for i in chosen if ties[i.name].n_masters]
         rigid += [ties[i.name].coordinates @ rigid_motions(i.points) for i in moved]
-    return ops.transform(T, np.vstack(rigid))
+    return ops.transform(T, np.vstack(rigid)), numbers
 
 
 def _renumber(dofs: Index, removed: Index) -> Index:
     return dofs - np.searchsorted(removed, dofs)
-
-
-def _numbers(n: int, chosen: list[Interface], ties: dict[str, Tie]) -> list[Index]:
-    """Numbers of the interface coordinates after the removed dofs are gone."""
-    removed = np.sort(np.concatenate([t.removed for t in ties.values()]))
-    numbers, first_master = [], n - removed.size
-    for interface in chosen:
-        m = ties[interface.name].n_masters
-        if m:
-            numbers.append(first_master + np.arange(m))
-            first_master += m
-        else:
-            numbers.append(_renumber(interface.dofs, removed))
-    return numbers
 
 
 def _connection(ops: Operators, ties: dict[str, Tie], numbers: list[Index]) -> Connection:

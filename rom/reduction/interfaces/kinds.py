@@ -30,7 +30,9 @@ def tie(interface: Interface, kind: Any) -> Tie:
     """The tie of an interface of that kind."""
     kind = parsed(interface.name, kind)
     if kind == "full":
-        return _full(interface)
+        names = tuple(f"node {k // 3} u{'xyz'[k % 3]}" for k in range(interface.dofs.size))
+        itself, nothing = identity(interface.dofs.size, format="csr"), np.zeros((0, 0))
+        return Tie("full", names, itself, NO_DOFS, nothing, NO_DOFS, nothing)
     if kind == "rbe2":
         R = rigid_motions(interface.points - interface.origin)
         return _stiff(interface, "rbe2", SIX_LABELS, mean_motion(interface), R)
@@ -41,16 +43,12 @@ def tie(interface: Interface, kind: Any) -> Tie:
     if isinstance(kind, CharacteristicFunctions):
         return _found(interface, "characteristic", kind.functions(interface))
     Q = interface_functions(kind, interface)
-    names = [f"{axis}{j + 1}" for j in range(Q.shape[1]) for axis in "xyz"]
+    names = tuple(f"{axis}{j + 1}" for j in range(Q.shape[1]) for axis in "xyz")
     L = kron((interface.surface_mass @ Q).T, identity(3), format="csr")
-    return _stiff(interface, _label(kind), tuple(names), L, kron(Q, identity(3), format="csr"))
-
-
-def _full(interface: Interface) -> Tie:
-    n = interface.dofs.size
-    names = tuple(f"node {k // 3} u{'xyz'[k % 3]}" for k in range(n))
-    nothing = np.zeros((0, 0))
-    return Tie("full", names, identity(n, format="csr"), NO_DOFS, nothing, NO_DOFS, nothing)
+    label = f"polynomial:{kind.order}"
+    if isinstance(kind, FourierLegendre):
+        label = f"fourier:{kind.harmonics},{kind.order}"
+    return _stiff(interface, label, names, L, kron(Q, identity(3), format="csr"))
 
 
 def _stiff(
@@ -89,12 +87,6 @@ def _averaged(interface: Interface) -> Tie:
     inverse = np.linalg.inv(C[:, d])
     dofs = interface.dofs
     return Tie("rbe3", SIX_LABELS, C, dofs[d], inverse, dofs[r], -inverse @ C[:, r])
-
-
-def _label(kind: Polynomial | FourierLegendre) -> str:
-    if isinstance(kind, Polynomial):
-        return f"polynomial:{kind.order}"
-    return f"fourier:{kind.harmonics},{kind.order}"
 
 
 def by_name(interfaces: Any) -> dict[str, Any]:

@@ -10,7 +10,7 @@ import numpy as np
 from rom.eigen.verbs import Held, Operators, residual_errors
 from rom.errors import ConfigError, SolverError
 from rom.model import Array, FEModel
-from rom.reduction.bases.enhanced import projected
+from rom.reduction.bases.fixed_interface import projected
 from rom.reduction.bases.method import CraigBampton
 from rom.reduction.bases.selection import BAND_FACTOR, SAFETY_FACTOR, reduced_modes
 from rom.reduction.interfaces.connection import connect

@@ -12,11 +12,12 @@ Source:
 
 from dataclasses import dataclass
 from itertools import product
+from typing import Annotated
 
 import numpy as np
 from numpy.polynomial.legendre import legvander
 
-from rom.arguments import typed, whole
+from rom.arguments import Count, typed
 from rom.eigen.verbs import DEPENDENT_RTOL, orthonormal_in
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, Interface
@@ -50,11 +51,7 @@ class Polynomial:
         9
     """
 
-    order: int | None = None
-
-    def __post_init__(self) -> None:
-        if self.order is not None:
-            whole("order", self.order, 1, reason="a constant alone is a ball joint, not a surface")
+    order: Annotated[int, Count(1)] | None = None
 
     def functions(self, interface: Interface) -> Array:
         """(k, n) functions [1] at the nodes, from low to high degree; some may depend on others.
@@ -95,12 +92,8 @@ class FourierLegendre:
         FourierLegendre(harmonics=4, order=2)
     """
 
-    harmonics: int
-    order: int
-
-    def __post_init__(self) -> None:
-        whole("harmonics", self.harmonics, 1, reason="a tilted seat needs the first one")
-        whole("order", self.order, 0, reason="a degree is not negative")
+    harmonics: Annotated[int, Count(1)]
+    order: Annotated[int, Count(0)]
 
     def functions(self, interface: Interface) -> Array:
         """(k, n) functions [1] at the nodes; linear ones first, so that rigid motions are exact.

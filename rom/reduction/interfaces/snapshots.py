@@ -1,11 +1,11 @@
 """Interface functions learnt from displacements that the surface has been seen to take."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
-from rom.arguments import between, finite, typed, whole
+from rom.arguments import Between, Count, finite, typed
 from rom.eigen.verbs import rigid_motions
 from rom.errors import ConfigError
 from rom.model import Array, Interface
@@ -36,8 +36,8 @@ class Snapshots:
     """
 
     values: Any
-    energy: float | None = None
-    n: int | None = None
+    energy: Annotated[float, Between(0, 1, "(]")] | None = None
+    n: Annotated[int, Count(6)] | None = None
 
     def __post_init__(self) -> None:
         X = finite("values", self.values, None)
@@ -53,10 +53,6 @@ class Snapshots:
             raise ConfigError(
                 "Snapshots needs either energy or n.", hint="energy=0.9999 keeps almost all."
             )
-        if self.energy is not None:
-            between("energy", self.energy, 0, 1, "(]")
-        if self.n is not None:
-            whole("n", self.n, 6, reason="the rigid motions count")
 
     def __repr__(self) -> str:
         """Size instead of numbers, for provenance and labels."""
@@ -74,7 +70,9 @@ def snapshot_functions(kind: Snapshots, interface: Interface) -> Array:
         )
     S = interface.surface_mass
     L = np.linalg.cholesky(S.toarray() if hasattr(S, "toarray") else np.asarray(S))
-    weighted = [_per_axis(L.T, A) for A in (_centred_motions(interface), kind.values)]
+    x = interface.points - interface.points.mean(axis=0)
+    motions = rigid_motions(x / (np.linalg.norm(x, axis=1).max() or 1.0))
+    weighted = [_per_axis(L.T, A) for A in (motions, kind.values)]
     R = np.linalg.qr(weighted[0])[0]
     X = weighted[1] - R @ (R.T @ weighted[1])
     X = X - R @ (R.T @ X)
@@ -96,12 +94,6 @@ def _number(kind: Snapshots, sigma: Array, name: str) -> int:
             hint="Ask for fewer, or take more snapshots.",
         )
     return kind.n - 6
-
-
-def _centred_motions(interface: Interface) -> Array:
-    """(3k, 6) rigid motions about the middle of the surface, scaled to its size."""
-    x = interface.points - interface.points.mean(axis=0)
-    return rigid_motions(x / (np.linalg.norm(x, axis=1).max() or 1.0))
 
 
 def _per_axis(A: Array, X: Array) -> Array:

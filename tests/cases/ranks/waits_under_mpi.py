@@ -1,4 +1,4 @@
-"""Run by test_fe_waiting.py under mpirun: what ranks do that wait, into one file."""
+"""Run by test_fe_mpi.py under mpirun: what ranks do that wait, into one file."""
 
 import ctypes
 import json

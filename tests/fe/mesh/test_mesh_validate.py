@@ -19,7 +19,7 @@ from rom.fe.mesh.curving import TET_HALVES, smallest_determinants, without_middl
 from rom.fe.mesh.quality import aspect_ratio, scaled_jacobian, straighten
 from rom.fe.mesh.repair import repair
 from rom.fe.mesh.solid import SolidMesh
-from rom.fe.mesh.topology import faces_of, parts_by_face, row_ids
+from rom.fe.mesh.topology import faces_of, parts, row_ids
 from rom.fe.mesh.validate import validate
 
 pytestmark = pytest.mark.once
@@ -66,7 +66,7 @@ def test_a_brick_has_six_faces_and_a_shared_face_two_opposite_signs():
     assert faces.count.size == 11 and (faces.count == 2).sum() == 1
     shared = faces.of_cell == np.flatnonzero(faces.count == 2)[0]
     assert sorted(faces.sign[shared]) == [-1, 1]
-    assert parts_by_face(faces)[0] == 1
+    assert parts(faces.of_cell)[0] == 1
 
 
 def test_mirrored_cells_are_turned_round():

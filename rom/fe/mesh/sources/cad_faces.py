@@ -19,13 +19,7 @@ from rom.fe.mesh.picks import EVERY_FACE, Pick, picks
 from rom.fe.mesh.solid import MAX_SHOWN, Notes, shown
 from rom.model import Array, Index
 
-KINDS = {
-    "Plane": "plane",
-    "Cylinder": "cylinder",
-    "Cone": "cone",
-    "Sphere": "sphere",
-    "Torus": "torus",
-}
+KINDS = {kind: kind.lower() for kind in ("Plane", "Cylinder", "Cone", "Sphere", "Torus")}
 COAXIAL_RTOL = 1e-6  # of the size, and of the angle between axes
 SMALLEST_ARC = 0.499 * np.pi  # of cylinders with an axis of use: a quarter turn, less round-off
 MAX_DISTANCE_RATIO = 0.05  # of the diagonal: a point further from every face is a mistake
@@ -98,7 +92,8 @@ def axes(gmsh: ModuleType) -> dict[str, Axis]:
 
 def _common_axis(gmsh: ModuleType, tags: list[int]) -> Axis | None:
     """None if the faces have several axes, or go around less than a quarter turn."""
-    if max(map(lambda tag: _arc(gmsh, tag), tags)) < SMALLEST_ARC:
+    bounds = [gmsh.model.getParametrizationBounds(2, tag) for tag in tags]
+    if max(abs(high[0] - low[0]) for low, high in bounds) < SMALLEST_ARC:
         return None
     first = _circle(gmsh, tags[0])
     ends = np.array([end for tag in tags for end in _ends(gmsh, tag)])
@@ -129,7 +124,8 @@ def _circle(gmsh: ModuleType, tag: int) -> _Circle:
 
 def _circle_at(gmsh: ModuleType, tag: int, u: float, v: float) -> _Circle:
     """Three points of it, which may lie beyond the edges of the face, give it."""
-    a, b, c = (_point(gmsh, tag, u + turn, v) for turn in (0.0, 0.5 * np.pi, np.pi))
+    turns = (0.0, 0.5 * np.pi, np.pi)
+    a, b, c = (np.array(gmsh.model.getValue(2, tag, [u + turn, v])) for turn in turns)
     centre = 0.5 * (a + c)
     axis = np.cross(a - centre, b - centre)
     axis *= np.sign(axis[np.argmax(np.abs(axis).round(12))]) / np.linalg.norm(axis)
@@ -140,16 +136,6 @@ def _ends(gmsh: ModuleType, tag: int) -> tuple[Array, Array]:
     """Points of the axis at both ends of a cylinder face."""
     (u, low), (_, high) = gmsh.model.getParametrizationBounds(2, tag)
     return _circle_at(gmsh, tag, u, low).centre, _circle_at(gmsh, tag, u, high).centre
-
-
-def _arc(gmsh: ModuleType, tag: int) -> float:
-    """Angle that a cylinder face goes around [rad]."""
-    (low, _), (high, _) = gmsh.model.getParametrizationBounds(2, tag)
-    return abs(high - low)
-
-
-def _point(gmsh: ModuleType, tag: int, u: float, v: float) -> Array:
-    return np.array(gmsh.model.getValue(2, tag, [u, v]))
 
 
 class _Outward:

@@ -9,9 +9,9 @@ from types import ModuleType
 
 import numpy as np
 
-from rom.errors import FileFormatError, MeshError, TagError
+from rom.errors import MeshError, TagError
 from rom.fe.mesh.solid import Read, packed
-from rom.fe.mesh.sources.deck import only_type
+from rom.fe.mesh.sources.deck import only_type, positions
 from rom.model import Array, Index
 
 # gmsh element types
@@ -67,13 +67,13 @@ def collect(gmsh: ModuleType, declared: Path, *, strict: bool, repeated: bool) -
     cells = np.vstack([nodes for _, nodes in blocks.values()])
     counts = [len(ids) for ids, _ in blocks.values()]
     facets = {
-        name: _rows(tags, _facets(gmsh, tag, name, repeated=repeated), f"surface {name!r}")
+        name: positions(tags, _facets(gmsh, tag, name, repeated=repeated), "node")
         for (dim, tag), name in groups.items()
         if dim == 2
     }
     return packed(
         points,
-        _rows(tags, cells, "a cell"),
+        positions(tags, cells, "node"),
         SOLIDS[kind],
         np.repeat([region[volume] for volume in blocks], counts),
         np.concatenate([ids for ids, _ in blocks.values()]),
@@ -135,12 +135,6 @@ def _solids(gmsh: ModuleType) -> tuple[int, Blocks]:
         kinds |= {int(t) for t in types}
         if len(types) == 1:
             blocks[volume] = ids[0].astype(np.int64), nodes[0].astype(np.int64)
-    _check_kinds(gmsh, kinds)
-    size = gmsh.model.mesh.getElementProperties(min(kinds))[3]
-    return kinds.pop(), {v: (ids, nodes.reshape(-1, size)) for v, (ids, nodes) in blocks.items()}
-
-
-def _check_kinds(gmsh: ModuleType, kinds: set[int]) -> None:
     if not kinds:
         raise _no_solid(gmsh)
     name = only_type(gmsh.model.mesh.getElementProperties(kind)[0] for kind in kinds)
@@ -149,6 +143,8 @@ def _check_kinds(gmsh: ModuleType, kinds: set[int]) -> None:
             f"cells of type {name} are not supported.",
             hint="Supported are tetrahedra and hexahedra of first and second order.",
         )
+    size = gmsh.model.mesh.getElementProperties(min(kinds))[3]
+    return kinds.pop(), {v: (ids, nodes.reshape(-1, size)) for v, (ids, nodes) in blocks.items()}
 
 
 def _no_solid(gmsh: ModuleType) -> MeshError:
@@ -232,15 +228,6 @@ def _check_copies(rows: Index, groups: int, name: str) -> None:
         )
 
 
-def _rows(tags: Index, nodes: Index, what: str) -> Index:
-    """Positions of node tags among the sorted tags of all nodes."""
-    place = np.minimum(np.searchsorted(tags, nodes), max(tags.size - 1, 0))
-    if not tags.size or not np.array_equal(tags[place], nodes):
-        missing = np.setdiff1d(nodes, tags)[:3].tolist()
-        raise FileFormatError(f"{what} names the nodes {missing}, which the file does not define.")
-    return place
-
-
 def triangles(gmsh: ModuleType) -> Read:
     """Arrays and notes as `collect` returns them, of triangles in z = 0, facets being curves."""
     tags, points = _nodes(gmsh)
@@ -286,14 +273,12 @@ def _plane_surfaces(gmsh: ModuleType, ids: Index) -> dict[str, Index]:
         single = len(parts) == 1
         named |= {name if single else f"{name} {k}": part for k, part in enumerate(parts, 1)}
     named = named or {f"surface {tag}": tag for _, tag in gmsh.model.getEntities(2)}
-    found = {name: _triangle_ids(gmsh, tag) for name, tag in named.items()}
-    order = np.argsort(ids, kind="stable")
-    return {name: order[np.searchsorted(ids[order], some)] for name, some in found.items()}
-
-
-def _triangle_ids(gmsh: ModuleType, surface: int) -> Index:
-    found = gmsh.model.mesh.getElements(2, surface)[1]
-    return np.concatenate([np.zeros(0, dtype=np.int64), *(x.astype(np.int64) for x in found)])
+    found, order = {}, np.argsort(ids, kind="stable")
+    for name, tag in named.items():
+        kinds = [x.astype(np.int64) for x in gmsh.model.mesh.getElements(2, tag)[1]]
+        some = np.concatenate([np.zeros(0, dtype=np.int64), *kinds])
+        found[name] = order[np.searchsorted(ids[order], some)]
+    return found
 
 
 def _lines(gmsh: ModuleType, tag: int, tags: Index, place: Array) -> Index:

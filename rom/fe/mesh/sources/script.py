@@ -300,7 +300,11 @@ def confine(folder: Path) -> None:
     _write_only_below(libc, folder)
     calls = CALLS.get(platform.machine())
     if calls is not None:
-        _install(libc, _filter(calls))
+        steps = _filter(calls)
+        code = b"".join(struct.pack("=HBBI", *step) for step in steps)
+        buffer = ctypes.create_string_buffer(code)
+        program = struct.pack("@HP", len(steps), ctypes.addressof(buffer))
+        libc.prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, program, 0, 0)
 
 
 def _filter(calls: Calls) -> list[tuple[int, int, int, int]]:
@@ -325,13 +329,6 @@ def _filter(calls: Calls) -> list[tuple[int, int, int, int]]:
 def _answer(test: int, values: Iterable[int], verdict: int) -> list[tuple[int, int, int, int]]:
     steps = [[(test, 0, 1, value), (RETURN, 0, 0, verdict)] for value in values]
     return [step for pair in steps for step in pair]
-
-
-def _install(libc: ctypes.CDLL, steps: list[tuple[int, int, int, int]]) -> None:
-    code = b"".join(struct.pack("=HBBI", *step) for step in steps)
-    buffer = ctypes.create_string_buffer(code)
-    program = struct.pack("@HP", len(steps), ctypes.addressof(buffer))
-    libc.prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, program, 0, 0)
 
 
 def _write_only_below(libc: ctypes.CDLL, folder: Path) -> None:

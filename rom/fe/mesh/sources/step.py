@@ -9,14 +9,13 @@ from pathlib import Path
 from types import ModuleType
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from rom.arguments import positive
 from rom.errors import ConfigError, FileFormatError, MeshError, TagError
 from rom.fe.mesh.solid import Made, Request, shown
 from rom.fe.mesh.sources.builder import check_parameters
 from rom.fe.mesh.sources.cad_faces import diagonal, group, surfaces
+from rom.fe.mesh.topology import parts_of
 
 FACE_PATTERN = re.compile(r"#(\d+)\s*=\s*ADVANCED_FACE\s*\(\s*'((?:[^']|'')*)'", re.IGNORECASE)
 SHELL_PATTERN = re.compile(
@@ -59,7 +58,10 @@ def _check_solid(gmsh: ModuleType) -> None:
             f"the STEP file contains no solid{what}.",
             hint="Let the CAD program close the faces to a solid body, and export that.",
         )
-    if _parts(gmsh, solids) > 1:
+    place = {tag: k for k, tag in enumerate(solids)}
+    faces = {face: gmsh.model.getAdjacencies(2, face)[0] for face in surfaces(gmsh)}
+    pairs = np.array([(place[int(tag)], face) for face, tags in faces.items() for tag in tags])
+    if parts_of(*pairs.T)[0] > 1:
         volumes = sorted((gmsh.model.occ.getMass(3, tag) for tag in solids), reverse=True)
         listed = shown([f"{v:.4g}" for v in volumes])
         raise MeshError(
@@ -69,16 +71,6 @@ def _check_solid(gmsh: ModuleType) -> None:
             "are not connected; else export each into a file of its own and join them in a "
             "mechanism.",
         )
-
-
-def _parts(gmsh: ModuleType, solids: list[int]) -> int:
-    """Number of groups of solids that have faces in common."""
-    place = {tag: k for k, tag in enumerate(solids)}
-    pairs = [[place[int(t)] for t in gmsh.model.getAdjacencies(2, s)[0]] for s in surfaces(gmsh)]
-    common = np.array([pair for pair in pairs if len(pair) == 2]).reshape(-1, 2)
-    ones = np.ones(len(common))
-    graph = coo_matrix((ones, common.T), shape=(len(solids),) * 2)
-    return int(connected_components(graph, directed=False)[0])
 
 
 def _check_size(gmsh: ModuleType, lc: object) -> None:

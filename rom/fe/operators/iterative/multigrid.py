@@ -60,7 +60,11 @@ class Level:
         self.A, self.P = A, P
         self.R = PETSc.Mat()
         P.transpose(self.R)
-        self.scale = _inverse_diagonal(A)[:, None]
+        d = A.getDiagonal().array
+        largest = A.comm.tompi4py().allreduce(d.max(initial=0.0), op=MPI.MAX)
+        least = EMPTY_RTOL * largest
+        # zero where an aggregate of few nodes has less than six motions
+        self.scale = np.where(d > least, 1.0 / np.maximum(d, least), 0.0)[:, None]
         self.rho = BOUND_SAFETY * _largest(A, self.scale)
 
     def smoothed(self, R: Array, *, residual: bool) -> tuple[Array, Array]:
@@ -98,7 +102,10 @@ class Cycle:
         starts, columns, values = coarse.getValuesCSR()
         mine = np.zeros((starts.size - 1, coarse.getSize()[1]))
         mine[np.repeat(np.arange(starts.size - 1), np.diff(starts)), columns] = values
-        self.coarse = _pseudo_inverse(np.vstack(self.comm.allgather(mine)))[self.rows]
+        A = np.vstack(self.comm.allgather(mine))
+        lam, V = np.linalg.eigh(0.5 * (A + A.T))
+        kept = lam > EMPTY_RTOL * lam[-1]  # motions that no node makes are left out
+        self.coarse = (V[:, kept] / lam[kept] @ V[:, kept].T)[self.rows]
 
     def __call__(self, F: Array) -> Array:
         """Near A^-1 F."""
@@ -121,20 +128,6 @@ class Cycle:
         R -= dense_rows(level.A, E)
         X += level.smoothed(R, residual=False)[0]
         return X
-
-
-def _inverse_diagonal(A: PETSc.Mat) -> Array:
-    """(n_local,) of A; zero where an aggregate of few nodes has less than six motions."""
-    d = A.getDiagonal().array
-    largest = A.comm.tompi4py().allreduce(d.max(initial=0.0), op=MPI.MAX)
-    return np.where(d > EMPTY_RTOL * largest, 1.0 / np.maximum(d, EMPTY_RTOL * largest), 0.0)
-
-
-def _pseudo_inverse(A: Array) -> Array:
-    """Inverse of a small matrix but for motions that no node makes."""
-    lam, V = np.linalg.eigh(0.5 * (A + A.T))
-    V, lam = V[:, lam > EMPTY_RTOL * lam[-1]], lam[lam > EMPTY_RTOL * lam[-1]]
-    return V / lam @ V.T
 
 
 def _largest(A: PETSc.Mat, scale: Array) -> float:
