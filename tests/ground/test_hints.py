@@ -1,6 +1,5 @@
 """Errors say the cure, and warnings name the line of the user that caused them."""
 
-import ast
 from functools import cache
 
 import numpy as np
@@ -8,7 +7,6 @@ import pytest
 
 import rom
 from cases.mbs.mechanisms import random_body
-from cases.paths import ROOT
 from cases.solid import block, reduced
 from rom import errors
 from rom.errors import RomError, RomWarning, UnknownNameError
@@ -148,12 +146,3 @@ def test_a_warning_names_the_line_outside_the_package(way, tmp_path):
     (one,) = (found for found in caught if words in str(found.message))
     lines = {line for _, _, line in call.__code__.co_lines()}
     assert (one.filename, one.lineno in lines) == (__file__, True)
-
-
-def test_all_warnings_go_one_way():
-    """Numbers of frames are wrong as soon as a function between gets a decorator."""
-    for path in (ROOT / "rom").rglob("*.py"):
-        if path != ROOT / "rom/errors.py":
-            nodes = ast.walk(ast.parse(path.read_text()))
-            calls = (node.func for node in nodes if isinstance(node, ast.Call))
-            assert "warnings.warn" not in map(ast.unparse, calls), path

@@ -11,7 +11,7 @@ import re
 
 import pytest
 
-from cases.files.docstrings import INSIDE, pages_and_demos, public, raised
+from cases.files.docstrings import public, raised
 from cases.paths import ROOT
 
 pytestmark = pytest.mark.once
@@ -123,10 +123,3 @@ def test_modules_of_methods_name_their_sources():
             module = name.rpartition(".")[0]
             texts.setdefault(module, [importlib.import_module(module).__doc__]).append(one.text)
     assert {m for m, said in texts.items() if not any(map(source_in, said))} == PLAIN
-
-
-def test_users_import_from_no_inner_front():
-    text = pages_and_demos()
-    for package in INSIDE:
-        assert (ROOT / package.replace(".", "/") / "__init__.pyi").exists()
-        assert not re.search(rf"from {package} import", text), f"users import from {package}"
