@@ -35,32 +35,24 @@ ORTHOTROPIC = Declared(
 SHAPES = "rom.reduction.interfaces.polynomial"
 
 
+SOLID = Variants(
+    {"isotropic": ISOTROPIC, "orthotropic": ORTHOTROPIC}, {"G": "orthotropic"}, "isotropic"
+)
+
+
 @dataclass(frozen=True, slots=True)
 class Solids:
     """One material, or a table of them by region."""
 
-    parts: ClassVar[dict[str, Table]] = {"isotropic": ISOTROPIC, "orthotropic": ORTHOTROPIC}
-    summary: str = "isotropic or orthotropic table, or a table of them by region"
+    parts: ClassVar[Mapping[str, Table]] = SOLID.tables
+    summary: str = f"{SOLID.summary}; or table of them by region"
 
     def read(self, value: object, place: Place) -> Values:
         """Values of the material, or of each region under "regions"."""
-        if (
-            isinstance(value, Mapping)
-            and value
-            and all(isinstance(v, dict) for v in value.values())
-        ):
-            return {"regions": Named(_Solid(), "materials").read(value, place)}
-        return _Solid().read(value, place)
-
-
-@dataclass(frozen=True, slots=True)
-class _Solid:
-    summary: str = "material"
-
-    def read(self, value: object, place: Place) -> Values:
-        """Values of one material."""
-        other = isinstance(value, Mapping) and "G" in value
-        return (ORTHOTROPIC if other else ISOTROPIC).read(value, place)
+        several = isinstance(value, Mapping) and value
+        if several and all(isinstance(v, dict) for v in value.values()):
+            return {"regions": Named(SOLID, "materials").read(value, place)}
+        return SOLID.read(value, place)
 
 
 @dataclass(frozen=True, slots=True)

@@ -290,22 +290,26 @@ class Named:
 
 @dataclass(frozen=True, slots=True)
 class Variants:
-    """Tables told apart by their key ``kind``."""
+    """Tables told apart by their key ``kind``, or by one that only some of them have."""
 
     tables: Mapping[str, Table]
     # {key: kind it stands for where none is written}
     telling: Mapping[str, str] = field(default_factory=dict)
+    usual: str = ""  # kind where no key tells; then no kind is ever written
 
     @property
     def summary(self) -> str:
         """The kinds."""
-        return "table with a kind: " + ", ".join(self.tables)
+        words = "table of" if self.usual else "table with a kind:"
+        return f"{words} {', '.join(self.tables)}"
 
     def read(self, value: object, place: Place) -> Values:
         """Values by key, ``kind`` among them."""
         if not isinstance(value, Mapping):
             place.refuse(value, f": needed is a table [{place.name}]")
         written = [kind for key, kind in self.telling.items() if key in value]
+        if self.usual:
+            return self.tables[(*written, self.usual)[0]].read(value, place)
         if "kind" not in value and not written:
             raise place.error(f"kind is missing in [{place.name}].", nearest("", self.tables))
         named = value.get("kind", written[0] if written else "")
