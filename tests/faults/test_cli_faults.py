@@ -2,15 +2,12 @@
 
 import json
 import os
-import signal
-import subprocess
-import sys
 import time
 
 import pytest
 
 import rom
-from cases.command import ROOT, environment, python, wait_until
+from cases.command import ROOT, python
 from cases.command import rom as command
 from cases.solid import block, reduced
 from rom.cli.main import main
@@ -193,25 +190,6 @@ def test_every_exception_becomes_one_line(raised, code, words, monkeypatch, caps
     refused(capsys, code, ["check", "x"], *words)
     assert main(["check", "x", "--debug"]) == code
     assert "Traceback" in capsys.readouterr().err
-
-
-@pytest.mark.fenicsx
-def test_ctrl_c_ends_with_code_7_and_leaves_nothing(folder):
-    """While gmsh is at work in a process of its own, which does not hear Ctrl-C itself."""
-    source = folder / "slow.py"
-    source.write_text("import time\ndef build(gmsh):\n    open('begun', 'w')\n    time.sleep(60)\n")
-    command_line = [sys.executable, "-m", "rom", "mesh", "slow.py", "--save", "x.vtu", "--trust"]
-    env, pipe = environment(PYTHONDONTWRITEBYTECODE="1"), subprocess.PIPE
-    process = subprocess.Popen(
-        command_line, env=env, stdout=pipe, stderr=pipe, text=True, start_new_session=True
-    )
-    wait_until((folder / "begun").exists)
-    os.killpg(process.pid, signal.SIGINT)
-    out, err = process.communicate(timeout=20)
-    assert (process.returncode, out) == (7, "")
-    assert err.startswith("error: interrupted.") and "Traceback" not in err
-    for name in ("begun", "slow.py"):
-        (folder / name).unlink()
 
 
 @pytest.mark.fenicsx
