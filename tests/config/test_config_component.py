@@ -137,40 +137,34 @@ def test_materials_by_region_and_orthotropic(tmp_path):
     assert solids["core"].E == (12e9, 1e9, 1e9) and solids["core"].rho == 450
 
 
-def test_a_changed_value_stands_in_for_the_one_of_the_file(tmp_path):
-    (tmp_path / "part.toml").write_text(SOLID)
-    part = read_component(tmp_path / "part.toml", {("material", "E"): "70 GPa"})
-    assert part.material().E == 70e9
-
-
 HELD = '[interfaces]\na = "rbe2"\n'
+KIND = HELD.replace('"rbe2"', '{ kind = "polynomal", order = 3 }')
 MISTAKES = {  # what stands in the file, what instead, and what is said
-    "wrong dimension": ('"210 GPa"', '"210 mm"', "part.toml:9: material.E: '210 mm' is a length; "
-                        "a pressure or stress [Pa] is wanted."),
-    "misspelt key": ("nu =", "nuu =", "part.toml:8: 2 mistakes. line 8: nu is missing in [material]"
-                     ". line 10: there is no key 'nuu' in [material]."),
-    "misspelt table": ("[geometry.", "[geometri.",
-                       "part.toml:4: there is no key 'geometri'. Did you mean geometry?"),
-    "twice": ("nu = 0.3", 'E = "70 GPa"', "part.toml:10: 'material.E' is given twice, in lines 9 "
-              "and 10. Keep one of them."),
+    "wrong dimension": ('"210 GPa"', '"210 mm"', "part.toml:9: material.E: '210 mm' is a length"),
+    "misspelt key": ("nu =", "nuu =", "2 mistakes. line 8: nu is missing", "line 10: ", "'nuu'"),
+    "misspelt table": (
+        "[geometry.",
+        "[geometri.",
+        "part.toml:4: ",
+        "'geometri'. Did you mean geom",
+    ),
+    "twice": ("nu = 0.3", 'E = "70 GPa"', "part.toml:10: 'material.E'", "in lines 9 and 10"),
     "no text": ('"mm"', "mm", "part.toml:3: this is no TOML: invalid value."),
     "number for a table": (SOLID, "material = 3\n", "part.toml:1: material = 3: needed is a table"),
-    "kind": (SOLID, HELD.replace('"rbe2"', '{ kind = "polynomal", order = 3 }'),
-             "part.toml:2: interfaces.a.kind = 'polynomal' does not exist. Did you mean poly"),
-    "kind missing": (SOLID, HELD.replace('"rbe2"', "{ order = 3 }"), "missing in [interfaces.a]"),
+    "kind": (SOLID, KIND, "part.toml:2: interfaces.a.kind = 'polynomal'", "Did you mean poly"),
+    "kind missing": (SOLID, KIND.replace("kind", "king"), "missing in [interfaces.a]"),
     "negative count": (SOLID, "[reduction]\nmodes = -1\n", "must be a whole number from 0"),
-    "a mechanism": (SOLID, "[bodies.a]\n",
-                    "part.toml:1: this is a mechanism; a component is needed"),
-}  # fmt: skip
+    "a mechanism": (SOLID, "[bodies.a]\n", "part.toml:1: this is a mechanism; a component is need"),
+}
 
 
 @pytest.mark.parametrize("case", MISTAKES)
 def test_a_mistake_is_told_with_file_and_line(case, tmp_path):
-    old, new, expected = MISTAKES[case]
+    old, new, *expected = MISTAKES[case]
     (tmp_path / "part.toml").write_text(SOLID.replace(old, new))
     with pytest.raises(ConfigError) as refused:
         read_component(tmp_path / "part.toml")
-    assert expected in str(refused.value).replace(f"{tmp_path}/", "")
+    assert not [words for words in expected if words not in str(refused.value)]
 
 
 def test_missing_and_unreadable_files(tmp_path):
