@@ -73,6 +73,11 @@ def test_a_benchmark_runs_from_its_beginning_to_its_end(name, monkeypatch):
 
 
 TARGETS = re.findall(r"^(\w+):", (ROOT / "Makefile").read_text(), re.M)
+TOGETHER = {  # what a target starts at least: all that is to be checked
+    "test": "ruff check .|ruff format --check|mypy|pytest -m fenicsx or once -n|"
+    "pytest -m not fenicsx and not once -p",
+    "long": "pytest -m long -n|pytest -m not long tests/|pytest -m not fenicsx and once -p",
+}
 STUB = '#!/bin/sh\nprintf "%s\\n" "$*" >> "{log}"\n'
 
 
@@ -95,6 +100,8 @@ def test_a_target_of_make_starts_modules_and_files_that_are_there(target, tmp_pa
     assert done.returncode == 0, done.stderr
     lines = log.read_text().splitlines() if log.exists() else []
     assert lines or target == "clean"
+    said = log.read_text() if lines else ""
+    assert all(f"-m {part}" in said for part in TOGETHER.get(target, "").split("|") if part)
     for line in lines:
         for module in re.findall(r"-m ([a-z_]+)\b", line)[:1]:
             assert importlib.util.find_spec(module), line
