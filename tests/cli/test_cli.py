@@ -95,11 +95,6 @@ def test_help_of_a_verb_has_examples_that_parse(verb, capsys):
         assert build_parser().parse_args(line.split()).verb == verb
 
 
-def test_version(capsys):
-    assert main(["--version"]) == 0
-    assert capsys.readouterr().out == f"rom {rom.__version__}\n"
-
-
 def test_check_prints_the_certificate_and_passes(file, capsys):
     assert main(["check", str(file)]) == 0
     out, err = capsys.readouterr()
@@ -159,12 +154,6 @@ def test_simulate_lets_the_body_fall_about_its_hinge(file, tmp_path, capsys):
     assert_allclose(table_[:, 5] - table_[0, 5], fall, atol=2e-4)
     assert fall[-1] < -0.01
     assert_allclose(table_[:, 1:4] - table_[0, 1:4], 0.0, atol=1e-12)
-
-
-def test_bench_lists_its_benchmarks(capsys):
-    from benchmarks.benchmarks import BENCHMARKS
-
-    assert list(answer(capsys, "bench", "--list")["benchmarks"]) == list(BENCHMARKS)
 
 
 def test_bench_prints_figures_with_their_aims(capsys, monkeypatch):

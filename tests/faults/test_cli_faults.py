@@ -1,6 +1,5 @@
 """Bad command lines, files and circumstances: the class of error, the culprit, no traceback."""
 
-import json
 import os
 import time
 
@@ -147,15 +146,6 @@ def test_a_wrong_command_line_is_refused_before_anything_heavy_is_loaded(folder)
     code += f"print(codes, sorted({heavy} & set(sys.modules)))"
     done = python("-c", code, timeout=60)
     assert done.stdout == "{2} []\n", done.stderr
-
-
-@pytest.mark.parametrize("case", ["unknown option", "output is a folder"])
-def test_json_reports_the_error_too(case, folder, capsys):
-    line, *words = USAGE[case]
-    assert main([*typed(line), "--json"]) == 2
-    found = json.loads(capsys.readouterr().out)
-    assert found["ok"] is False and found["error"] == "ConfigError" and found["exit_code"] == 2
-    assert words[0] in found["message"]
 
 
 def test_a_read_only_folder_is_found_before_the_computation(folder, capsys, monkeypatch):
