@@ -9,12 +9,9 @@ from typing import Any
 import numpy as np
 
 CLASSES = {  # number of the class: its module
-    "1": "code",  # from the working folder
-    "2": "names",  # several wrong ones at once
     "3": "geometry",  # geometries as programs
     "4": "motion",  # what is kept of one
-    "5": "physics",  # wrong without a word
-    "6": "files",
+    "6": "files",  # and lines, also of several mistakes at once
     "7": "bounds",
     "8": "together",  # alone, and beside others
     "R": "reliability",  # odd cases of the table

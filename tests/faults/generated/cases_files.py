@@ -1,10 +1,12 @@
 """Command lines and files of all kinds: wrong by hand, by table and at random."""
 
+import zipfile
+
 import numpy as np
 from scipy.sparse import identity
 
 import rom
-from generated.case import case, edit, write
+from generated.case import Silent, arrays_changed, case, edit, write
 from generated.stock import MATRICES, STEEL, model
 from rom.errors import ConfigError, FileFormatError, InterfaceError, MaterialError, ModelError
 from rom.io.sid.dialect import read_sid
@@ -54,6 +56,13 @@ LINES = {  # command lines of which one thing is wrong
     "Rayleigh's nan": (f"reduce {MATRICES} --rayleigh nan,0 -o a.npz", ("rayleigh", "alpha")),
     "an unknown material": ("swing box.msh --hinge root --material wood -o out", "wood"),
 }
+MISSING = {  # command lines that lack several things, and all of them
+    "modes": ("modes box.msh --nu 0.3", "--E", "--rho"),
+    "reduce": (f"reduce box.msh {STEEL}", "-i", "-o"),
+    "simulate": ("simulate good.npz", "--hinge", "--t-end", "--dt", "-o"),
+    "swing": ("swing box.msh", "--hinge", "-o"),
+    "export": ("export", "file", "output"),
+}
 ANY = (ConfigError, ModelError, InterfaceError, FileFormatError, MaterialError, rom.ParameterError)
 BYTES = {  # whole documents
     "empty": (b"", "bodies"),
@@ -73,7 +82,32 @@ def craig_bampton(folder):
     return rom.craig_bampton(model().K, identity(3, format="csr"), list(range(12)), 2)
 
 
+def stored(member):
+    """A member of another name in the body file."""
+
+    def prepare(folder):
+        with zipfile.ZipFile(folder / BODY, "a") as archive:
+            archive.writestr(member, archive.read("K.npy"))
+
+    return prepare
+
+
 CASES = [
+    *(case(f"a member named {member}", f"check {BODY}", READ, BODY, given=stored(member))
+      for member in ("../pwned.npy", "/nowhere/pwned.npy", "a\\b.npy")),
+    case("a pickle that nothing names", f"check {BODY}", Silent, given=arrays_changed(
+        BODY, lambda arrays: arrays.update(extra=np.array([{"a": 1}], dtype=object)))),
+    *(case(f"rom {verb} without several things", line, CONFIG, *words)
+      for verb, (line, *words) in MISSING.items()),
+    case("two sets that are not there", LINE.replace("root", "rot").replace("tip", "tipp"), FOREIGN,
+         "rot", "tipp"),
+    case("two parameters that are not there", lambda folder: rom.load(FAMILY).at(rhoo=1, E=2),
+         rom.ParameterError, "rhoo", "E"),
+    case("two keys that are not there", "simulate pendulum.toml -o out", CONFIG, "masss", "atx",
+         given=(edit("pendulum.toml", "mass =", "masss ="), edit("pendulum.toml", "at =", "atx ="))),
+    case("two markers that are not there", "simulate pendulum.toml -o out", ANY, "'pm'", "'pn'",
+         given=edit("pendulum.toml", '{ ground = [0, 0, 0] }, "bob.pin"', '"bob.pm", "bob.pn"')),
+    case("a parent that is a file", "export good.npz good.npz/x.vtu", CONFIG, BODY),
     *(case(f"a parameter of {value!r}", lambda folder, x=value: rom.load(folder / FAMILY).at(rho=x), ANY,
            "rho") for value in ("five", np.nan, np.inf, [1.0, 2.0], 1j, {})),
     case("matrices that do not fit", craig_bampton, (*ANY, rom.QualityGateError), "36"),
