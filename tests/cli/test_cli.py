@@ -121,18 +121,6 @@ def test_json_of_check_holds_the_numbers_of_the_report(file, capsys):
     assert_allclose([row["value"] for row in rows], [row.value for row in report.rows])
 
 
-def test_simulate_writes_a_film_and_a_history_when_asked(file, tmp_path, capsys):
-    found = answer(
-        capsys, "simulate", file, "--hinge", "root", "--t-end", 0.004, "--dt", 4e-4, "-q",
-        "--film", "glb", "--history", "csv", "-o", tmp_path,
-    )  # fmt: skip
-    names = ("body.glb", "body.history.csv", "scene.json", "run.json")
-    assert found["also"] == [str(tmp_path / name) for name in names]
-    assert (tmp_path / "body.glb").read_bytes()[:4] == b"glTF"
-    assert "hinge force x [N]" in (tmp_path / "body.history.csv").read_text().splitlines()[0]
-    assert {path.name for path in tmp_path.iterdir()} == {"body.csv", *names}
-
-
 def test_simulate_lets_the_body_fall_about_its_hinge(file, tmp_path, capsys):
     """Tip of a stiff pendulum released at rest: y = -alpha L t^2 / 2, alpha = m g c / I.
 

@@ -15,6 +15,7 @@ import pytest
 import rom
 from cases import command
 from cases.command import ran
+from cases.files.docstrings import PAGES, commands
 from cases.paths import ROOT
 from cases.solid import block, composite
 from rom import errors
@@ -22,11 +23,10 @@ from rom.cli.parser import verb_modules
 from rom.io.matrices.op4 import write_op4
 
 DOCS = ROOT / "docs"
-WRITTEN = sorted(path for path in DOCS.rglob("*.md") if "generated" not in path.parts)
 CODE = re.compile(r"^```python\n(.*?)^```$", re.M | re.S)
 TOUR = DOCS / "tour.md"  # its blocks start from files of their own
 STEP_PART = DOCS / "step_part.md"
-TRIED = [path for path in WRITTEN if path != TOUR and CODE.search(path.read_text())]
+TRIED = [path for path in PAGES[1:] if path != TOUR and CODE.search(path.read_text())]
 PARTS = """# # A title
 #
 # Some `code` in prose.
@@ -224,9 +224,8 @@ def test_commands_of_the_page_about_a_part_run(tmp_path, monkeypatch):
     exec(CODE.search(text).group(1), {})
     (mechanism,) = re.findall(r"^```toml\n(.*?)^```$", text, re.M | re.S)
     (tmp_path / "push.toml").write_text(mechanism)
-    blocks = "".join(re.findall(r"^```sh\n(.*?)^```$", text, re.M | re.S)).replace("\\\n", " ")
     said = {}
-    for line in blocks.splitlines():
+    for line in commands(STEP_PART):
         program, verb, *arguments = shlex.split(line)
         assert program == "rom"
         done = command.rom(verb, *arguments, "--json", cwd=tmp_path, timeout=600)
@@ -310,7 +309,6 @@ def named(name):
 
 def test_what_pages_name_exists():
     """Modules, functions, files, lists and tests; of tests names that are long may end in dots."""
-    above = (ROOT / f"{name}.md" for name in ("README", "CHANGELOG", "CONTRIBUTING"))
     tests = {path: path.read_text() for path in (ROOT / "tests").rglob("test_*.py")}
     known = {path.stem for path in tests}.union(
         *(re.findall(r"def (test_\w+)", text) for text in tests.values())
@@ -322,7 +320,7 @@ def test_what_pages_name_exists():
         r"`(test_\w+)`": known.__contains__,
         r"`(test_\w+)\.\.\.`": lambda name: any(one.startswith(name) for one in known),
     }
-    for path in (*WRITTEN, *above):
+    for path in (*PAGES, ROOT / "CHANGELOG.md", ROOT / "CONTRIBUTING.md"):
         text = path.read_text()
         gone = [x for pattern, there in exists.items() for x in re.findall(pattern, text)
                 if not there(x)]  # fmt: skip

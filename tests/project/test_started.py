@@ -15,6 +15,7 @@ from benchmarks import two_stages
 from benchmarks.benchmarks import BENCHMARKS
 from cases import command
 from cases.command import ran
+from cases.files.docstrings import PAGES, commands
 from cases.paths import ROOT
 from cases.solid import block, reduced
 from rom.cli.parser import build_parser
@@ -110,7 +111,6 @@ def test_a_target_of_make_starts_modules_and_files_that_are_there(target, tmp_pa
     assert (ROOT / "rom" / "__init__.py").exists()
 
 
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 OTHERS = (  # ways to install, which `.ci/other_systems.sh` goes on systems of their own
     "sudo apt-get install", "/usr/bin/python3 -m venv", "python3 -m venv", ".venv/bin/pip install",
     "conda ", "docker ",
@@ -127,14 +127,6 @@ SHORTER = (  # what a command of a page gets instead, so that it takes seconds a
     (r"--held foot", "--held root"),
 )
 NOTHING_TO_RESUME = "there is nothing to resume"
-
-
-def commands(page):
-    """Lines of the blocks of a page, with what goes over several in one."""
-    blocks = re.findall(r"^```(?:sh|bash|console)\n(.*?)^```$", page.read_text(), re.M | re.S)
-    text = "".join(blocks).replace("\\\n", " ")
-    words = (shlex.split(line, comments=True) for line in text.splitlines())
-    return [shlex.join(line) for line in words if line]
 
 
 def kind(line):

@@ -11,7 +11,7 @@ import pytest
 
 import rom
 from cases.command import ran
-from cases.files.docstrings import INSIDE
+from cases.files.docstrings import DEMOS, INSIDE, PAGES
 from cases.paths import ROOT
 from rom import errors
 from rom.cli.parser import EXIT_CODES
@@ -51,10 +51,8 @@ def test_every_error_is_caught_by_its_name_and_has_an_exit_code_the_help_explain
     assert documented == [str(code) for code in range(8)]
 
 
-WRITTEN = (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))
-PAGES = [path for path in WRITTEN if "generated" not in path.parts]
 FILES, MODULES = files(), sorted((ROOT / "rom").rglob("*.py"))
-USERS_READ = [*PAGES, *(ROOT / "demos").glob("*.py")]
+USERS_READ = [*PAGES, *DEMOS]
 HOSTS = r"\b(pypi|pythonhosted|deb\.debian|anaconda|conda\.io|dockerhub|docker\.io)\b"
 PRIVATE = r"\bnumba\.(core|np|_\w+)\b|\bllvmlite\b|\.overloads\b|\bcall_conv\b"
 NOWHERE = {  # what no line may have: a pattern, in which files, but for those
