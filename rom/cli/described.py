@@ -10,11 +10,9 @@ from rom.cli.options import (
     faces,
     meshing,
     names,
-    number,
     number_or_text,
-    numbers,
+    numbers_of,
     option,
-    positive,
     unique,
 )
 from rom.config.component_keys import TABLE
@@ -78,10 +76,7 @@ def keyed(to: argparse._ActionsContainer, *several: str) -> None:
 
 def _value(kind: Kind) -> Callable[[str], object] | None:
     """What reads the value of an option in SI; None for a flag, which has none."""
-    if isinstance(kind, Quantity):
-        one = number if kind.low < 0.0 else positive
-        return one if kind.shapes == ((),) else numbers
-    return VALUES.get(type(kind))
+    return numbers_of(kind) if isinstance(kind, Quantity) else VALUES.get(type(kind))
 
 
 def described(args: argparse.Namespace) -> bool:
