@@ -235,6 +235,7 @@ MISTAKES = {  # what stands in the file, or nothing; what instead, or behind it;
     "name twice": ("", DRIVE.replace(".m", ".pivot") + "1\n", 19, "'pivot' is used twice"),
     "stop": ("", '[stops.m]\njoint = "pivot"\nstiffness = 1\n', 19, "stop 'm' has no limit"),
     "missing file": ("", '[bodies.x]\nfile = "nope.rom.npz"\n', 19, "nope.rom.npz"),
+    "no bodies": (PENDULUM, "[simulation]\nt_end = 1.0\n", 2, "bodies is missing"),
     "a component": (PENDULUM, '[geometry]\nfile = "x.geo"\n', 2, "this is a component"),
 }
 

@@ -235,13 +235,3 @@ def test_every_refusal_of_a_mechanism_file_has_file_line_and_cure(tmp_path):
             taken.append(change)
     free = {"", "law = -1.0", 'name = "text"', 'name = "3 furlong"'}
     assert set(taken) == free and refused > 170
-
-
-def test_what_is_missing_altogether_has_the_line_behind_which_it_goes(tmp_path):
-    path = tmp_path / "crank.toml"
-    path.write_text("[simulation]\nt_end = 1.0\n")
-    with pytest.raises(RomError, match=r"crank\.toml:2: bodies is missing"):
-        rom.read_mechanism(path)
-    path.write_text(MECHANISM.replace("t_end", "tend"))
-    with pytest.raises(RomError, match=r"crank\.toml:\d+: 2 mistakes"):
-        rom.read_mechanism(path)

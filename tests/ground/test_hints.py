@@ -63,7 +63,10 @@ WRONG_CALLS = {  # call: words of the message or hint
     'sol.position("a", "end")': r"\['m'\]",
     'sol.position(a, "m")': "write 'a'",
     'mech.drive("d", a, lambda t: t)': "write 'a'",
-    'mech.revolute("j", a, b.marker("m"), axis=(0, 0, 1))': r"from part.marker\(place\)",
+    'rom.reduce(model, method="rubin", **TO_TIP)':
+        r"^reduce: method = 'rubin' must be .* Method \(such as rom.CraigBampton\(n_modes=20\)",
+    'mech.revolute("j", a, b.marker("m"), axis=(0, 0, 1))':
+        r"^Mechanism.revolute 'j': m1 = .* of type Marker \(from part.marker\(place\)",
     'state.position("a")': "rom.snapshot.mechanism, state",
     "sol.positions": "'position'",
     'mech.add_body("c")': "Write add_rigid, or add_flexible",
