@@ -16,7 +16,7 @@ from rom.cli.options import (
     unique,
 )
 from rom.config.component_keys import TABLE
-from rom.config.keys import Kind, Text, Words
+from rom.config.keys import Text, Words
 from rom.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -71,12 +71,9 @@ def keyed(to: argparse._ActionsContainer, *several: str) -> None:
             default = key.default if isinstance(key.default, tuple) else (key.default,)
             about += f" (default {', '.join(map(str, default))})"
         how = {"choices": kind.choices} if getattr(kind, "choices", ()) else {}
-        option(to, words, about, _value(kind), default=key.default, **how)
-
-
-def _value(kind: Kind) -> Callable[[str], object] | None:
-    """What reads the value of an option in SI; None for a flag, which has none."""
-    return numbers_of(kind) if isinstance(kind, Quantity) else VALUES.get(type(kind))
+        # what reads its value in SI; None for a flag, which has none
+        read = numbers_of(kind) if isinstance(kind, Quantity) else VALUES.get(type(kind))
+        option(to, words, about, read, default=key.default, **how)
 
 
 def described(args: argparse.Namespace) -> bool:

@@ -82,7 +82,8 @@ class Reader:
         """Raise an error with the formula and a caret below the place."""
         first, last = max(0, at - WINDOW_SIZE), min(len(self.text), at + WINDOW_SIZE)
         before, behind = "..." * (first > 0), "..." * (last < len(self.text))
-        line = before + _printed(self.text[first:last]) + behind
+        letters = (x if x.isprintable() else " " for x in self.text[first:last])
+        line = before + "".join(letters) + behind  # each letter in its place
         caret = " " * (len(before) + at - first) + "^"
         message = f"{self.place.name}: {what}.\n    {line}\n    {caret}"
         raise self.place.error(message, hint)
@@ -186,11 +187,6 @@ class Reader:
                 yield code, 0.0
         if most is not None:
             yield code, 0.0
-
-
-def _printed(text: str) -> str:
-    """On one line, each letter in its place."""
-    return "".join(letter if letter.isprintable() else " " for letter in text)
 
 
 @dataclass(frozen=True, slots=True)
