@@ -85,10 +85,6 @@ def whole(module, name):
     return module if name is None else f"{module}.{name}"
 
 
-def part_of(path):
-    return path.relative_to(ROOT / "rom").with_suffix("").parts[0]
-
-
 def wrong(part, name):
     """What is wrong with an import, or nothing."""
     package, _, rest = name.partition(".")
@@ -115,12 +111,11 @@ def remarks(judge):
 
 
 def test_imports_follow_the_layers():
-    bad = remarks(
-        lambda path, module, name: wrong(
-            part_of(path), whole(module, name) if module == "rom" else module
-        )
-    )
-    assert not bad, "\n".join(bad)
+    def judge(path, module, name):
+        own = path.relative_to(ROOT / "rom").with_suffix("").parts[0]
+        return wrong(own, whole(module, name) if module == "rom" else module)
+
+    assert not remarks(judge)
 
 
 def upward(path, name, order):
@@ -141,8 +136,7 @@ def upward(path, name, order):
 
 def test_no_file_imports_from_a_higher_room():
     """At every level, also inside functions and where only types are meant."""
-    bad = remarks(lambda path, module, name: upward(path, whole(module, name), ORDER))
-    assert not bad, "\n".join(bad)
+    assert not remarks(lambda path, module, name: upward(path, whole(module, name), ORDER))
 
 
 def test_every_room_has_its_place_in_the_order():

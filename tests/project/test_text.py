@@ -92,18 +92,12 @@ STUBS = {
 FOLDERS = sorted(path for path in (ROOT / "rom").rglob("__init__.py") if path.parent.name != "rom")
 
 
-def front_of(package):
-    if package.startswith("rom.fe"):
-        pytest.importorskip("dolfinx", reason="modules of rom.fe need it")
-    return import_module(package)
-
-
 @pytest.mark.parametrize(
     "package",
     [pytest.param(n, marks=[pytest.mark.fenicsx] * n.startswith("rom.fe")) for n in STUBS],
 )
 def test_a_front_has_the_names_of_its_stub_and_shows_no_others(package):
-    front = front_of(package)
+    front = import_module(package)
     lines = [n for n in ast.parse(STUBS[package].read_text()).body if isinstance(n, ast.ImportFrom)]
     own = [line for line in lines if line.module != "typing"]
     assert isinstance(front, Front)

@@ -6,8 +6,6 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 CLASSES = {  # number of the class: its module
     "3": "geometry",  # geometries as programs
     "4": "motion",  # what is kept of one
@@ -72,18 +70,6 @@ def write(name: str, content: str | bytes) -> Callable[[Path], object]:
     """Writes a file."""
     data = content if isinstance(content, bytes) else content.encode()
     return lambda folder: (folder / name).write_bytes(data)
-
-
-def arrays_changed(name: str, change: Callable[[dict[str, Any]], object]) -> Any:
-    """Changes arrays of a body file behind the back of its checksums, as another program would."""
-
-    def prepare(folder: Path) -> None:
-        with np.load(folder / name) as found:
-            arrays = dict(found)
-        change(arrays)
-        np.savez(folder / name, **arrays)
-
-    return prepare
 
 
 def geometry(line: str) -> Callable[[Path], object]:

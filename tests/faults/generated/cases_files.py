@@ -1,12 +1,13 @@
 """Command lines and files of all kinds: wrong by hand, by table and at random."""
 
+import io
 import zipfile
 
 import numpy as np
 from scipy.sparse import identity
 
 import rom
-from generated.case import Silent, arrays_changed, case, edit, write
+from generated.case import Silent, case, edit, write
 from generated.stock import MATRICES, STEEL, model
 from rom.errors import ConfigError, FileFormatError, InterfaceError, MaterialError, ModelError
 from rom.io.sid.dialect import read_sid
@@ -82,21 +83,22 @@ def craig_bampton(folder):
     return rom.craig_bampton(model().K, identity(3, format="csr"), list(range(12)), 2)
 
 
-def stored(member):
+def stored(member, data=None):
     """A member of another name in the body file."""
 
     def prepare(folder):
         with zipfile.ZipFile(folder / BODY, "a") as archive:
-            archive.writestr(member, archive.read("K.npy"))
+            archive.writestr(member, data or archive.read("K.npy"))
 
     return prepare
 
 
+PICKLED = io.BytesIO()
+np.save(PICKLED, np.array([{"a": 1}], dtype=object))
 CASES = [
     *(case(f"a member named {member}", f"check {BODY}", READ, BODY, given=stored(member))
       for member in ("../pwned.npy", "/nowhere/pwned.npy", "a\\b.npy")),
-    case("a pickle that nothing names", f"check {BODY}", Silent, given=arrays_changed(
-        BODY, lambda arrays: arrays.update(extra=np.array([{"a": 1}], dtype=object)))),
+    case("a pickle that nothing names", f"check {BODY}", Silent, given=stored("extra.npy", PICKLED.getvalue())),
     *(case(f"rom {verb} without several things", line, CONFIG, *words)
       for verb, (line, *words) in MISSING.items()),
     case("two sets that are not there", LINE.replace("root", "rot").replace("tip", "tipp"), FOREIGN,
