@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.special import ellipk
 
 import rom
-from cases.command import ROOT, python
+from cases.command import ROOT
 from cases.files.schema import answer
 from cases.files.toml_files import ALL, CRANK, PENDULUM, laid_out
 from cases.long import few
@@ -255,17 +255,6 @@ def test_markers_far_apart_are_warned_of(tmp_path):
     (tmp_path / "p.toml").write_text(PENDULUM.replace('"-500 mm"', '"-400 mm"'))
     with pytest.warns(rom.errors.RomWarning, match=r"p.toml:10: .* 'pivot' are 0.1 m apart"):
         read_mechanism(tmp_path / "p.toml").mechanism()
-
-
-def test_it_moves_without_fenicsx_and_pictures(folder):
-    """A machine with NumPy, SciPy and Numba only reads and moves a mechanism file."""
-    heavy = ["dolfinx", "ufl", "petsc4py", "mpi4py", "gmsh", "pyvista", "matplotlib", "meshio"]
-    code = f"import sys; sys.modules.update(dict.fromkeys({heavy!r}))\n"
-    code += "from rom.cli.main import main\n"
-    code += "sys.exit(main(['simulate', 'crank.toml', '-q', '-o', 'out']))"
-    done = python("-c", code, cwd=folder, timeout=600)
-    assert done.returncode == 0, done.stderr
-    assert (folder / "out" / "motion.csv").exists()
 
 
 @pytest.mark.long
