@@ -49,8 +49,8 @@ class Solids:
 
     def read(self, value: object, place: Place) -> Values:
         """Values of the material, or of each region under "regions"."""
-        several = isinstance(value, Mapping) and value
-        if several and all(isinstance(v, dict) for v in value.values()):
+        several = value.values() if isinstance(value, Mapping) else ()
+        if several and all(isinstance(v, dict) for v in several):
             return {"regions": Named(SOLID, "materials").read(value, place)}
         return SOLID.read(value, place)
 

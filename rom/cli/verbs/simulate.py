@@ -226,8 +226,8 @@ def _pendulum(args: argparse.Namespace) -> Answer:
         from rom.mbs.results.audit import audit as audited
 
         mechanism = pendulum(body, args.hinge, axis=args.axis, gravity=args.gravity)
-        how = {"progress": _aloud(args), "keep": keep}
-        solution = simulate(mechanism, t_end=args.t_end, dt=args.dt, **how)
+        steps = {"t_end": args.t_end, "dt": args.dt}
+        solution = simulate(mechanism, **steps, progress=_aloud(args), keep=keep)
         audit = audited(solution)
 
     def write() -> None:
