@@ -8,7 +8,7 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, NoReturn, Protocol
 
-from rom.arguments import Quantity, Whole
+from rom.arguments import Quantity, Whole, shortened
 from rom.config.document import Document, KeyPath, Values
 from rom.errors import ConfigError
 from rom.names import check_text
@@ -41,7 +41,7 @@ class Place:
 
     def refuse(self, value: object, wanted: str) -> NoReturn:
         """Raise the error of a value, with a sentence about what is wanted behind it."""
-        raise self.error(f"{self.name} = {as_text(value)}{wanted}.")
+        raise self.error(f"{self.name} = {shortened(value)}{wanted}.")
 
     @contextmanager
     def told(self) -> Iterator[None]:
@@ -354,12 +354,6 @@ def nearest(word: str, known: Iterable[object]) -> str:
     words = [str(k) for k in known]
     near = get_close_matches(word, words, n=1)
     return (f"Did you mean {near[0]}? " if near else "") + f"Known: {', '.join(words)}."
-
-
-def as_text(value: object) -> str:
-    """A value, not longer than a line."""
-    text = repr(value) if not isinstance(value, int) or abs(value) < 10**18 else "a huge number"
-    return text if len(text) <= 60 else text[:57] + "..."
 
 
 def read_table(table: Table, document: Document) -> Values:

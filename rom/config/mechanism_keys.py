@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any, NamedTuple
 
-from rom.arguments import NotNegative, Number, Positive, Quantity
+from rom.arguments import NotNegative, Number, Positive, Quantity, shortened
 from rom.config.declared import Declared
 from rom.config.expressions import FormulaTable, formula_keys, formula_kind
 from rom.config.keys import (
@@ -21,7 +21,6 @@ from rom.config.keys import (
     Text,
     Variants,
     Words,
-    as_text,
     read_value,
 )
 from rom.config.laws import ByCoordinate, law_kind
@@ -49,7 +48,7 @@ class MarkerName:
             body, _, marker = value.partition(".")
             return body, marker
         raise place.error(
-            f"{place.name} = {as_text(value)} is no marker.",
+            f"{place.name} = {shortened(value)} is no marker.",
             'Write "body.marker", or { ground = [x, y, z] }.',
         )
 
