@@ -95,7 +95,9 @@ def mechanism(args: argparse.Namespace, *extra: str) -> "MechanismFile":
     return read_mechanism(args.file, changes(args.given, MOTION_KEYS, extra), **meshing(args))
 
 
-def changes(given: dict[str, Any], places: dict[str, tuple[str, ...]], extra: Any) -> Changes:
+def changes(
+    given: dict[str, Any], places: dict[str, tuple[str, ...]], extra: tuple[str, ...]
+) -> Changes:
     """What options say, by the keys of the file."""
     found: Changes = {}
     for name, value in given.items():
