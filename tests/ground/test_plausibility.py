@@ -1,6 +1,5 @@
 """Numbers of another unit never pass in silence, and numbers of real machines always do."""
 
-import json
 import warnings
 from dataclasses import replace
 
@@ -9,7 +8,6 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
-from cases.command import rom as run_rom
 from cases.files.cells import solid as solid_mesh
 from cases.solid import STEEL, block, reduced
 from rom.body.conversion import Factors
@@ -318,22 +316,6 @@ def test_a_step_file_that_is_scaled_on_top_of_its_unit_is_doubted(scale, n, tmp_
     gmsh.finalize()
     found = said(lambda: read_mesh(path, scale=scale))
     assert [("scale=0.001" in text and "0.0001225 m" in text) for text in found] == [True] * n
-
-
-@pytest.mark.once
-def test_strict_turns_a_doubt_into_an_error_of_its_own_code(tmp_path):
-    path = tmp_path / "m.toml"
-    path.write_text(
-        "gravity = [0, 0, -9810]\n[bodies.a]\nmass = 1\ninertia = [1, 1, 1]\nat = [0, 0, 0]\n"
-        "[simulation]\nt_end = 1e-3\ndt = 1e-3\n"
-    )
-    arguments = ("simulate", path, "-o", tmp_path / "out", "--json")
-    done = run_rom(*arguments, "--strict")
-    assert done.returncode == 5 and "9810" in json.loads(done.stdout)["message"]
-    done = run_rom(*arguments)
-    assert done.returncode == 0
-    assert [text for text in json.loads(done.stdout)["warnings"] if "9810" in text] != []
-    assert done.stderr.count("9810 m/s^2;") == 1
 
 
 def matrices(folder, *, k=1.0, m=1.0, x=1.0, material=STEEL, units="SI"):
