@@ -122,8 +122,6 @@ CASES = [
     *(case(f"a document: {name}", "simulate pendulum.toml -o out",
            (ConfigError, FileFormatError, rom.UnsafeFileError), *words, given=write("pendulum.toml", data))
       for name, (data, *words) in BYTES.items()),
-    case("a warning with --strict", f"modes box.msh --strict -n 7 {STEEL} --degree 1", rom.QualityGateError,
-         "linear tetrahedra", fe=True),
     *(case(f"{a} read as {b}", lambda folder, a=a, b=b: READERS[b](folder / a), (*READ, ConfigError), a)
       for a in READERS for b in READERS if READERS[a] is not READERS[b]),
     *(case(f"a deck: {name}", LINE, FOREIGN, word, given=edit("deck.inp", old, new))
