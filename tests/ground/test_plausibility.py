@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose
 
 import rom
 from cases.files.cells import solid as solid_mesh
+from cases.files.step_parts import step_box
 from cases.solid import STEEL, block, reduced
 from rom.body.conversion import Factors
 from rom.body.rotating import rotating_frequencies
@@ -304,16 +305,10 @@ def test_geometries_compare_parameters_with_their_defaults(name, text, L, n, tmp
 @pytest.mark.fenicsx
 @pytest.mark.parametrize(("scale", "n"), [(1.0, 0), (1e-3, 1)])
 def test_a_step_file_that_is_scaled_on_top_of_its_unit_is_doubted(scale, n, tmp_path):
-    gmsh = pytest.importorskip("gmsh")
     from rom.fe.mesh.read import read_mesh
 
     path = tmp_path / "box.step"
-    gmsh.initialize([], False)
-    gmsh.option.setNumber("General.Terminal", 0)
-    gmsh.model.occ.addBox(0, 0, 0, 100.0, 50.0, 50.0)  # STEP files of gmsh are in millimetres
-    gmsh.model.occ.synchronize()
-    gmsh.write(str(path))
-    gmsh.finalize()
+    step_box(path, 100.0, 50.0, 50.0)
     found = said(lambda: read_mesh(path, scale=scale))
     assert [("scale=0.001" in text and "0.0001225 m" in text) for text in found] == [True] * n
 

@@ -16,6 +16,7 @@ from benchmarks.benchmarks import BENCHMARKS
 from cases import command
 from cases.command import ran
 from cases.files.docstrings import PAGES, commands
+from cases.files.step_parts import step_part
 from cases.paths import ROOT
 from cases.solid import block, reduced
 from rom.cli.parser import build_parser
@@ -151,17 +152,12 @@ SHOWN = [page for page in PAGES if page.name != "step_part.md" and
          "rom" in map(kind, commands(page))]  # fmt: skip
 
 
-def part(folder):
-    """A plate with a blind bore of 6 mm, which leaves its foot whole, in millimetres."""
-    import gmsh
-
-    gmsh.initialize()
-    plate = gmsh.model.occ.addBox(-20, -20, 0, 80, 40, 10)
-    bore = gmsh.model.occ.addCylinder(0, 0, 4, 0, 0, 30, 6)
-    gmsh.model.occ.cut([(3, plate)], [(3, bore)])
-    gmsh.model.occ.synchronize()
-    gmsh.write(str(folder / "part.step"))
-    gmsh.finalize()
+def part(path):
+    """A plate with a blind bore of 6 mm, which leaves its foot whole."""
+    with step_part(path) as occ:
+        plate = occ.addBox(-20, -20, 0, 80, 40, 10)
+        bore = occ.addCylinder(0, 0, 4, 0, 0, 30, 6)
+        occ.cut([(3, plate)], [(3, bore)])
 
 
 @pytest.mark.long
@@ -170,7 +166,7 @@ def part(folder):
 def test_commands_of_a_page_run_one_after_the_other(page, tmp_path):
     for name in ("meshes", "demos"):
         shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
-    part(tmp_path)
+    part(tmp_path / "part.step")
     made = reduced(4, block(), reference="root")
     rom.save(made, tmp_path / "jacket.rom.npz")
     for line in commands(page):
