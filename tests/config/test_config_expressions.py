@@ -228,8 +228,8 @@ def test_noise_is_refused_or_a_number():
 @pytest.mark.parametrize(
     ("section", "expression", "message"),
     [
-        ("drives", "2 + 1/(t - 0.25)", "function of 'm'"),
-        ("motors", "log(0.25 - t)", "law of 'm' gives no finite number"),
+        ("drives", "2 + 1/(t - 0.5)", "function of 'm'"),
+        ("motors", "log(0.5 - t)", "law of 'm' gives no finite number"),
     ],
 )
 def test_a_value_that_is_not_finite_is_told_with_the_time(section, expression, message, tmp_path):
@@ -237,4 +237,4 @@ def test_a_value_that_is_not_finite_is_told_with_the_time(section, expression, m
     (tmp_path / "p.toml").write_text(PENDULUM + law)
     with pytest.raises(rom.RomError, match=message) as refused:
         rom.read_mechanism(tmp_path / "p.toml").simulate()
-    assert "t = 0.25" in str(refused.value) and refused.value.solution.t[-1] <= 0.25
+    assert "t = 0.5" in str(refused.value) and refused.value.solution.t[-1] <= 0.5
