@@ -3,7 +3,7 @@
 import json
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from rom.model import Report
@@ -36,11 +36,7 @@ def table(header: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
 
 def report_data(report: Report) -> Data:
     """A report for ``--json``."""
-    rows = [
-        {"quantity": r.quantity, "value": r.value, "limit": r.limit, "ok": r.ok}
-        for r in report.rows
-    ]
-    return {"title": report.title, "ok": report.ok, "rows": rows}
+    return {"title": report.title, "ok": report.ok, "rows": [asdict(row) for row in report.rows]}
 
 
 def failures(report: Report) -> tuple[str, ...]:

@@ -10,15 +10,13 @@ from rom.cli.options import (
     faces,
     meshing,
     names,
-    number,
     number_or_text,
-    numbers,
+    numbers_of,
     option,
-    positive,
     unique,
 )
 from rom.config.component_keys import TABLE
-from rom.config.keys import Kind, Text, Words
+from rom.config.keys import Text, Words
 from rom.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -73,15 +71,9 @@ def keyed(to: argparse._ActionsContainer, *several: str) -> None:
             default = key.default if isinstance(key.default, tuple) else (key.default,)
             about += f" (default {', '.join(map(str, default))})"
         how = {"choices": kind.choices} if getattr(kind, "choices", ()) else {}
-        option(to, words, about, _value(kind), default=key.default, **how)
-
-
-def _value(kind: Kind) -> Callable[[str], object] | None:
-    """What reads the value of an option in SI; None for a flag, which has none."""
-    if isinstance(kind, Quantity):
-        one = number if kind.low < 0.0 else positive
-        return one if kind.shapes == ((),) else numbers
-    return VALUES.get(type(kind))
+        # what reads its value in SI; None for a flag, which has none
+        read = numbers_of(kind) if isinstance(kind, Quantity) else VALUES.get(type(kind))
+        option(to, words, about, read, default=key.default, **how)
 
 
 def described(args: argparse.Namespace) -> bool:
@@ -103,7 +95,9 @@ def mechanism(args: argparse.Namespace, *extra: str) -> "MechanismFile":
     return read_mechanism(args.file, changes(args.given, MOTION_KEYS, extra), **meshing(args))
 
 
-def changes(given: dict[str, Any], places: dict[str, tuple[str, ...]], extra: Any) -> Changes:
+def changes(
+    given: dict[str, Any], places: dict[str, tuple[str, ...]], extra: tuple[str, ...]
+) -> Changes:
     """What options say, by the keys of the file."""
     found: Changes = {}
     for name, value in given.items():

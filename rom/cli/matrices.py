@@ -4,27 +4,16 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rom.cli.options import assignment, material, option, reading, require, unique
+from rom.cli.options import assignment, material, option, reading, require, unique, verb_parsers
 from rom.errors import ConfigError
 from rom.names import is_whole, named
 
 if TYPE_CHECKING:
     from rom.model import FEModel, Index
 
-GEOMETRY_OPTIONS: dict[str, object] = {  # options of a geometry, and what they are when not given
-    "E": None,
-    "nu": None,
-    "rho": None,
-    "degree": 2,
-    "solver": "auto",
-    "parameter": [],
-    "face": [],
-    "scale": 1.0,
-    "order": None,
-    "trust": False,
-    "time_limit": None,
-    "memory_limit": None,
-}
+GEOMETRY_OPTIONS = (
+    "E nu rho degree solver parameter face scale order trust time_limit memory_limit".split()
+)
 MOST_NODES = 10_000_000  # in a range
 
 
@@ -69,13 +58,11 @@ def read_matrices(args: argparse.Namespace) -> "FEModel":
     from rom.config.component import source
     from rom.io.matrices.read_model import read_model
 
-    odd = [
-        f"--{name.replace('_', '-')}"
-        for name, default in GEOMETRY_OPTIONS.items()
-        if getattr(args, name) != default
-    ]
+    parser = verb_parsers(args.parser)[args.verb]
+    odd = [name for name in GEOMETRY_OPTIONS if getattr(args, name) != parser.get_default(name)]
     if odd:
-        raise ConfigError(f"{odd[0]} is for geometries, and --mass for matrices; give one of them.")
+        option = f"--{odd[0].replace('_', '-')}"
+        raise ConfigError(f"{option} is for geometries, and --mass for matrices; give one of them.")
     if args.nodes is None:
         raise ConfigError("--mass needs --nodes, the file with the places of the nodes.")
     held = [word.partition(":")[0] for word in getattr(args, "fixed", ())]

@@ -2,9 +2,13 @@
 
 import argparse
 from collections.abc import Callable, Mapping
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
+import numpy as np
+
+from rom.arguments import NotNegative, Number, Positive, Quantity
 from rom.errors import ConfigError
 from rom.names import check_once, is_whole
 
@@ -18,41 +22,40 @@ BYTES_PER_GIGABYTE = 1e9
 OUTPUT_FLAG = "-o/--output"
 
 
-def number(text: str) -> float:
-    """A finite number."""
-    try:
-        value = float(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(
-            f"{text!r} is not a number" + (" (write a decimal point)" if "," in text else "")
-        ) from None
-    if value != value or value in (float("inf"), float("-inf")):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a finite number")
-    return value
+def numbers_of(kind: Quantity) -> Callable[[str], Any]:
+    """What reads the value of an option: numbers with commas, of the shape and limits of a kind."""
+    n = kind.shapes[0]
+    wanted = f"{n[0] or 'only'} numbers with commas" if n else "a number (write a decimal point)"
+
+    def read(text: str) -> object:
+        try:
+            x = np.array(text.split(",") if n else text, dtype=float)
+        except ValueError:
+            x = np.array(np.nan)
+        if not (np.isfinite(x).all() and kind.has_shape(x.shape)):
+            raise argparse.ArgumentTypeError(f"{text!r} is not {wanted}")
+        if kind.fault(x):
+            raise argparse.ArgumentTypeError(f"{text} {kind.must}")
+        return tuple(x.tolist()) if n else float(x)
+
+    return read
+
+
+number, positive, not_negative = map(numbers_of, (Number(), Positive(), NotNegative()))
+vector = numbers_of(Number("1", (3,)))
 
 
 def typed_number(option: str, text: str) -> float:
     """A finite number in the value of an option."""
     try:
-        return number(text)
+        return float(number(text))
     except argparse.ArgumentTypeError as error:
         raise ConfigError(f"{option}: {error}; a number is needed.") from None
 
 
-def positive(text: str) -> float:
-    """A number above zero."""
-    value = number(text)
-    if value <= 0:
-        raise argparse.ArgumentTypeError(f"{text} is not positive")
-    return value
-
-
 def limit(text: str) -> float:
     """A number from zero on, or inf."""
-    value = float("inf") if text == "inf" else number(text)
-    if value < 0:
-        raise argparse.ArgumentTypeError(f"{text} is negative")
-    return value
+    return inf if text == "inf" else float(not_negative(text))
 
 
 def count(text: str) -> int:
@@ -60,20 +63,6 @@ def count(text: str) -> int:
     if not is_whole(text):
         raise argparse.ArgumentTypeError(f"{text!r} is not a whole number")
     return int(text)
-
-
-def vector(text: str) -> tuple[float, float, float]:
-    """Three numbers with commas."""
-    parts = text.split(",")
-    if len(parts) != 3:
-        raise argparse.ArgumentTypeError(f"{text!r} is not three numbers with commas, as in 0,0,1")
-    x, y, z = map(number, parts)
-    return x, y, z
-
-
-def numbers(text: str) -> tuple[float, ...]:
-    """Numbers with commas."""
-    return tuple(map(number, text.split(",")))
 
 
 def names(text: str) -> tuple[str, ...]:

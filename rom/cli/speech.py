@@ -77,7 +77,9 @@ def speaking(options: OutputOptions, *, verbose: bool) -> Iterator[list[str]]:
             print_to_stderr(f"warning: {text}")
 
     log, handler = logging.getLogger("rom"), logging.StreamHandler()
-    log.setLevel(_level(options) if verbose else logging.CRITICAL)
+    level = logging.DEBUG if options.verbose else logging.INFO
+    level = logging.ERROR if options.quiet else level
+    log.setLevel(level if verbose else logging.CRITICAL)
     log.addHandler(handler)
     log.propagate = False  # ffcx gives the root logger a handler of its own
     try:
@@ -88,12 +90,6 @@ def speaking(options: OutputOptions, *, verbose: bool) -> Iterator[list[str]]:
     finally:
         log.removeHandler(handler)
         log.propagate = True
-
-
-def _level(options: OutputOptions) -> int:
-    if options.quiet:
-        return logging.ERROR
-    return logging.DEBUG if options.verbose else logging.INFO
 
 
 def say(text: str) -> None:

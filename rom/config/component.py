@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rom.arguments import Quantity, typed
+from rom.arguments import Quantity, shortened, typed
 from rom.config.component_keys import TABLE
 from rom.config.document import Document, KeyPath, Values, read_document
-from rom.config.keys import Place, as_text, read_table, read_value
+from rom.config.keys import Place, read_table, read_value
 from rom.config.methods import chosen
 from rom.errors import ConfigError, RomError
 from rom.units import LENGTH, in_si, unit
@@ -283,7 +283,7 @@ def change(data: Values, key: tuple[str, ...], value: object) -> None:
     for name in key[:-1]:
         inner = data.setdefault(name, {})
         if not isinstance(inner, dict):
-            raise ConfigError(f"{name} = {as_text(inner)} must be a table, to have keys below.")
+            raise ConfigError(f"{name} = {shortened(inner)} must be a table, to have keys below.")
         data = inner
     if value is None:
         data.pop(key[-1], None)

@@ -35,32 +35,24 @@ ORTHOTROPIC = Declared(
 SHAPES = "rom.reduction.interfaces.polynomial"
 
 
+SOLID = Variants(
+    {"isotropic": ISOTROPIC, "orthotropic": ORTHOTROPIC}, {"G": "orthotropic"}, "isotropic"
+)
+
+
 @dataclass(frozen=True, slots=True)
 class Solids:
     """One material, or a table of them by region."""
 
-    parts: ClassVar[dict[str, Table]] = {"isotropic": ISOTROPIC, "orthotropic": ORTHOTROPIC}
-    summary: str = "isotropic or orthotropic table, or a table of them by region"
+    parts: ClassVar[Mapping[str, Table]] = SOLID.tables
+    summary: str = f"{SOLID.summary}; or table of them by region"
 
     def read(self, value: object, place: Place) -> Values:
         """Values of the material, or of each region under "regions"."""
-        if (
-            isinstance(value, Mapping)
-            and value
-            and all(isinstance(v, dict) for v in value.values())
-        ):
-            return {"regions": Named(_Solid(), "materials").read(value, place)}
-        return _Solid().read(value, place)
-
-
-@dataclass(frozen=True, slots=True)
-class _Solid:
-    summary: str = "material"
-
-    def read(self, value: object, place: Place) -> Values:
-        """Values of one material."""
-        other = isinstance(value, Mapping) and "G" in value
-        return (ORTHOTROPIC if other else ISOTROPIC).read(value, place)
+        several = value.values() if isinstance(value, Mapping) else ()
+        if several and all(isinstance(v, dict) for v in several):
+            return {"regions": Named(SOLID, "materials").read(value, place)}
+        return SOLID.read(value, place)
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,24 +128,21 @@ TABLE = Table("A component.", (
             ("mean-axis",)),
         Key("stiffening", Flag(), "Add the geometric stiffness of rotation and of loads on "
             "interfaces.", False),
-        Key("nonlinear", Table("Loads under which it is to deflect far, and shapes for them.", (
+        Key("nonlinear", Declared(
+            "rom.body.nonlinear.ranges:Geometric",
             Key("loads", Named(Table("The largest load on an interface, of either sign.", (
                 Key("force", Quantity("N", ((3,),)), "Along the axes of the geometry.", (0.0,) * 3),
                 Key("moment", Quantity("N m", ((3,),)), "About the same axes.", (0.0,) * 3),
             )), "loads"), "Largest loads by interface.", ...),
             Key("modes", Whole(), "So many of the lowest modes drag others along.", 4),
-            Key("tol", Positive("1"), "Share of the states left out.", 1e-4),
             Key("shapes", Whole(1), "So many shapes are added; as tol asks if missing."),
             Key("steps", Whole(1), "States on the way to the largest load.", 4),
-            Key("fixed", Words(), "Held beside the reference, wholly or as `name:yz`.", ()),
-            Key("spin", Quantity("rad/s", ((3,),)), "Largest angular velocity about each axis.",
-                (0.0,) * 3),
             Key("about", Quantity("m", ((3,),)), "A point of its axis; the reference if missing."),
-            Key("snapshots", Flag(), "Full solutions at the largest loads are shapes as well.",
-                False),
-            Key("sampling", Positive("1"),
-                "The material is neo-Hookean, and few elements have its energy to this share."),
-        )), "Reach large deflection."),
+            about="Loads under which it is to deflect far, and shapes for them.",
+            without="n_modes n_shapes n_steps",
+            fixed=Words(),
+            spin=Quantity("rad/s", ((3,),)),
+        ), "Reach large deflection."),
         Key("stress", Flag(), "Make stress on the surface recoverable.", False),
         Key("certificate", Flag("full"), "Compare with the full model; full: in every support, "
             "however long it takes.", True),

@@ -3,12 +3,11 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from inspect import signature
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 from rom.config.document import Values
 from rom.config.keys import Place, Variants, nearest
-from rom.config.laws import Law, law_of
+from rom.config.laws import Law, check_points, law_of
 from rom.config.mechanism_keys import sections
 from rom.config.python_files import function_of, plain_function_of
 from rom.errors import ConfigError
@@ -151,12 +150,7 @@ def _points(entry: Entry) -> None:
     from rom.mbs.elements.formulas.lines import line_law, through_points
 
     x, values = entry.values["x"], entry.values["values"]
-    if len(x) != len(values) or len(x) < 2:
-        raise entry.place.error(
-            f"{entry.place.name} needs two lengths or more, and as many values."
-        )
-    if any(b <= a for a, b in pairwise(x)):
-        raise entry.place.at("x").error(f"the lengths of {entry.place.name} must ascend.")
+    check_points(x, values, entry.place.at("x"), "lengths")
     one, two = entry.ends
     force, potential = through_points(x, values, entry.values["interpolation"])
     line_law(entry.made, entry.name, one, two, force, potential)

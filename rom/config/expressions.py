@@ -33,7 +33,7 @@ from rom.units import NUMBER as QUANTITY_NUMBER
 from rom.units import in_si
 
 MAX_LETTERS = 1000  # of a formula
-MAX_BRACKETS, MAX_DEPTH = 40, 200  # inside each other; depth of the tree
+MAX_DEPTH = 200  # of the tree
 WINDOW_SIZE = 30  # letters of a formula on either side of what is wrong in it
 TOKEN_PATTERN = re.compile(
     r"(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|(?P<word>[A-Za-z_][A-Za-z_0-9]*)"
@@ -73,7 +73,6 @@ class Reader:
                 "Give a table of points, or a function in Python.",
             )
         tokens = list(self._tokens())
-        self._check_brackets(tokens)
         code = tuple(self._walk(self._tree(tokens), 0))
         if depth(code) > MAX_STACK:
             self._refuse(0, f"it needs more than {MAX_STACK} intermediate results at once")
@@ -83,7 +82,8 @@ class Reader:
         """Raise an error with the formula and a caret below the place."""
         first, last = max(0, at - WINDOW_SIZE), min(len(self.text), at + WINDOW_SIZE)
         before, behind = "..." * (first > 0), "..." * (last < len(self.text))
-        line = before + _printed(self.text[first:last]) + behind
+        letters = (x if x.isprintable() else " " for x in self.text[first:last])
+        line = before + "".join(letters) + behind  # each letter in its place
         caret = " " * (len(before) + at - first) + "^"
         message = f"{self.place.name}: {what}.\n    {line}\n    {caret}"
         raise self.place.error(message, hint)
@@ -109,20 +109,6 @@ class Reader:
     def _known(self) -> str:
         return f"Known: + - * / ^ ( ) , {', '.join(self.names)}."
 
-    def _check_brackets(self, tokens: list[Token]) -> None:
-        opened: list[int] = []
-        for token in tokens:
-            if token.text == "(":
-                opened.append(token.at)
-                if len(opened) > MAX_BRACKETS:
-                    self._refuse(token.at, f"more than {MAX_BRACKETS} brackets are in each other")
-            elif token.text == ")":
-                if not opened:
-                    self._refuse(token.at, "this bracket was never opened")
-                opened.pop()
-        if opened:
-            self._refuse(opened[-1], "this bracket is never closed")
-
     def _tree(self, tokens: list[Token]) -> ast.expr:
         """The tree, each node of which has its ``col_offset`` in the text as written."""
         if all(token.kind == "blank" for token in tokens):
@@ -138,7 +124,7 @@ class Reader:
             tree = ast.parse(python.lstrip(), mode="eval").body
         except SyntaxError as error:
             at = min((error.offset or 1) - 1 + blanks, len(places) - 1)
-            self._refuse(places[at], "this is no formula", "Something is missing or too many.")
+            self._refuse(places[at], f"this is no formula: {error.msg}")
         except (MemoryError, RecursionError, ValueError):
             self._refuse(0, "it is nested too deeply")
         for node in ast.walk(tree):
@@ -201,11 +187,6 @@ class Reader:
                 yield code, 0.0
         if most is not None:
             yield code, 0.0
-
-
-def _printed(text: str) -> str:
-    """On one line, each letter in its place."""
-    return "".join(letter if letter.isprintable() else " " for letter in text)
 
 
 @dataclass(frozen=True, slots=True)

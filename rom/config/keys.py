@@ -8,7 +8,7 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, NoReturn, Protocol
 
-from rom.arguments import Quantity, Whole
+from rom.arguments import Quantity, Whole, shortened
 from rom.config.document import Document, KeyPath, Values
 from rom.errors import ConfigError
 from rom.names import check_text
@@ -41,7 +41,7 @@ class Place:
 
     def refuse(self, value: object, wanted: str) -> NoReturn:
         """Raise the error of a value, with a sentence about what is wanted behind it."""
-        raise self.error(f"{self.name} = {as_text(value)}{wanted}.")
+        raise self.error(f"{self.name} = {shortened(value)}{wanted}.")
 
     @contextmanager
     def told(self) -> Iterator[None]:
@@ -290,22 +290,26 @@ class Named:
 
 @dataclass(frozen=True, slots=True)
 class Variants:
-    """Tables told apart by their key ``kind``."""
+    """Tables told apart by their key ``kind``, or by one that only some of them have."""
 
     tables: Mapping[str, Table]
     # {key: kind it stands for where none is written}
     telling: Mapping[str, str] = field(default_factory=dict)
+    usual: str = ""  # kind where no key tells; then no kind is ever written
 
     @property
     def summary(self) -> str:
         """The kinds."""
-        return "table with a kind: " + ", ".join(self.tables)
+        words = "table of" if self.usual else "table with a kind:"
+        return f"{words} {', '.join(self.tables)}"
 
     def read(self, value: object, place: Place) -> Values:
         """Values by key, ``kind`` among them."""
         if not isinstance(value, Mapping):
             place.refuse(value, f": needed is a table [{place.name}]")
         written = [kind for key, kind in self.telling.items() if key in value]
+        if self.usual:
+            return self.tables[(*written, self.usual)[0]].read(value, place)
         if "kind" not in value and not written:
             raise place.error(f"kind is missing in [{place.name}].", nearest("", self.tables))
         named = value.get("kind", written[0] if written else "")
@@ -350,12 +354,6 @@ def nearest(word: str, known: Iterable[object]) -> str:
     words = [str(k) for k in known]
     near = get_close_matches(word, words, n=1)
     return (f"Did you mean {near[0]}? " if near else "") + f"Known: {', '.join(words)}."
-
-
-def as_text(value: object) -> str:
-    """A value, not longer than a line."""
-    text = repr(value) if not isinstance(value, int) or abs(value) < 10**18 else "a huge number"
-    return text if len(text) <= 60 else text[:57] + "..."
 
 
 def read_table(table: Table, document: Document) -> Values:

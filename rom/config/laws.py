@@ -120,8 +120,6 @@ def law_of(values: Any, place: Place, *, t_end: float | None = None, trust: bool
 
     values = dict(values) if isinstance(values, Mapping) else {"kind": "constant", "value": values}
     kind = values.pop("kind")
-    if kind == "table":
-        _check_points(values, place, t_end)
     if kind == "constant":
         return _polynomial(values["value"], 0.0)
     if kind == "steady":
@@ -136,6 +134,13 @@ def law_of(values: Any, place: Place, *, t_end: float | None = None, trust: bool
     if kind == "table":
         from scipy.interpolate import CubicSpline
 
+        t = values["t"]
+        check_points(t, values["values"], place, "times")
+        if t_end is not None and not (t[0] <= 0.0 and t[-1] >= t_end):
+            raise place.error(
+                f"the points of {place.name} cover {t[0]:g} s to {t[-1]:g} s; "
+                f"the run needs 0 s to {t_end:g} s."
+            )
         spline = CubicSpline(np.array(values["t"]), np.array(values["values"]))
         return Law(spline, spline.derivative(1), spline.derivative(2))
     if kind == "harmonic":
@@ -162,14 +167,9 @@ def _harmonic(values: Values) -> Law:
     )
 
 
-def _check_points(values: Values, place: Place, t_end: float | None) -> None:
-    t, y = values["t"], values["values"]
-    if len(t) != len(y) or len(t) < 2:
-        raise place.error(f"{place.name} needs two times or more, and as many values.")
-    if any(b <= a for a, b in pairwise(t)):
-        raise place.error(f"the times of {place.name} must ascend.")
-    if t_end is not None and not (t[0] <= 0.0 and t[-1] >= t_end):
-        raise place.error(
-            f"the points of {place.name} cover {t[0]:g} s to {t[-1]:g} s; "
-            f"the run needs 0 s to {t_end:g} s."
-        )
+def check_points(x: list[float], y: list[float], place: Place, what: str) -> None:
+    """Refuse points of a curve that do not ascend, or lack values."""
+    if len(x) != len(y) or len(x) < 2:
+        raise place.error(f"{place.name} needs two {what} or more, and as many values.")
+    if any(b <= a for a, b in pairwise(x)):
+        raise place.error(f"the {what} of {place.name} must ascend.")

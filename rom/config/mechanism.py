@@ -16,7 +16,6 @@ from rom.errors import ConfigError, warn
 from rom.fields import find
 
 if TYPE_CHECKING:
-    from rom.body.flexible import FlexibleBody
     from rom.mbs.integrate.keeping import Keeping
     from rom.mbs.mechanism import Mechanism
     from rom.mbs.results.solution import Solution
@@ -154,7 +153,8 @@ class MechanismFile(Described):
         body, where = marker
         names: Values = {GROUND: self.values["ground"]}
         names |= {key: made.parts[key].names for key in self.values["bodies"]}
-        names |= {key: _places(made, key) for key in made.nonlinear}
+        for key, rod in made.nonlinear.items():  # its ends, and all frames by number
+            names[key] = [*rod.body.places, *map(str, range(len(rod.parts)))]
         if body not in names:
             place.mistakes.append(place.error(f"there is no body {body!r}.", nearest(body, names)))
             return
@@ -168,12 +168,6 @@ class MechanismFile(Described):
             frames = f'"{body}.start", "{body}.end" or "{body}.3" for its frame 3'
             what = f"rod {body!r} has no points of its own."
             place.mistakes.append(place.error(what, f"Write {frames}."))
-
-
-def _places(made: "Mechanism", rod: str) -> list[str]:
-    """Markers of a rod: its ends, and all frames by number."""
-    whole = made.nonlinear[rod]
-    return [*whole.body.places, *map(str, range(len(whole.parts)))]
 
 
 def _markers(found: Any) -> list[Any]:
@@ -202,16 +196,13 @@ def _add_body(made: "Mechanism", name: str, values: Values, meshing: Values) -> 
             raise ConfigError("a rigid body has no elastic coordinates; leave q and qd out.")
         _add_rigid_from(made, name, _mass_of(file, meshing), values)
         return
-    body = _body_of(file, meshing)
+    from rom.io.native import load
+
+    described = file.suffix == ".toml"
+    body = read_component(file, **meshing).body() if described else load(file)
     if reference is not None:
         body = body.with_reference(reference[0] if len(reference) == 1 else reference)
     made.add_flexible(name, body, **values)
-
-
-def _body_of(file: Path, meshing: Values) -> "FlexibleBody":
-    from rom.io.native import load
-
-    return read_component(file, **meshing).body() if file.suffix == ".toml" else load(file)
 
 
 def _add_rigid_from(made: "Mechanism", name: str, known: "MassProperties", values: Values) -> None:
@@ -296,11 +287,7 @@ def read_mechanism(
     meshing = {"trust": trust, "time_limit": time_limit, "memory_limit": memory_limit}
     file = MechanismFile(document, read_table(mechanism_table(), document), meshing)
     with file.at("simulation", "dt"):
-        _check_step(file.values["simulation"])
+        t_end, dt = (file.values["simulation"].get(key) for key in ("t_end", "dt"))
+        if dt is not None and dt > t_end:
+            raise ConfigError(f"dt = {dt:g} s must be at most t_end = {t_end:g} s.")
     return file
-
-
-def _check_step(simulation: Values) -> None:
-    t_end, dt = simulation["t_end"], simulation.get("dt")
-    if dt is not None and dt > t_end:
-        raise ConfigError(f"dt = {dt:g} s must be at most t_end = {t_end:g} s.")

@@ -4,11 +4,10 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
-from rom.arguments import NotNegative, Number, Positive, Quantity
+from rom.arguments import NotNegative, Number, Positive, Quantity, shortened
 from rom.config.declared import Declared
-from rom.config.document import Values
 from rom.config.expressions import FormulaTable, formula_keys, formula_kind
 from rom.config.keys import (
     Either,
@@ -22,7 +21,6 @@ from rom.config.keys import (
     Text,
     Variants,
     Words,
-    as_text,
     read_value,
 )
 from rom.config.laws import ByCoordinate, law_kind
@@ -50,7 +48,7 @@ class MarkerName:
             body, _, marker = value.partition(".")
             return body, marker
         raise place.error(
-            f"{place.name} = {as_text(value)} is no marker.",
+            f"{place.name} = {shortened(value)} is no marker.",
             'Write "body.marker", or { ground = [x, y, z] }.',
         )
 
@@ -95,19 +93,7 @@ FROM_FILE = Declared(
 )
 
 
-@dataclass(frozen=True, slots=True)
-class Body:
-    """A body: rigid by its numbers, or from a file."""
-
-    parts: ClassVar[dict[str, Table]] = {"rigid": RIGID, "from a file": FROM_FILE}
-    summary: str = "table with a file, or with mass and inertia"
-
-    def read(self, value: object, place: Place) -> Values:
-        """Its values."""
-        from_file = isinstance(value, Mapping) and "file" in value
-        return (FROM_FILE if from_file else RIGID).read(value, place)
-
-
+BODY = Variants({"rigid": RIGID, "from a file": FROM_FILE}, {"file": "from a file"}, "rigid")
 BETWEEN = Key(
     "between",
     Markers(two=True),
@@ -310,7 +296,7 @@ OUTPUT = Table("What `rom simulate` writes beside the table `motion.csv`.", WRIT
 BEFORE_BODIES = (
     Key("name", Text(), "Its name; that of the file if missing."),
     Key("gravity", Quantity("m/s^2", ((3,),)), "Acceleration of gravity.", [0.0, 0.0, -9.81]),
-    Key("bodies", Named(Body(), "bodies"), "What moves, beside rods.", {}),
+    Key("bodies", Named(BODY, "bodies"), "What moves, beside rods.", {}),
 )
 GROUND_POINTS = Key("ground", Named(POINT, "points"), "Named points of the ground.", {})
 HOW = (

@@ -91,13 +91,9 @@ def _inside(word: str, table: Table) -> Iterator[str]:
     if table.keys:
         yield keys(table)
     for key in table.keys:
-        for more, one in () if _is_law(key.kind) else tables(key.kind):
+        inner = dict(tables(key.kind))
+        for more, one in () if "run-up" in inner else inner.items():  # laws have their own section
             yield from _inside(f"{key.name}, {more}".strip(", "), one)
-
-
-def _is_law(kind: Kind) -> bool:
-    """Laws have a section of their own."""
-    return "run-up" in dict(tables(kind))
 
 
 def keys(table: Table) -> str:

@@ -159,10 +159,6 @@ def _linearize() -> None:
     linearize(*_equilibrium())
 
 
-def _of_field(name: str) -> None:
-    find("first_use", name)()
-
-
 CASES: dict[str, Callable[[], object]] = {
     "pendulum": _first_motion,
     "slider-crank": _slider_crank,
@@ -176,7 +172,7 @@ CASES: dict[str, Callable[[], object]] = {
     "elements": _elements,
     "formulas": _formulas,
     "chain": _chain,
-    **{name: partial(_of_field, name) for name in names("first_use")},
+    **{name: partial(lambda one: find("first_use", one)(), name) for name in names("first_use")},
 }
 DEMO_CASES = ("pendulum", "slider-crank")  # what `make demo` and the first page need
 

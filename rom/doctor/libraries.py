@@ -218,7 +218,9 @@ def caches(forms: Answer, *, fix: bool) -> list[Finding]:
     To fix is to remove damaged files; the probe has removed those of forms.
     """
     found = [_form_cache(forms, fix)] if "path" in forms else []
-    damaged = [path for folder in numba_folders() for path in damaged_files(folder)]
+    own = os.environ.get("NUMBA_CACHE_DIR")  # where Numba may keep what it compiled for rom
+    folders = [Path(own), PACKAGE] if own else [PACKAGE]
+    damaged = [path for folder in folders for path in damaged_files(folder)]
     if fix:
         for path in damaged:
             path.unlink(missing_ok=True)
@@ -239,14 +241,6 @@ def _cache(name: str, where: str, damaged: Sequence[object], fix: bool) -> Findi
         return Finding("caches", name, f"{len(damaged)} damaged files removed {where}".strip())
     value = f"{len(damaged)} damaged files, e.g. {damaged[0]}"
     return Finding("caches", name, value, "note", REMOVE_COMMAND)
-
-
-def numba_folders() -> Iterator[Path]:
-    """Where Numba may keep what it compiled for rom."""
-    own = os.environ.get("NUMBA_CACHE_DIR")
-    if own:
-        yield Path(own)
-    yield PACKAGE
 
 
 def damaged_files(folder: Path) -> Iterator[Path]:

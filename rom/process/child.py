@@ -228,7 +228,8 @@ def sweep() -> None:
 def _remove_abandoned(path: Path) -> None:
     descriptor = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
     try:
-        if _ours(descriptor):
+        about = os.fstat(descriptor)  # ours, and closed to all others, as mkdtemp makes it
+        if about.st_uid == os.geteuid() and stat.S_IMODE(about.st_mode) == stat.S_IRWXU:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)  # held while the maker lives
             shutil.rmtree(path)
     finally:
@@ -249,9 +250,3 @@ def trusted(path: Path) -> bool:
     group = not about.st_mode & stat.S_IWGRP or about.st_gid in (os.getegid(), package.st_gid)
     owner = about.st_uid in (os.geteuid(), 0, package.st_uid)
     return owner and group and not about.st_mode & stat.S_IWOTH
-
-
-def _ours(descriptor: int) -> bool:
-    """Whether a folder belongs to this user and nobody else may enter it, as mkdtemp makes it."""
-    about = os.fstat(descriptor)
-    return about.st_uid == os.geteuid() and stat.S_IMODE(about.st_mode) == stat.S_IRWXU

@@ -16,17 +16,12 @@ N_LOOKS = 20  # one after another at a full disk: what waits no longer says by i
 GRACE_PERIOD = 1.0  # [s] between SIGTERM and SIGKILL
 
 
-def free_on(folder: str) -> int:
-    """What this user may still write there [bytes]."""
-    disk = os.statvfs(folder)
-    return disk.f_frsize * (disk.f_bavail if os.geteuid() else disk.f_bfree)
-
-
 def main(folder: str, least: int, pid: int) -> None:
     """Look until less than the least stays free; then say so where PID complains, end it."""
     n_full = 0
     while n_full < N_LOOKS:
-        free = free_on(folder)
+        disk = os.statvfs(folder)
+        free = disk.f_frsize * (disk.f_bavail if os.geteuid() else disk.f_bfree)  # for this user
         n_full = n_full + 1 if free < least else 0
         sleep(LOOK_PERIOD)
     with suppress(OSError), Path(f"/proc/{pid}/fd/2").open("a") as its_error:

@@ -108,12 +108,10 @@ class Turns:
     def _lock(self, path: Path, how: int) -> bool:
         place = int(sha256(path.name.encode()).hexdigest(), 16) % N_PLACES
         try:
-            fcntl.lockf(self._file(path.parent), how, 1, place)
+            if path.parent not in self._files:
+                file = os.open(path.parent / LOCK_FILE, os.O_RDWR | os.O_CREAT, 0o666)
+                self._files[path.parent] = file
+            fcntl.lockf(self._files[path.parent], how, 1, place)
         except OSError:  # held by others, not possible here, or each would wait for the other
             return False
         return True
-
-    def _file(self, folder: Path) -> int:
-        if folder not in self._files:
-            self._files[folder] = os.open(folder / LOCK_FILE, os.O_RDWR | os.O_CREAT, 0o666)
-        return self._files[folder]

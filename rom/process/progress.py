@@ -62,10 +62,6 @@ def looked_for() -> bool:
     return not ranks()[0] and sys.stderr.isatty() and log.isEnabledFor(logging.WARNING)
 
 
-def in_silence(label: str) -> None:
-    """Say nothing."""
-
-
 @contextmanager
 def stages(total: int, begun: int = 0, *, long: bool = True) -> Iterator[Callable[[str], None]]:
     """Around work in stages, begun of which had a line before; silent where nobody looks.
@@ -73,7 +69,7 @@ def stages(total: int, begun: int = 0, *, long: bool = True) -> Iterator[Callabl
     Gives what takes the name of a stage at its begin.
     """
     if not (long and looked_for()):
-        yield in_silence
+        yield lambda label: None
         return
     progress = Progress(total)
 

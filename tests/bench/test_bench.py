@@ -1,7 +1,6 @@
 """What the benchmarks measure is what they say they measure."""
 
 import json
-import os
 import sys
 from functools import cache
 from pathlib import Path
@@ -16,8 +15,7 @@ from benchmarks import benchmarks, two_stages, updating, wheel
 from benchmarks import large_deflection as bench
 from benchmarks.models import planetary_train, shaft_in_films
 from benchmarks.peers import compare, spin_up
-from cases.command import python, ran
-from cases.paths import ROOT
+from cases.command import ran
 from cases.solid import block
 from rom import rotation
 from rom.components.cosserat import straight
@@ -84,19 +82,6 @@ def test_a_bed_under_the_interfaces_is_that_of_the_full_model(bar, kind):
     f = benchmarks._on_a_bed(body, bar)
     assert np.all(f > exact * (1 - 1e-9))
     assert_allclose(f, exact, rtol=1e-3)
-
-
-def test_the_integrator_is_measured_without_fenicsx():
-    """After one turn of 1000 steps that compiles, and on a rod of twenty normal modes."""
-    code = (
-        "import sys; sys.modules.update(dict.fromkeys(['dolfinx', 'petsc4py', 'gmsh', 'mpi4py']))\n"
-        "from benchmarks.benchmarks import integrator\n"
-        "for figure in integrator(turns=2): print(figure.case, figure.quantity, figure.value > 0)"
-    )
-    done = python("-c", code, env=os.environ | {"PYTHONPATH": str(ROOT)}, timeout=600)
-    case = "26 elastic coordinates, 2000 steps"
-    expected = [f"{case} steps per second True", f"{case} share outside compiled code True"]
-    assert done.stdout.splitlines() == expected, done.stderr
 
 
 @pytest.mark.long

@@ -95,11 +95,6 @@ def test_help_of_a_verb_has_examples_that_parse(verb, capsys):
         assert build_parser().parse_args(line.split()).verb == verb
 
 
-def test_version(capsys):
-    assert main(["--version"]) == 0
-    assert capsys.readouterr().out == f"rom {rom.__version__}\n"
-
-
 def test_check_prints_the_certificate_and_passes(file, capsys):
     assert main(["check", str(file)]) == 0
     out, err = capsys.readouterr()
@@ -126,18 +121,6 @@ def test_json_of_check_holds_the_numbers_of_the_report(file, capsys):
     assert_allclose([row["value"] for row in rows], [row.value for row in report.rows])
 
 
-def test_simulate_writes_a_film_and_a_history_when_asked(file, tmp_path, capsys):
-    found = answer(
-        capsys, "simulate", file, "--hinge", "root", "--t-end", 0.004, "--dt", 4e-4, "-q",
-        "--film", "glb", "--history", "csv", "-o", tmp_path,
-    )  # fmt: skip
-    names = ("body.glb", "body.history.csv", "scene.json", "run.json")
-    assert found["also"] == [str(tmp_path / name) for name in names]
-    assert (tmp_path / "body.glb").read_bytes()[:4] == b"glTF"
-    assert "hinge force x [N]" in (tmp_path / "body.history.csv").read_text().splitlines()[0]
-    assert {path.name for path in tmp_path.iterdir()} == {"body.csv", *names}
-
-
 def test_simulate_lets_the_body_fall_about_its_hinge(file, tmp_path, capsys):
     """Tip of a stiff pendulum released at rest: y = -alpha L t^2 / 2, alpha = m g c / I.
 
@@ -159,12 +142,6 @@ def test_simulate_lets_the_body_fall_about_its_hinge(file, tmp_path, capsys):
     assert_allclose(table_[:, 5] - table_[0, 5], fall, atol=2e-4)
     assert fall[-1] < -0.01
     assert_allclose(table_[:, 1:4] - table_[0, 1:4], 0.0, atol=1e-12)
-
-
-def test_bench_lists_its_benchmarks(capsys):
-    from benchmarks.benchmarks import BENCHMARKS
-
-    assert list(answer(capsys, "bench", "--list")["benchmarks"]) == list(BENCHMARKS)
 
 
 def test_bench_prints_figures_with_their_aims(capsys, monkeypatch):

@@ -1,7 +1,5 @@
 """Component files: the body is that of the same words in Python; mistakes have file and line."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -137,40 +135,34 @@ def test_materials_by_region_and_orthotropic(tmp_path):
     assert solids["core"].E == (12e9, 1e9, 1e9) and solids["core"].rho == 450
 
 
-def test_a_changed_value_stands_in_for_the_one_of_the_file(tmp_path):
-    (tmp_path / "part.toml").write_text(SOLID)
-    part = read_component(tmp_path / "part.toml", {("material", "E"): "70 GPa"})
-    assert part.material().E == 70e9
-
-
 HELD = '[interfaces]\na = "rbe2"\n'
+KIND = HELD.replace('"rbe2"', '{ kind = "polynomal", order = 3 }')
 MISTAKES = {  # what stands in the file, what instead, and what is said
-    "wrong dimension": ('"210 GPa"', '"210 mm"', "part.toml:9: material.E: '210 mm' is a length; "
-                        "a pressure or stress [Pa] is wanted."),
-    "misspelt key": ("nu =", "nuu =", "part.toml:8: 2 mistakes. line 8: nu is missing in [material]"
-                     ". line 10: there is no key 'nuu' in [material]."),
-    "misspelt table": ("[geometry.", "[geometri.",
-                       "part.toml:4: there is no key 'geometri'. Did you mean geometry?"),
-    "twice": ("nu = 0.3", 'E = "70 GPa"', "part.toml:10: 'material.E' is given twice, in lines 9 "
-              "and 10. Keep one of them."),
+    "wrong dimension": ('"210 GPa"', '"210 mm"', "part.toml:9: material.E: '210 mm' is a length"),
+    "misspelt key": ("nu =", "nuu =", "2 mistakes. line 8: nu is missing", "line 10: ", "'nuu'"),
+    "misspelt table": (
+        "[geometry.",
+        "[geometri.",
+        "part.toml:4: ",
+        "'geometri'. Did you mean geom",
+    ),
+    "twice": ("nu = 0.3", 'E = "70 GPa"', "part.toml:10: 'material.E'", "in lines 9 and 10"),
     "no text": ('"mm"', "mm", "part.toml:3: this is no TOML: invalid value."),
     "number for a table": (SOLID, "material = 3\n", "part.toml:1: material = 3: needed is a table"),
-    "kind": (SOLID, HELD.replace('"rbe2"', '{ kind = "polynomal", order = 3 }'),
-             "part.toml:2: interfaces.a.kind = 'polynomal' does not exist. Did you mean poly"),
-    "kind missing": (SOLID, HELD.replace('"rbe2"', "{ order = 3 }"), "missing in [interfaces.a]"),
+    "kind": (SOLID, KIND, "part.toml:2: interfaces.a.kind = 'polynomal'", "Did you mean poly"),
+    "kind missing": (SOLID, KIND.replace("kind", "king"), "missing in [interfaces.a]"),
     "negative count": (SOLID, "[reduction]\nmodes = -1\n", "must be a whole number from 0"),
-    "a mechanism": (SOLID, "[bodies.a]\n",
-                    "part.toml:1: this is a mechanism; a component is needed"),
-}  # fmt: skip
+    "a mechanism": (SOLID, "[bodies.a]\n", "part.toml:1: this is a mechanism; a component is need"),
+}
 
 
 @pytest.mark.parametrize("case", MISTAKES)
 def test_a_mistake_is_told_with_file_and_line(case, tmp_path):
-    old, new, expected = MISTAKES[case]
+    old, new, *expected = MISTAKES[case]
     (tmp_path / "part.toml").write_text(SOLID.replace(old, new))
     with pytest.raises(ConfigError) as refused:
         read_component(tmp_path / "part.toml")
-    assert expected in str(refused.value).replace(f"{tmp_path}/", "")
+    assert not [words for words in expected if words not in str(refused.value)]
 
 
 def test_missing_and_unreadable_files(tmp_path):
@@ -178,9 +170,6 @@ def test_missing_and_unreadable_files(tmp_path):
     for name in ("no.toml", "latin.toml", "."):
         with pytest.raises(FileFormatError):
             read_component(tmp_path / name)
-    (tmp_path / "deep.toml").write_text("x = " + "[" * 500 + "]" * 500 + "\n")
-    with pytest.raises(ConfigError, match="brackets may be in each other"):
-        read_component(tmp_path / "deep.toml")
 
 
 @pytest.mark.parametrize(
@@ -258,35 +247,35 @@ def test_the_page_has_every_key_with_its_meaning():
     assert all(sample.strip() in text for sample in samples)
 
 
-def test_loads_of_large_deflection_are_those_of_the_same_words_in_python(folder):
-    asked = """
+DEFLECTION = """
 [reduction.nonlinear]
 modes = 2
-shapes = 9
-[reduction.nonlinear.loads.tip]
-force = ["0 N", "2 kN", "0 N"]
-moment = [0, 0, "3 N m"]
+loads.tip = { force = ["0 N", "2 kN", "0 N"], moment = [0, 0, "3 N m"] }
 """
+TURNING = 'spin = [0, 0, "30 rpm"]\nabout = [0, "20 mm", 0]\nsnapshots = true\nsampling = 0.01\n'
+TURNED = {"spin": (0.0, 0.0, np.pi), "about": (0.0, 0.02, 0.0), "snapshots": True, "sampling": 0.01}
+
+
+@pytest.mark.parametrize(
+    ("more", "given"),
+    [
+        ("shapes = 9\n", {"n_shapes": 9}),
+        ('tol = 0.002\nfixed = "hub:yz"\n', {"tol": 0.002, "fixed": ("hub:yz",)}),
+        ("steps = 7\n", {"n_steps": 7}),
+        (TURNING, TURNED),
+    ],
+)
+def test_loads_of_large_deflection_are_those_of_the_same_words_in_python(folder, more, given):
     file = folder / "bar.toml"
-    plain = file.read_text()
     assert read_component(file).nonlinear() is None
-    file.write_text(plain + asked)
-    found = read_component(file).nonlinear()
+    plain = file.read_text()
+    file.write_text(plain + DEFLECTION + more)
     loads = {"tip": (0.0, 2000.0, 0.0, 0.0, 0.0, 3.0)}
-    assert found == rom.Geometric(loads=loads, n_modes=2, n_shapes=9)
-    with pytest.raises(ConfigError, match="no finite elements"):
-        read_component(file).body()
-    file.write_text(plain + asked.replace("shapes = 9", 'tol = 0.002\nfixed = "hub:yz"'))
-    same = replace(found, n_shapes=None, tol=0.002, fixed=("hub:yz",))
-    assert read_component(file).nonlinear() == same
-    file.write_text(plain + asked.replace("shapes = 9", "steps = 7"))
-    assert read_component(file).nonlinear() == replace(found, n_shapes=None, n_steps=7)
-    turning = 'spin = [0, 0, "30 rpm"]\nabout = [0, "20 mm", 0]\nsnapshots = true\nsampling = 0.01'
-    file.write_text(plain + asked.replace("shapes = 9", turning))
-    turned = {"spin": (0.0, 0.0, np.pi), "about": (0.0, 0.02, 0.0)}
-    same = replace(found, n_shapes=None, snapshots=True, sampling=0.01, **turned)
-    assert read_component(file).nonlinear() == same
-    file.write_text(plain + asked.replace("2 kN", "0 N").replace("3 N m", "0 N m"))
+    assert read_component(file).nonlinear() == rom.Geometric(loads=loads, n_modes=2, **given)
+    if "n_shapes" in given:
+        with pytest.raises(ConfigError, match="no finite elements"):
+            read_component(file).body()
+    file.write_text(plain + DEFLECTION.replace("2 kN", "0 N").replace("3 N m", "0 N m"))
     with pytest.raises(ConfigError, match="it needs a force") as refused:
         read_component(file).nonlinear()
-    assert "bar.toml:" in str(refused.value)
+    assert "bar.toml:" in refused.value.where

@@ -177,16 +177,6 @@ def test_a_script_beside_a_mesh_is_not_run(tmp_path):
     assert not (tmp_path / "pwned").exists()
 
 
-def test_a_file_without_permission_is_named(tmp_path):
-    path = write_msh(tmp_path / "box.msh", BOX.points, BLOCKS, NAMES)
-    path.chmod(0)
-    if os.access(path, os.R_OK):  # root may read everything
-        assert len(read_mesh(path).cells) == 72
-        return
-    with pytest.raises(RomError, match=r"box\.msh"):
-        read_mesh(path)
-
-
 def test_names_with_blanks_and_umlauts_work(tmp_path):
     folder = tmp_path / "Größe 1"
     folder.mkdir()

@@ -1,6 +1,5 @@
 """Errors say the cure, and warnings name the line of the user that caused them."""
 
-import ast
 from functools import cache
 
 import numpy as np
@@ -8,7 +7,6 @@ import pytest
 
 import rom
 from cases.mbs.mechanisms import random_body
-from cases.paths import ROOT
 from cases.solid import block, reduced
 from rom import errors
 from rom.errors import RomError, RomWarning, UnknownNameError
@@ -59,23 +57,16 @@ TO_TIP = {"interfaces": {"root": "rbe2"}, "certify": False}
 WRONG_CALLS = {  # call: words of the message or hint
     "rom.reduce(model, method=rom.CraigBampton, **TO_TIP)":
         r"CraigBampton is a class; write CraigBampton\(n_modes=20\)",
-    "rom.reduce(model, method=rom.Rubin, **TO_TIP)": r"Rubin is a class; write Rubin\(n_modes=20\)",
-    "rom.reduce(model, method=rom.craig_bampton, **TO_TIP)":
-        r"such as rom.CraigBampton\(n_modes=20\)",
-    'rom.reduce(model, method="craig_bampton", **TO_TIP)':
-        r"such as rom.CraigBampton\(n_modes=20\)",
     "rom.reduce(rom.FEModel, **TO_TIP)": "FEModel is a class; write",
-    "rom.reduce(model, damping=rom.Rayleigh, **TO_TIP)":
-        r"Rayleigh is a class; write Rayleigh\(alpha=...\)",
-    "rom.reduce(model, nonlinear=rom.Geometric, **TO_TIP)": "Geometric is a class; write Geometric",
     'rom.reduce(model, interfaces={"root": rom.Polynomial})': r"rom.Polynomial\(order\)",
-    "rom.simulate(rom.Mechanism, t_end=1.0)": "is a class; write",
-    "rom.simulate(mech, t_end=1.0, keep=rom.Keeping)": "Keeping is a class; write",
     'sol.position("a", b.marker("m"))': r"Write \('b', 'm'\)",
     'sol.position("a", "end")': r"\['m'\]",
     'sol.position(a, "m")': "write 'a'",
     'mech.drive("d", a, lambda t: t)': "write 'a'",
-    'mech.revolute("j", a, b.marker("m"), axis=(0, 0, 1))': r"from part.marker\(place\)",
+    'rom.reduce(model, method="rubin", **TO_TIP)':
+        r"^reduce: method = 'rubin' must be .* Method \(such as rom.CraigBampton\(n_modes=20\)",
+    'mech.revolute("j", a, b.marker("m"), axis=(0, 0, 1))':
+        r"^Mechanism.revolute 'j': m1 = .* of type Marker \(from part.marker\(place\)",
     'state.position("a")': "rom.snapshot.mechanism, state",
     "sol.positions": "'position'",
     'mech.add_body("c")': "Write add_rigid, or add_flexible",
@@ -91,10 +82,7 @@ WRONG_CALLS = {  # call: words of the message or hint
     'rom.load(folder / "x.npz")': "cut in a transfer",
     'rom.load(folder / "y.npz")': "Relative paths",
     'rom.units.in_si("3 furlong", "m")': "unit",
-    "rom.simulate(mech, t_end=-1.0)": "t_end",
-    'rom.simulate(mech, t_end=1.0, method="euler")': "bdf",
     'mech.add_rigid("a", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0))': "in use are",
-    'mech.add_rigid("c", mass=-1.0, inertia=(1, 1, 1), at=(0, 0, 0))': "mass",
 }  # fmt: skip
 
 
@@ -148,12 +136,3 @@ def test_a_warning_names_the_line_outside_the_package(way, tmp_path):
     (one,) = (found for found in caught if words in str(found.message))
     lines = {line for _, _, line in call.__code__.co_lines()}
     assert (one.filename, one.lineno in lines) == (__file__, True)
-
-
-def test_all_warnings_go_one_way():
-    """Numbers of frames are wrong as soon as a function between gets a decorator."""
-    for path in (ROOT / "rom").rglob("*.py"):
-        if path != ROOT / "rom/errors.py":
-            nodes = ast.walk(ast.parse(path.read_text()))
-            calls = (node.func for node in nodes if isinstance(node, ast.Call))
-            assert "warnings.warn" not in map(ast.unparse, calls), path

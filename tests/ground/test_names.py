@@ -221,15 +221,6 @@ def test_names_do_not_break_out_of_xml(marked, tmp_path):
     assert any("<b>" in v.get("name") for v in told.iter("ScalarVariable"))
 
 
-def test_names_do_not_break_out_of_html(marked):
-    from rom.report.html import checks, paragraph, source, table
-
-    written = [paragraph(INJECTED), source(INJECTED), table([INJECTED], [[INJECTED]], INJECTED),
-               checks(rom.Report(INJECTED, (rom.model.Row(INJECTED, 1.0, INJECTED, True),)),
-                      INJECTED), marked._repr_html_()]  # fmt: skip
-    assert not [text for text in written if "<b>&" in text or "&'" in text]
-
-
 def test_names_do_not_break_out_of_tables_and_programs(marked, folder):
     rom.save(marked, folder / "b.npz")
     assert main(["simulate", "b.npz", "--hinge", "root", "--t-end", "2e-6", "--dt", "1e-6",

@@ -14,7 +14,7 @@ from cases.command import python
 from rom.cli.main import translated
 from rom.errors import ResourceError
 from rom.process import memory, mpirun
-from rom.process.interruption import Terminated, terminable
+from rom.process.interruption import terminable
 
 
 @pytest.mark.parametrize(("limit", "use", "cache"), memory.GROUP_FILES)
@@ -114,24 +114,6 @@ def test_no_launcher_is_said(places, monkeypatch):
     assert mpirun.found() == ""
     with pytest.raises(ResourceError, match=r"mpirun is not installed\. `rom doctor`"):
         mpirun.mpirun(2)
-
-
-def test_sigterm_is_raised_inside_and_restored_outside():
-    with pytest.raises(Terminated):
-        interrupted_inside()
-    assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
-
-
-def interrupted_inside():
-    """The outermost block would end this very process; it is caught one block further in."""
-    with terminable():
-        try:
-            with terminable():
-                os.kill(os.getpid(), signal.SIGTERM)
-                signal.pause()
-        except Terminated as error:
-            caught = error
-    raise caught
 
 
 def test_a_handler_of_the_user_is_left_alone():

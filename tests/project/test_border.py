@@ -18,7 +18,7 @@ import pytest
 
 import rom
 import rom.view
-from cases.files.border_calls import body, calls, mistuned, model
+from cases.files.border_calls import body, calls, mistuned
 from cases.files.docstrings import public
 from cases.paths import ROOT
 from rom.arguments.border import _Border, _taken
@@ -220,30 +220,6 @@ def test_nearly_every_refusal_names_the_argument(capsys):
     with capsys.disabled():
         sys.stdout.write(f"\n{dict(COUNTED)}: {share:.1%} of the refusals name the argument\n")
     assert share > 0.97
-
-
-SAID = {
-    "a method by name": (
-        lambda b: rom.reduce(model(), method="craig-bampton", interfaces={}),
-        "reduce: method = 'craig-bampton' must be of type Method (such as rom.CraigBampton",
-    ),
-    "a joint of parts": (
-        lambda b: rom.Mechanism().spherical("ball", None, None),
-        "Mechanism.spherical 'ball': m1 = None must be of type Marker (from part.marker(place)",
-    ),
-    "a number that overflows": (
-        lambda b: rom.Mechanism().add_rigid("m", mass=10**400, inertia=(1, 1, 1), at=(0, 0, 0)),
-        "mass = 1000",
-    ),
-}
-
-
-@pytest.mark.parametrize("case", SAID)
-def test_the_message_says_function_argument_value_and_what_is_wanted(case):
-    call, words = SAID[case]
-    with pytest.raises(rom.ConfigError) as caught:
-        call(body())
-    assert words in str(caught.value)
 
 
 @pytest.mark.parametrize("given", [{}, {"body": 1, "path": "x", "ending": ".npz"}])

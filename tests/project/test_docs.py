@@ -15,6 +15,7 @@ import pytest
 import rom
 from cases import command
 from cases.command import ran
+from cases.files.docstrings import PAGES, commands
 from cases.paths import ROOT
 from cases.solid import block, composite
 from rom import errors
@@ -22,11 +23,10 @@ from rom.cli.parser import verb_modules
 from rom.io.matrices.op4 import write_op4
 
 DOCS = ROOT / "docs"
-WRITTEN = sorted(path for path in DOCS.rglob("*.md") if "generated" not in path.parts)
 CODE = re.compile(r"^```python\n(.*?)^```$", re.M | re.S)
 TOUR = DOCS / "tour.md"  # its blocks start from files of their own
 STEP_PART = DOCS / "step_part.md"
-TRIED = [path for path in WRITTEN if path != TOUR and CODE.search(path.read_text())]
+TRIED = [path for path in PAGES[1:] if path != TOUR and CODE.search(path.read_text())]
 PARTS = """# # A title
 #
 # Some `code` in prose.
@@ -224,9 +224,8 @@ def test_commands_of_the_page_about_a_part_run(tmp_path, monkeypatch):
     exec(CODE.search(text).group(1), {})
     (mechanism,) = re.findall(r"^```toml\n(.*?)^```$", text, re.M | re.S)
     (tmp_path / "push.toml").write_text(mechanism)
-    blocks = "".join(re.findall(r"^```sh\n(.*?)^```$", text, re.M | re.S)).replace("\\\n", " ")
     said = {}
-    for line in blocks.splitlines():
+    for line in commands(STEP_PART):
         program, verb, *arguments = shlex.split(line)
         assert program == "rom"
         done = command.rom(verb, *arguments, "--json", cwd=tmp_path, timeout=600)
@@ -309,30 +308,23 @@ def named(name):
 
 
 def test_what_pages_name_exists():
-    """Modules, functions and files written in backquotes."""
-    above = (ROOT / f"{name}.md" for name in ("README", "CHANGELOG", "CONTRIBUTING"))
-    for path in (*WRITTEN, *above):
+    """Modules, functions, files, lists and tests; of tests names that are long may end in dots."""
+    tests = {path: path.read_text() for path in (ROOT / "tests").rglob("test_*.py")}
+    known = {path.stem for path in tests}.union(
+        *(re.findall(r"def (test_\w+)", text) for text in tests.values())
+    )
+    exists = {  # what is written in backquotes: whether there is such a thing
+        r"`(rom(?:\.\w+)+)(?:\(.*?\))?`": named,
+        r"`((?:meshes|demos|tests|rom|docs|\.ci)/[\w./-]+)`": lambda name: (ROOT / name).exists(),
+        r"`([A-Z_]+)` of `([\w./]+)`": lambda name, path: re.search(
+            rf"^{name}\b", (ROOT / path).read_text(), re.M
+        ),
+        r"`(test_\w+)`": known.__contains__,
+        r"`(test_\w+)\.\.\.`": lambda name: any(one.startswith(name) for one in known),
+    }
+    for path in (*PAGES, ROOT / "CHANGELOG.md", ROOT / "CONTRIBUTING.md"):
         text = path.read_text()
-        for name in re.findall(r"`(rom(?:\.\w+)+)(?:\(.*?\))?`", text):
-            assert named(name), f"{path.name} names {name}"
-        for name in re.findall(r"`((?:meshes|demos|tests|rom|docs|\.ci)/[\w./-]+)`", text):
-            assert (ROOT / name).exists(), f"{path.name} names {name}"
-
-
-def test_claims_name_tests_that_exist():
-    """A claim without its test is none; names that are long may end in dots."""
-    known = set()
-    for path in (ROOT / "tests").rglob("test_*.py"):
-        known |= {path.stem, *re.findall(r"def (test_\w+)", path.read_text())}
-    for path in DOCS.rglob("*.md"):
-        for name, dots in re.findall(r"`(test_\w+)(\.\.\.)?`", path.read_text()):
-            there = name in known or (dots and any(one.startswith(name) for one in known))
-            assert there, f"{path.name} names {name}"
-    assert len(re.findall(r"`test_\w+`", (DOCS / "claims.md").read_text())) > 30
-
-
-def test_lists_named_for_contributors_exist():
-    for name, path in re.findall(
-        r"`([A-Z_]+)` of `([\w./]+)`", (DOCS / "contributing.md").read_text()
-    ):
-        assert re.search(rf"^{name}\b", (ROOT / path).read_text(), re.M), f"{name} of {path}"
+        gone = [x for pattern, there in exists.items() for x in re.findall(pattern, text)
+                if not there(*[x] if isinstance(x, str) else x)]  # fmt: skip
+        assert not gone, f"{path.name} names {gone}"
+    assert len(re.findall(r"`test_\w+`", (DOCS / "claims.md").read_text())) > 30  # with a claim

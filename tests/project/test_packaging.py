@@ -143,12 +143,7 @@ def test_versions_agree_everywhere():
     assert f"license: {project['license']['text']}" in citation
 
 
-def test_the_image_installs_what_the_set_up_installs():
-    script = (ROOT / ".ci" / "setup.sh").read_text()
-    wanted = re.search(r'packages="([^"]+)"', script).group(1).split()
-    recipe = (ROOT / "Dockerfile").read_text()
-    install = re.search(r"--no-install-recommends(.+?)&&", recipe, re.S).group(1)
-    assert install.replace("\\", " ").split() == wanted
-    sent = (ROOT / ".dockerignore").read_text()
-    for name in re.findall(r"^COPY (.+) \S+$", recipe, re.M):
-        assert all(f"!{word}\n" in sent for word in name.split())
+def test_what_the_image_copies_is_sent():
+    recipe, sent = ((ROOT / name).read_text() for name in ("Dockerfile", ".dockerignore"))
+    words = " ".join(re.findall(r"^COPY (.+) \S+$", recipe, re.M)).split()
+    assert words and all(f"!{word}\n" in sent for word in words)

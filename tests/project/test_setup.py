@@ -25,12 +25,17 @@ SETUP = ROOT / ".ci" / "setup.sh"
 OTHER_SYSTEMS = ROOT / ".ci" / "other_systems.sh"
 
 
-def packages():
-    return re.search(r'packages="([^"]+)"', SETUP.read_text()).group(1).split()
+def packages(script):
+    return set(re.search(r'packages="([^"]+)"', script.read_text()).group(1).split())
 
 
-def name_of(requirement):
-    return re.split(r"[<>=!~ ;\[]", requirement)[0]
+def names_of(requirements):
+    return {re.split(r"[<>=!~ ;\[]", requirement)[0] for requirement in requirements}
+
+
+def function_of(name):
+    """A function of the script."""
+    return re.search(rf"^{name}\(\) \{{.*?^\}}$", SETUP.read_text(), re.S | re.M).group()
 
 
 def deny_network(folder):
@@ -67,23 +72,22 @@ def test_a_system_without_debian_packages_is_told_so(tmp_path):
 
 def test_programs_to_compare_with_are_not_needed(tmp_path):
     """The function of the script, where nothing is installed and nothing can be."""
-    function = re.search(r"^try_optional\(\) \{.*?^\}$", SETUP.read_text(), re.S | re.M).group()
-    script = f"set -eu\noptional=calculix-ccx\ninstalled() {{ false; }}\n{function}\ntry_optional\n"
+    script = "set -eu\noptional=calculix-ccx\ninstalled() { false; }\n"
+    script += function_of("try_optional") + "\ntry_optional\n"
     done = ran("sh", "-c", script, env=deny_network(tmp_path))
     assert (done.returncode, done.stdout) == (0, "")
     assert "not installed: calculix-ccx; some tests are skipped" in done.stderr
-    assert 'optional="calculix-ccx chromium"' in SETUP.read_text()
 
 
 def compile_ahead(folder, code, sources="one"):
     """Exit code and calls of Python of the function of the script, with a Python that ends so."""
-    function = re.search(r"^compile_ahead\(\) \{.*?^\}$", SETUP.read_text(), re.S | re.M).group()
     python = folder / ".venv" / "bin" / "python"
     python.parent.mkdir(parents=True, exist_ok=True)
     python.write_text(f'#!/bin/sh\necho "$@" >>calls\nexit {code}\n')
     python.chmod(0o755)
     (folder / "calls").write_text("")
-    script = f"set -eu\nmade_of={sources}\n{function}\ncompile_ahead .venv || exit 9\n"
+    script = f"set -eu\nmade_of={sources}\n{function_of('compile_ahead')}\n"
+    script += "compile_ahead .venv || exit 9\n"
     done = ran("sh", "-c", script, cwd=folder)
     return done.returncode, (folder / "calls").read_text().splitlines()
 
@@ -103,70 +107,42 @@ def test_scripts_are_valid_shell():
         ran("sh", "-n", script, check=True)
 
 
-def recipe(target):
-    """What a target of make does."""
-    makefile = (ROOT / "Makefile").read_text()
-    return makefile.partition(f"\n{target}: setup\n")[2].partition("\n\n")[0] + "\n"
-
-
-def test_ci_runs_make_test_which_covers_style_types_and_both_environments():
-    assert (ROOT / ".ci" / "run").read_text().endswith("\nexec make test\n")
-    for part in ("ruff check", "ruff format --check", "-m mypy",
-                 '$(PYTHON) -m pytest -m "fenicsx or once" $(SIDE_BY_SIDE)\n',
-                 '$(LIGHT) -m pytest -m "not fenicsx and not once" -p'):  # fmt: skip
-        assert part in recipe("test")
-
-
 def test_what_begins_exists_and_what_waits_for_make_long_is_run_there():
     """A file under another name would come last again; `make long` finds files by what they say."""
+    assert (ROOT / ".ci" / "run").read_text().endswith("\nexec make test\n")
     assert [name for name in (*LONGEST_FIRST, *ONCE) if not (TESTS / name).exists()] == []
     importing = {path for path in TESTS.rglob("*.py") if "cases.long" in path.read_text()}
     apart = {TESTS / "conftest.py", Path(__file__)}
     assert all(path.name.startswith("test_") for path in importing - apart)
-    assert "grep -rlE 'ROM_LONG|SHARED_BY' tests" in (ROOT / "Makefile").read_text()
-    assert "ROM_LONG=1 $(PYTHON) -m pytest -m long" in recipe("long-marked")
-    assert 'ROM_LONG=1 $(PYTHON) -m pytest -m "not long" $(MORE)' in recipe("long-more")
-    assert 'ROM_LONG=1 $(LIGHT) -m pytest -m "not fenicsx and once"' in recipe("long-light")
 
 
-def test_the_doctor_advises_packages_the_setup_installs():
-    advised = {
-        word for text in (SYSTEM_COMMAND, SLOW_ADVICE) for word in text.split() if word[:3] == "lib"
-    }
-    known = {*packages(), "python3-mpi4py"}  # comes with petsc4py
-    assert advised and advised | {debian for debian, _ in PACKAGES.values()} <= known
-    assert set(DEBIAN_PACKAGES.split()) <= known
+def test_lists_of_packages_agree():
+    """Of what the doctor advises, the set-up and the image install, and both ways in need.
 
-
-def test_the_way_in_by_pip_alone_is_told_the_same_everywhere():
-    """The extra, what is advised where it is missing, the script that tries it, and the page."""
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    brought = [name_of(r) for r in project["optional-dependencies"]["fe"]]
-    assert brought == WHEEL_PACKAGES.split()
-    fenicsx = {name for _, names in PACKAGES.values() for name in names.split()}
-    assert fenicsx - {"mpi4py", "mpich"} == set(brought)  # these two come with FEniCSx
-    script = " ".join(OTHER_SYSTEMS.read_text().split())
+    pip cannot see Debian's gmsh and h5py, and would put other builds in front of them.
+    """
+    setup, by_pip = packages(SETUP), packages(OTHER_SYSTEMS)
+    of_debian = {debian for debian, _ in PACKAGES.values()} | set(DEBIAN_PACKAGES.split())
+    cures = {word for word in f"{SYSTEM_COMMAND} {SLOW_ADVICE}".split() if word[:3] == "lib"}
+    assert cures | of_debian <= setup | {"python3-mpi4py"}  # comes with petsc4py
+    recipe = (ROOT / "Dockerfile").read_text()
+    install = re.search(r"--no-install-recommends(.+?)&&", recipe, re.S).group(1)
+    assert set(install.replace("\\", " ").split()) == setup
     page = " ".join((ROOT / "docs" / "install.md").read_text().replace("\\\n", " ").split())
-    needed = set(re.search(r'packages="([^"]+)"', script).group(1).split())
     install = re.search(r"apt-get install (gcc [^`]+?) python3 -m venv", page).group(1)
-    assert set(install.split()) == needed
-    assert needed > {*GMSH_LIBRARIES.split(), *SYSTEM_COMMAND.split()[3:]}
-    assert ".[fe,view,dev]" in script and ".[fe,view]" in page
-    assert ".[fe,view]" in (ROOT / "README.md").read_text()
-
-
-def test_pip_does_not_shadow_what_debian_provides():
-    """pip cannot see Debian's gmsh and h5py, and would put other builds in front of them."""
+    assert set(install.split()) == by_pip > {*GMSH_LIBRARIES.split(), *SYSTEM_COMMAND.split()[3:]}
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     extras = project["optional-dependencies"]
-    apart = extras.pop("fe")
-    for recipe in (SETUP, ROOT / "Dockerfile", ROOT / "Makefile"):
-        assert not re.search(r"\[[\w,]*\bfe\b", recipe.read_text())
-    wanted = [*project["dependencies"], *chain(*extras.values())]
-    names = {name_of(requirement) for requirement in wanted}
-    assert not names & {name_of(requirement) for requirement in apart}
-    debian = "gmsh h5py petsc4py slepc4py mpi4py meshio fenics-dolfinx"
-    assert not names & set(debian.split()) and {"numpy", "scipy", "numba"} <= names
+    wheels = names_of(extras.pop("fe"))
+    told = {name for _, names in PACKAGES.values() for name in names.split()}
+    assert wheels == set(WHEEL_PACKAGES.split()) == told - {"mpi4py", "mpich"}  # they come along
+    for file in (OTHER_SYSTEMS, ROOT / "README.md", ROOT / "docs" / "install.md"):
+        assert ".[fe,view" in file.read_text()
+    for file in (SETUP, ROOT / "Dockerfile", ROOT / "Makefile"):
+        assert not re.search(r"\[[\w,]*\bfe\b", file.read_text())
+    usual = names_of([*project["dependencies"], *chain(*extras.values())])
+    shadowing = {*wheels, *"gmsh h5py petsc4py slepc4py mpi4py meshio fenics-dolfinx".split()}
+    assert not usual & shadowing and {"numpy", "scipy", "numba"} <= usual
 
 
 PLANTED_IN = """

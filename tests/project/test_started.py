@@ -15,6 +15,8 @@ from benchmarks import two_stages
 from benchmarks.benchmarks import BENCHMARKS
 from cases import command
 from cases.command import ran
+from cases.files.docstrings import PAGES, commands
+from cases.files.step_parts import step_part
 from cases.paths import ROOT
 from cases.solid import block, reduced
 from rom.cli.parser import build_parser
@@ -73,6 +75,11 @@ def test_a_benchmark_runs_from_its_beginning_to_its_end(name, monkeypatch):
 
 
 TARGETS = re.findall(r"^(\w+):", (ROOT / "Makefile").read_text(), re.M)
+TOGETHER = {  # what a target starts at least: all that is to be checked
+    "test": "ruff check .|ruff format --check|mypy|pytest -m fenicsx or once -n|"
+    "pytest -m not fenicsx and not once -p",
+    "long": "pytest -m long -n|pytest -m not long tests/|pytest -m not fenicsx and once -p",
+}
 STUB = '#!/bin/sh\nprintf "%s\\n" "$*" >> "{log}"\n'
 
 
@@ -95,6 +102,8 @@ def test_a_target_of_make_starts_modules_and_files_that_are_there(target, tmp_pa
     assert done.returncode == 0, done.stderr
     lines = log.read_text().splitlines() if log.exists() else []
     assert lines or target == "clean"
+    said = log.read_text() if lines else ""
+    assert all(f"-m {part}" in said for part in TOGETHER.get(target, "").split("|") if part)
     for line in lines:
         for module in re.findall(r"-m ([a-z_]+)\b", line)[:1]:
             assert importlib.util.find_spec(module), line
@@ -103,7 +112,6 @@ def test_a_target_of_make_starts_modules_and_files_that_are_there(target, tmp_pa
     assert (ROOT / "rom" / "__init__.py").exists()
 
 
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 OTHERS = (  # ways to install, which `.ci/other_systems.sh` goes on systems of their own
     "sudo apt-get install", "/usr/bin/python3 -m venv", "python3 -m venv", ".venv/bin/pip install",
     "conda ", "docker ",
@@ -120,14 +128,6 @@ SHORTER = (  # what a command of a page gets instead, so that it takes seconds a
     (r"--held foot", "--held root"),
 )
 NOTHING_TO_RESUME = "there is nothing to resume"
-
-
-def commands(page):
-    """Lines of the blocks of a page, with what goes over several in one."""
-    blocks = re.findall(r"^```(?:sh|bash|console)\n(.*?)^```$", page.read_text(), re.M | re.S)
-    text = "".join(blocks).replace("\\\n", " ")
-    words = (shlex.split(line, comments=True) for line in text.splitlines())
-    return [shlex.join(line) for line in words if line]
 
 
 def kind(line):
@@ -152,17 +152,12 @@ SHOWN = [page for page in PAGES if page.name != "step_part.md" and
          "rom" in map(kind, commands(page))]  # fmt: skip
 
 
-def part(folder):
-    """A plate with a blind bore of 6 mm, which leaves its foot whole, in millimetres."""
-    import gmsh
-
-    gmsh.initialize()
-    plate = gmsh.model.occ.addBox(-20, -20, 0, 80, 40, 10)
-    bore = gmsh.model.occ.addCylinder(0, 0, 4, 0, 0, 30, 6)
-    gmsh.model.occ.cut([(3, plate)], [(3, bore)])
-    gmsh.model.occ.synchronize()
-    gmsh.write(str(folder / "part.step"))
-    gmsh.finalize()
+def part(path):
+    """A plate with a blind bore of 6 mm, which leaves its foot whole."""
+    with step_part(path) as occ:
+        plate = occ.addBox(-20, -20, 0, 80, 40, 10)
+        bore = occ.addCylinder(0, 0, 4, 0, 0, 30, 6)
+        occ.cut([(3, plate)], [(3, bore)])
 
 
 @pytest.mark.long
@@ -171,7 +166,7 @@ def part(folder):
 def test_commands_of_a_page_run_one_after_the_other(page, tmp_path):
     for name in ("meshes", "demos"):
         shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
-    part(tmp_path)
+    part(tmp_path / "part.step")
     made = reduced(4, block(), reference="root")
     rom.save(made, tmp_path / "jacket.rom.npz")
     for line in commands(page):

@@ -61,7 +61,9 @@ def run(args: argparse.Namespace) -> Answer:
     else:
         solid, file, how = _solid(args), args.file, reading(args)
     if args.save:
-        _check_save(args, file)
+        path = check_ending(args.save, "a mesh", ".png", ".vtu", DECK_SUFFIX)
+        ending = path.suffix.lower()
+        checked(args, path, "deck" if ending == DECK_SUFFIX else ending[1:], inputs=[file])
     if args.faces and FACE_WORD in how["faces"]:
         raise ConfigError(
             f"--faces lists the faces as {FACE_WORD} 1, {FACE_WORD} 2, ..., so none can be called "
@@ -76,12 +78,6 @@ def run(args: argparse.Namespace) -> Answer:
         return Answer(data, _text(data))
     data["saved"] = str(args.save)
     return Answer(data, _text(data), write=lambda: _save(mesh, args.save, solid))
-
-
-def _check_save(args: argparse.Namespace, geometry: Path) -> None:
-    path = check_ending(args.save, "a mesh", ".png", ".vtu", DECK_SUFFIX)
-    suffix = path.suffix.lower()
-    checked(args, path, "deck" if suffix == DECK_SUFFIX else suffix[1:], inputs=[geometry])
 
 
 def _solid(args: argparse.Namespace) -> "Material | None":

@@ -55,7 +55,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     keyed(parser, "--degree", "--solver")
     add_interfaces(parser)
     add_matrices(parser)
-    add_method(parser)
+    keyed(parser, "--method")
+    keyed(parser.add_mutually_exclusive_group(), "-m --modes", "--f-max")
+    keyed(parser, "--tol", "--at HZ,…", "--characteristic N", "--gravity-shapes")
     keyed(parser, "--reference NAME,...")
     damping = parser.add_mutually_exclusive_group()
     keyed(damping, "--damping-ratio")
@@ -152,13 +154,6 @@ def _text(body: "FlexibleBody", output: Path) -> str:
     lowest = ", ".join(f"{support} {table['reduced'][0]:.5g} Hz" for support, table in compared)
     about = f"lowest elastic frequency: {lowest}; it depends on how the body is held"
     return f"{head}\n{about}\n\n{body.certificate}"
-
-
-def add_method(parser: argparse.ArgumentParser) -> None:
-    """What is kept of the body."""
-    keyed(parser, "--method")
-    keyed(parser.add_mutually_exclusive_group(), "-m --modes", "--f-max")
-    keyed(parser, "--tol", "--at HZ,…", "--characteristic N", "--gravity-shapes")
 
 
 def method(args: argparse.Namespace) -> "Method | Characteristic":

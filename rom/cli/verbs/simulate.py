@@ -222,32 +222,29 @@ def _pendulum(args: argparse.Namespace) -> Answer:
         return path
 
     with _rescuing(args, keep, rescue):
-        solution, audit = _swing(body, args, keep)
+        from rom.mbs.integrate.simulation import simulate
+        from rom.mbs.results.audit import audit as audited
+
+        mechanism = pendulum(body, args.hinge, axis=args.axis, gravity=args.gravity)
+        steps = {"t_end": args.t_end, "dt": args.dt}
+        solution = simulate(mechanism, **steps, progress=_aloud(args), keep=keep)
+        audit = audited(solution)
 
     def write() -> None:
+        from rom.report.scene import motion_scene
+        from rom.report.scene_file import write_scene
+
         with _finishing(args, keep):
             _write_motion(path, tables, body, solution)
             record.write(paths, solution, audit)
             _write_films(films, solution)
-            _write_scene(paths[-2], body, solution)
+            write_scene(motion_scene(solution, title=f"Motion of {body.name}"), paths[-2])
 
     return _answer(solution, audit, paths, write)
 
 
 def _command(args: argparse.Namespace) -> str:
     return f"rom {' '.join(map(quote, args.argv))}"
-
-
-def _swing(
-    body: "FlexibleBody", args: argparse.Namespace, keep: "Keeping | None"
-) -> tuple["Solution", "Report"]:
-    from rom.mbs.integrate.simulation import simulate
-    from rom.mbs.results.audit import audit
-
-    mechanism = pendulum(body, args.hinge, axis=args.axis, gravity=args.gravity)
-    steps = {"t_end": args.t_end, "dt": args.dt}
-    solution = simulate(mechanism, **steps, progress=_aloud(args), keep=keep)
-    return solution, audit(solution)
 
 
 def _write_motion(
@@ -278,10 +275,3 @@ def _write_films(films: list[Path], solution: "Solution") -> None:
             animate(solution.mechanism, solution, film)
         else:
             write_animation(solution, film)
-
-
-def _write_scene(path: Path, body: "FlexibleBody", solution: "Solution") -> None:
-    from rom.report.scene import motion_scene
-    from rom.report.scene_file import write_scene
-
-    write_scene(motion_scene(solution, title=f"Motion of {body.name}"), path)

@@ -77,7 +77,9 @@ def run(args: argparse.Namespace) -> Answer:
     log.info("%s hangs on %s and swings for %.3g s", body.name, args.hinge, swing.t_end)
     if not compiled_before():
         log.info("move it without compiling first, which takes some seconds")
-        leave_uncompiled()
+        import numba
+
+        numba.config.DISABLE_JIT = True  # compiling takes longer than one swing in Python
     mechanism, solution = _moved(body, hinge, swing)
     magnify = args.magnify or magnification(body, solution.elastic(body.name))
     certificate = body.certificate
@@ -177,7 +179,7 @@ def planned(
             hint="Choose another --hinge, or --gravity across the part and across its axis.",
         )
     n = torque / np.linalg.norm(torque)
-    inertia = n @ rigid.inertia @ n + rigid.mass * _square_across(arm, n)
+    inertia = n @ rigid.inertia @ n + rigid.mass * float(arm @ arm - (arm @ n) ** 2)
     period = 2 * pi * sqrt(inertia / (rigid.mass * float(np.linalg.norm(g)) * lever))
     return Swing(tuple(g.tolist()), tuple(n.tolist()), t_end or FAR_SWING * period)
 
@@ -195,11 +197,6 @@ def _across(arm: "Array", axis: "Array | None") -> "Array":
     return 9.81 * down / np.linalg.norm(down) + 0.0
 
 
-def _square_across(x: "Array", n: "Array") -> float:
-    """Squared distance of a point from the axis through the origin."""
-    return float(x @ x - (x @ n) ** 2)
-
-
 def compiled_before() -> bool:
     """Whether the integrator is compiled; asked before it is imported, which decides."""
     import rom.mbs
@@ -211,13 +208,6 @@ def compiled_before() -> bool:
     return any(
         place.is_dir() and any(place.rglob("generalized_alpha.advance-*.nbi")) for place in places
     )
-
-
-def leave_uncompiled() -> None:
-    """Run kernels in Python from now on: they compile longer than one swing takes, some seconds."""
-    import numba
-
-    numba.config.DISABLE_JIT = True
 
 
 def _moved(body: "FlexibleBody", hinge: str, swing: Swing) -> "tuple[Mechanism, Solution]":

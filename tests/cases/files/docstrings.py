@@ -5,6 +5,7 @@ import builtins
 import importlib.util
 import inspect
 import re
+import shlex
 import textwrap
 from dataclasses import dataclass, field
 from functools import cache
@@ -203,8 +204,19 @@ def raised(thing):
 # --- what users read ---
 
 
+PAGES = [path for path in (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))
+         if "generated" not in path.parts]  # fmt: skip
+DEMOS = sorted((ROOT / "demos").glob("*.py"))
+
+
 def pages_and_demos():
     """All text of README, pages and demos; not the pages that are made of these."""
-    written = [path for path in (ROOT / "docs").rglob("*.md") if "generated" not in path.parts]
-    paths = [ROOT / "README.md", *written, *(ROOT / "demos").glob("*.py")]
-    return "\n".join(path.read_text() for path in paths)
+    return "\n".join(path.read_text() for path in (*PAGES, *DEMOS))
+
+
+def commands(page):
+    """Lines of the blocks of a page, with what goes over several in one."""
+    blocks = re.findall(r"^```(?:sh|bash|console)\n(.*?)^```$", page.read_text(), re.M | re.S)
+    text = "".join(blocks).replace("\\\n", " ")
+    words = (shlex.split(line, comments=True) for line in text.splitlines())
+    return [shlex.join(line) for line in words if line]

@@ -6,15 +6,10 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 CLASSES = {  # number of the class: its module
-    "1": "code",  # from the working folder
-    "2": "names",  # several wrong ones at once
     "3": "geometry",  # geometries as programs
     "4": "motion",  # what is kept of one
-    "5": "physics",  # wrong without a word
-    "6": "files",
+    "6": "files",  # and lines, also of several mistakes at once
     "7": "bounds",
     "8": "together",  # alone, and beside others
     "R": "reliability",  # odd cases of the table
@@ -75,18 +70,6 @@ def write(name: str, content: str | bytes) -> Callable[[Path], object]:
     """Writes a file."""
     data = content if isinstance(content, bytes) else content.encode()
     return lambda folder: (folder / name).write_bytes(data)
-
-
-def arrays_changed(name: str, change: Callable[[dict[str, Any]], object]) -> Any:
-    """Changes arrays of a body file behind the back of its checksums, as another program would."""
-
-    def prepare(folder: Path) -> None:
-        with np.load(folder / name) as found:
-            arrays = dict(found)
-        change(arrays)
-        np.savez(folder / name, **arrays)
-
-    return prepare
 
 
 def geometry(line: str) -> Callable[[Path], object]:

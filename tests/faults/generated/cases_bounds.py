@@ -29,7 +29,6 @@ CALLS = {
     "modes of free-free": (lambda: body(method=rom.FreeFree(HUGE)), TOLD),
     "orders of a polynomial": (
         lambda: body(interfaces={"root": rom.Polynomial(10**6), "tip": "rbe2"}), "1000000"),
-    "frames": (lambda: rom.write_animation(moved(), "a.glb", frames=0), "0"),
     "mass": (lambda: moved(mass=1e308), ("bob", "mass", "t = ")),
     "distances": (lambda: moved(at=(1e200, 0, 0)), ("bob", "hinge")),
     "speeds": (lambda: moved(omega=(0, 0, 1e200)), ("t = ", "omega")),

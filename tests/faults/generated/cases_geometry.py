@@ -1,8 +1,8 @@
 """Geometries are programs: they end, or are stopped by name."""
 
 from generated.case import Silent, Warned, Works, case, geometry, require, write
-from generated.stock import GEO
-from rom.errors import ConfigError, FileFormatError, MeshError, RomError, TagError
+from generated.stock import GEO, STEEL
+from rom.errors import ConfigError, FileFormatError, MeshError, RomError, TagError, UnsafeFileError
 from rom.fe.mesh.read import read_mesh
 
 BROKEN, LOST = (FileFormatError, MeshError), (FileFormatError, TagError, MeshError)
@@ -47,6 +47,9 @@ CASES = [
          given=geometry('DefineConstant[ w = {"a", Name "word"} ];')),
     case("a parameter: a text for a text", "mesh box.geo -p word=b", Silent, fe=True,
          given=geometry('DefineConstant[ w = {"a", Name "word"} ];')),
+    *(case(f"a builder, rom {line}", f"{line} {STEEL}", UnsafeFileError, "trust", fe=True)
+      for line in ("modes build.py", "reduce build.py -i root=rbe2 -o a.npz")),
+    case("a builder, rom swing", "swing build.py --hinge root -o out", UnsafeFileError, "trust", fe=True),
     case("a mesh after one that was stopped", again, Works, fe=True),
     case("no limits", "mesh box.geo --time-limit 0 --memory-limit 0", Silent, fe=True),
     case("a geometry cut in a word", "mesh box.geo", (FileFormatError, MeshError), "box.geo", fe=True,

@@ -4,15 +4,10 @@ import resource
 import signal
 
 import rom
-from generated.case import Works, case, require, write
+from generated.case import Works, case, require
 from generated.stock import pendulum
 from rom.cli.main import main
-from rom.errors import ConfigError, FileFormatError, ResourceError, SolverError
-
-RESUMED = {  # what is wrong with the folder from which a run goes on
-    "an empty folder": (lambda folder: (folder / "out").mkdir(), "out"),
-    "a file": (write("out", "mine"), "out"),
-}
+from rom.errors import ResourceError, SolverError
 
 
 def rows(folder):
@@ -50,13 +45,7 @@ def history(folder):
 CASES = [
     case("a mechanism that locks", locked, Works),
     case("a mechanism that locks, by name", "simulate lock.toml -o out", SolverError, "rod", leaves=True),
-    *(case(f"a run that goes on from {name}", "simulate pendulum.toml -o out --resume",
-           (ConfigError, FileFormatError), word, given=given)
-      for name, (given, word) in RESUMED.items()),
     case("a full disk for a table", full(history), ResourceError, "a.csv"),
     case("a full disk for a body", full(lambda folder: rom.save(rom.load("good.npz"), "a.npz")),
          ResourceError, "a.npz"),
-    case("a full disk for rom simulate",
-         full(lambda folder: require(main(["simulate", "pendulum.toml", "-q", "--dt", "1e-4", "-o", "out"]) == 6, "")),
-         Works),
 ]  # fmt: skip

@@ -9,10 +9,10 @@ import numpy as np
 
 import rom
 from cases.command import python, ran
-from generated.case import Silent, Works, case, require
+from generated.case import Works, case, require
 from generated.stock import KINDS, STEEL, body, model, pendulum
 from rom.cli.main import main
-from rom.errors import ConfigError, FileFormatError, ResourceError, RomError
+from rom.errors import ConfigError, ResourceError, RomError
 
 MISSING = {  # a library, a command that needs it, and a word of the refusal
     "h5py": "simulate pendulum.toml --history h5 -o out",
@@ -166,10 +166,4 @@ CASES = [
          in_a_gone_folder(lambda folder: rom.save(body(), "a.npz"), None), (ConfigError, ResourceError), ("a.npz", "folder")),
     case("two processes, the same bits", same_bits, Works),
     case("a call after an error", again, Works),
-    case("a folder instead of a motion", "report out -o a.html", (FileFormatError, ConfigError), "out",
-         given=lambda folder: (folder / "out").mkdir()),
-    case("a motion without its table", "report out -o a.html", (FileFormatError, ConfigError), "out",
-         given=lambda folder: main(["simulate", "pendulum.toml", "-o", "out", "-q"])
-         or (folder / "out/run.json").write_text("{}")),
-    case("a rank that is alone", lambda folder: motion(folder, 0), Silent),
 ]  # fmt: skip
