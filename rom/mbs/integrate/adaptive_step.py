@@ -212,23 +212,12 @@ class _Run:
             "there is kept in error.solution.",
         )
 
-    def columns(self, rows: Array) -> tuple[Array, ...]:
-        """Times, q, v, a, lam, work and base of saved rows."""
-        T, now = self.T, self.now
-        sizes = [1, T.q.size, now.v.size, now.v.size, now.lam.size, now.base.size]
-        t, q, v, a, lam, base, work = np.split(rows, np.cumsum(sizes), axis=1)
-        return t[:, 0], q, v, a, lam, work, base
-
-    def give_back(self) -> None:
-        """Go back to where the step under way began."""
-        for name in ("reals", "wholes", "lu"):
-            getattr(self.now, name)[:] = getattr(self.back, name)
-
     def note(self, before: State) -> None:
         """Keep the saved instants and stand at the last one, where the step under way began."""
         record, now = self.record, self.now
         if now.count[control.STAGE] != control.BEGINS:
-            self.give_back()
+            for name in ("reals", "wholes", "lu"):
+                getattr(now, name)[:] = getattr(self.back, name)
         shortest, longest = now.number[[control.SHORTEST, control.LONGEST]].tolist()
         record.counts = counts(self.T) | {"rejected": int(now.count[control.REJECTED])}
         record.counts |= {"shortest": shortest, "longest": longest}
@@ -236,10 +225,12 @@ class _Run:
             record.reach(before, record.noted)
             return
         every, kept = record.settings.save_every, int(now.count[control.SAVED])
-        t, *out = self.columns(self.trial.rows[:kept])
+        sizes = [1, self.T.q.size, now.v.size, now.v.size, now.lam.size, now.base.size]
+        t, *x, base, work = np.split(self.trial.rows[:kept], np.cumsum(sizes), axis=1)
+        t, out = t[:, 0], (*x, work, base)
         steps = int(self.T.count[entry.STEPS]) - np.arange(kept)[::-1]
         saved = steps % every == 0 if record.watch else np.full(kept, True)
-        steps_seen = self.beside, self.forces, t, tuple(out), saved
+        steps_seen = self.beside, self.forces, t, out, saved
         if record.watch and kept_before_the_end(record, *steps_seen):
             return
         if saved.any():

@@ -19,7 +19,6 @@ from rom.mbs.integrate.step_memory import (
     RUN_COUNTS,
     accelerated,
     begin,
-    copied,
     recall,
     remember,
     signals_at,
@@ -105,7 +104,7 @@ def _chunk(record: Record, W: Work, step: Step, forces: Laws, done: int, count: 
     every = 1 if record.watch else settings.save_every
     out = space(W, step, (done + good) // every - done // every)
     step.count[entry.STEPS_BEFORE] = before = step.count[entry.STEPS]
-    mark = Mark(copied(step), record.final, record.noted)
+    mark = Mark(Step(*(x.copy() for _, x in step.items())), record.final, record.noted)
     try:
         try:
             answer = _advance(record, W, step, forces, (t, table[:good], out))

@@ -147,11 +147,6 @@ def recall(memory: Memory, W: Work, step: Step) -> None:
     step.count[list(FACTOR_COUNTS)] = memory.arrays["count"]
 
 
-def copied(step: Step) -> Step:
-    """A step memory of its own with the same content."""
-    return Step(*(x.copy() for _, x in step.items()))
-
-
 def fits(memory: Memory | None, method: Array, weights: Array) -> bool:
     """Whether what is remembered belongs to the same method and step."""
     kept = {} if memory is None else memory.arrays
