@@ -154,16 +154,6 @@ def test_a_screw_turns_torque_into_thrust(pitch):
     assert audit(sol).ok, audit(sol)
 
 
-def test_a_gear_run_in_two_pieces_is_the_run_in_one():
-    """The angles go on from where they were, over whole turns."""
-    whole = simulate(gear_pair(2.7, 5.0), t_end=2.0, dt=2e-3)
-    mech = gear_pair(2.7, 5.0)
-    first = simulate(mech, t_end=1.0, dt=2e-3)
-    second = simulate(mech, t_end=2.0, dt=2e-3, state=first.final)
-    assert_allclose(second.base[-1], whole.base[-1], rtol=1e-9)
-    assert_allclose(second.v[-1], whole.v[-1], atol=1e-8)
-
-
 def test_a_planetary_gear_turns_as_willis_says():
     """Ring held, sun driven: the carrier turns with z_sun / (z_sun + z_ring) of the sun."""
     sun_teeth, ring_teeth = 20, 64
