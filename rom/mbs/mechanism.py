@@ -8,19 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from rom import rotation
-from rom.arguments import (
-    AnyBody,
-    Number,
-    Omega,
-    Orientation,
-    Point,
-    Positive,
-    Velocity,
-    finite,
-    matrix33,
-    start_pose,
-    typed,
-)
+from rom.arguments import AnyBody, finite, matrix33, start_pose, typed
+from rom.arguments.quantities import Number, Omega, Orientation, Point, Positive, Velocity
 from rom.errors import ConfigError
 from rom.fields import Methods, Open, families, find
 from rom.mbs.connections import drives as joint_drives
