@@ -7,7 +7,6 @@ from scipy.optimize import brentq
 
 import rom
 from cases.mbs.parts import ORIGIN, X, Z, on_guide, on_hinge
-from cases.refusals import refuses
 from rom.errors import ConfigError, ModelError
 
 G = 9.81
@@ -161,9 +160,10 @@ def test_the_end_of_a_motion_changes_as_its_equation_says():
 
 
 def test_wrong_questions_are_refused():
-    refuses(ConfigError, r"must be \{name: value\}", rom.motion_sensitivity, lambda: 0.0, {})
-    ragged, said = lambda x: np.zeros(1 + (x > 1)), "must have the same shape"
-    refuses(ConfigError, said, rom.motion_sensitivity, ragged, {"x": 1.0})
+    with pytest.raises(ConfigError, match=r"must be \{name: value\}"):
+        rom.motion_sensitivity(lambda: 0.0, {})
+    with pytest.raises(ConfigError, match="must have the same shape"):
+        rom.motion_sensitivity(lambda x: np.zeros(1 + (x > 1)), {"x": 1.0})
     found = rom.motion_sensitivity(lambda x: x**3, {"x": 2.0})
     assert_allclose(found["x"], 12.0, rtol=1e-9)
     with pytest.raises(ConfigError, match=r"no parameter 'y'.*'x'"):

@@ -5,7 +5,6 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
-from cases.refusals import refuses
 from rom.components.gear_mesh import Correction, GearPair
 from rom.errors import ConfigError, RomError
 from rom.mbs import Groove, JournalBearing
@@ -110,7 +109,8 @@ def test_a_rotor_that_nothing_holds_against_its_drag_is_named_soon(build, most, 
     """Once around it has met all forces there are."""
     tangents, count = _Search.tangent, []
     monkeypatch.setattr(_Search, "tangent", lambda *x: count.append(1) or tangents(*x))
-    refuses(RomError, r"'rotor' turns about its own axis \(0, 0, 1\)", rom.equilibrium, build())
+    with pytest.raises(RomError, match=r"'rotor' turns about its own axis \(0, 0, 1\)"):
+        rom.equilibrium(build())
     assert len(count) < most
 
 
