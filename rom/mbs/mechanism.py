@@ -8,19 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from rom import rotation
-from rom.arguments import (
-    AnyBody,
-    Number,
-    Omega,
-    Orientation,
-    Point,
-    Positive,
-    Velocity,
-    finite,
-    matrix33,
-    start_pose,
-    typed,
-)
+from rom.arguments import AnyBody, finite, matrix33, start_pose, typed
+from rom.arguments.quantities import Number, Omega, Orientation, Point, Positive, Velocity
 from rom.errors import ConfigError
 from rom.fields import Methods, Open, families, find
 from rom.mbs.connections import drives as joint_drives
@@ -266,12 +255,10 @@ class Mechanism(Methods, metaclass=Open, kind="methods", bound=bound):
             finite("qd", np.zeros(r) if qd is None else qd, (r,)),
         )
         pose = start_pose(at, orientation, velocity, omega)
-        return self._enter(flexible_part(name, body, self._moving(body), pose, elastic), spin)
-
-    def _moving(self, body: Any) -> Any:
-        """The body as it is integrated, one for all parts that are the same body."""
+        # as it is integrated, one for all parts that are the same body
         same = (part.moving for part in self.parts.values() if part.flexible is body)
-        return next(same, None) or body.on_mean_axes()
+        moving = next(same, None) or body.on_mean_axes()
+        return self._enter(flexible_part(name, body, moving, pose, elastic), spin)
 
     def add(self, name: str, element: object, family: Family) -> None:
         """Add an element of any family, one of your own too.

@@ -32,6 +32,7 @@ from rom.mbs.integrate.consistent_start import (
 from rom.mbs.integrate.fixed_step import failed_step, space
 from rom.mbs.integrate.run import Record, Settings
 from rom.mbs.integrate.step_memory import begin
+from rom.mbs.kernels import work as entry
 from rom.mbs.kernels.work import Step, Work, workspace
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.signals import padded, sampled
@@ -181,14 +182,14 @@ class Flow:
     def _advance(self, start: Start, step: Step, signals: Array, out: Any) -> None:
         """Take a step for each row of signals (k, s, 3)."""
         rank = self.packed.rows_solved(start.state.rank)
-        step.count[alpha.STEPS_BEFORE] = step.count[alpha.STEPS]
+        step.count[entry.STEPS_BEFORE] = step.count[entry.STEPS]
         answer = alpha.NEEDS_LAWS
         alpha.advance.link()
         while answer == alpha.NEEDS_LAWS:
             answer = alpha.advance(self.packed.system, self.W, step, rank, signals, self.steps, out)
-            taken = int(step.count[alpha.STEPS])
+            taken = int(step.count[entry.STEPS])
             if answer == alpha.NEEDS_LAWS:
-                slopes, t = not step.count[alpha.HAS_FACTOR], float(self.t[1 + taken])
+                slopes, t = not step.count[entry.HAS_FACTOR], float(self.t[1 + taken])
                 apply_laws(self.packed.asked, self.W, t, slopes=slopes)
         if answer != alpha.CONVERGED:
             self.failed[0] += 1
@@ -208,7 +209,7 @@ class Flow:
         step.a[:] = state.a + start.later
         step.size[[0, 4]] = 0.0
         step.count[:] = 0
-        step.count[alpha.USES_LAWS] = bool(self.packed.asked)
+        step.count[entry.USES_LAWS] = bool(self.packed.asked)
         self.W.base[:] = state.base
         return step
 

@@ -307,17 +307,14 @@ class _Search:
                 "motions): there is no unique equilibrium.",
                 hint="Hold it by a joint or a spring, or give its place by a drive.",
             )
-        if weakest.squares.size and weakest.squares[0] < 0.0 and self.statics_decide:
+        # stiffness alone says what is stable where nothing spins and no film pushes around
+        alone = self.now.packed.has_potential and not self.spins.any
+        if alone and weakest.squares.size and weakest.squares[0] < 0.0:
             motion = _described(self.now.packed, weakest.motions[:, 0])
             warn(
                 f"the equilibrium is unstable: {motion} and falls away at a rate of "
                 f"{np.sqrt(-weakest.squares[0]):.3g} 1/s."
             )
-
-    @property
-    def statics_decide(self) -> bool:
-        """Whether stiffness alone says what is stable: nothing spins, no film pushes around."""
-        return self.now.packed.has_potential and not self.spins.any
 
     def along_spin(self, motion: Array, state: State) -> bool:
         """Whether a free motion is the steady rotation itself."""

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from rom.errors import ConfigError
 from rom.mbs.connections.ends import not_zero
-from rom.mbs.parts.joints import Coordinate, Joint, Whole, coordinate_of, coupling, joint_with_axis
+from rom.mbs.parts.joints import Coordinate, Joint, Whole, coordinate_of, coupling
 from rom.mbs.parts.signals import TimeFunction
 
 
@@ -36,7 +36,7 @@ def drive(
         ConfigError: if the joint is unknown or has no coordinate to drive.
     """
     self.check_new(name)
-    joint_with_axis(self.joints, joint, "drive")
+    coordinate_of(self.joints, joint, None, "drive")
     self.drives[name] = Drive(joint, function, rate, acceleration)
 
 

@@ -64,6 +64,9 @@ def apart(_table: object, _body: Index) -> Iterable[Sequence[int]]:
     return ()
 
 
+OUTSIDE = {"outside": from_outside, "couples": apart, "by_rate": never}  # of loads
+
+
 def integers(values: Iterable[object]) -> Index:
     """Whole numbers as an array, empty ones too."""
     return np.array(list(values), dtype=np.int64)

@@ -59,7 +59,7 @@ from rom.mbs.kernels.tables import (
 from rom.mbs.parts.bodies import Marker
 from rom.mbs.parts.foreign import Entry, Function
 from rom.mbs.parts.joints import Whole
-from rom.model import Array, Index
+from rom.model import Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -408,14 +408,18 @@ def _outside(law: Law) -> bool:
     return not isinstance(law, UserForce) or len(law.markers) == 1
 
 
-def _couples(laws: Laws, body: Index) -> list[Index]:
-    return [body[at[:n]] for at, n in zip(laws.marker, laws.count, strict=True)]
-
-
-def _answers(laws: Laws) -> list[Array]:
-    return [laws.answer[i:j] for i, j in pairwise(laws.answer_at)]
-
-
-KERNELS, HOOKS = (law_wrenches, law_tangents, law_energy), Hooks(asked=asked, answers=_answers)
-KNOWN = {"ends": lambda law: law.markers, "outside": _outside, "couples": _couples}
-LAWS_FAMILY = Family("laws", Law, pack, *KERNELS, hooks=HOOKS, **KNOWN)
+LAWS_FAMILY = Family(
+    "laws",
+    Law,
+    pack,
+    *(law_wrenches, law_tangents, law_energy),
+    ends=lambda law: law.markers,
+    outside=_outside,
+    couples=lambda laws, body: [
+        body[at[:n]] for at, n in zip(laws.marker, laws.count, strict=True)
+    ],
+    hooks=Hooks(
+        asked=asked,
+        answers=lambda laws: [laws.answer[i:j] for i, j in pairwise(laws.answer_at)],
+    ),
+)

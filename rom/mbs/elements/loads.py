@@ -9,16 +9,7 @@ import numpy.typing as npt
 
 from rom.arguments import finite, number
 from rom.errors import ConfigError
-from rom.mbs.elements.family import (
-    Family,
-    Places,
-    apart,
-    from_outside,
-    integers,
-    never,
-    on_joint,
-    rows_of,
-)
+from rom.mbs.elements.family import OUTSIDE, Family, Places, integers, on_joint, rows_of
 from rom.mbs.kernels.algebra import (
     add,
     cross,
@@ -148,7 +139,6 @@ def load_tangents(s, W, loads, _lam, ck, _cc):
             pair_stiffness(s, W, m, m, W.Kt)
 
 
-OUTSIDE = {"outside": from_outside, "couples": apart, "by_rate": never}
 LOADS_FAMILY = Family(
     "loads", Load, pack, load_wrenches, load_tangents, ends=lambda load: (load.marker,), **OUTSIDE
 )

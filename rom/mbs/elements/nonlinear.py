@@ -369,23 +369,21 @@ def nonlinear_energy(s, _W, elements, q, v):
     return total
 
 
-def _couples(elements: Nonlinear, _body: Index) -> list[Index]:
-    return [bodies[:n] for n, bodies in zip(elements.count, elements.body, strict=True)]
-
-
 def _outside(whole: Assembly) -> bool:
     """Elements of one frame alone push it from outside, as wind does."""
     return any(group.frames.shape[1] == 1 for group in whole.body.elements)
 
 
-KERNELS = nonlinear_residuals, nonlinear_tangents, nonlinear_energy
-KNOWN = {"ends": on_joint, "outside": _outside, "couples": _couples}
 NONLINEAR_FAMILY = Family(
     "nonlinear",
     Assembly,
     pack,
-    *KERNELS,
-    **KNOWN,
+    *(nonlinear_residuals, nonlinear_tangents, nonlinear_energy),
+    ends=on_joint,
+    outside=_outside,
+    couples=lambda elements, _: [
+        bodies[:n] for n, bodies in zip(elements.count, elements.body, strict=True)
+    ],
     by_rate=lambda elements: bool(elements.by_rate.any()),
     hooks=Hooks(answers=lambda elements: elements.forces),
 )

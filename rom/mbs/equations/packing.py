@@ -70,11 +70,6 @@ class Packed:
         return int(self.system.coordinates.kind.size + self.system.memory.size)
 
     @property
-    def coordinate_rows(self) -> tuple[Row, ...]:
-        """What each followed joint coordinate measures."""
-        return tuple(row for _, row in self.places.coordinates)
-
-    @property
     def loaded_rows(self) -> Index:
         """Constraint rows whose multipliers forces depend on."""
         return loaded_by(self.elements)

@@ -19,7 +19,8 @@ from rom.mbs.integrate.fixed_step import counts, failed_step, in_chunks, kept_be
 from rom.mbs.integrate.run import FIRST_STEP_RATIO, RUN_KEY, Record, of, standing_at
 from rom.mbs.integrate.step_control import Control, Trial
 from rom.mbs.integrate.step_memory import FACTOR_FIELDS, begin, recall, remember
-from rom.mbs.kernels.work import Work, workspace
+from rom.mbs.kernels import work as entry
+from rom.mbs.kernels.work import Step, Work, workspace
 from rom.mbs.parts.signals import padded, sampled
 from rom.mbs.results.state import Memory, State
 from rom.model import Array
@@ -81,7 +82,7 @@ class _Run:
         # joint coordinates are followed apart from those of the saved instants
         arrays["jerk"], arrays["base"] = now.jerk.copy(), self.W.base.copy()
         arrays[RUN_KEY] = of(record.final)
-        taken, h = int(self.T.count[alpha.STEPS]), float(now.number[control.LENGTH])
+        taken, h = int(self.T.count[entry.STEPS]), float(now.number[control.LENGTH])
         return replace(memory, h=h, origin=record.settings.t_start, taken=taken, arrays=arrays)
 
     def recall(self, state: State) -> None:
@@ -104,7 +105,7 @@ class _Run:
         if not record.watch or limit == 1:
             return self.piece(limit)
         mark = now.reals.copy(), now.wholes.copy(), now.lu.copy()
-        before = record.final if self.T.count[alpha.STEPS] else record.given
+        before = record.final if self.T.count[entry.STEPS] else record.given
         begun = record.t, record.final, record.noted, len(record.blocks)
         try:
             return self.piece(limit)
@@ -124,7 +125,7 @@ class _Run:
     def piece(self, limit: int) -> int:
         """Take up to so many steps as above."""
         record, count = self.record, self.now.count
-        before = record.final if self.T.count[alpha.STEPS] else record.given
+        before = record.final if self.T.count[entry.STEPS] else record.given
         count[control.LIMIT], count[control.TAKEN], count[control.SAVED] = limit, 0, 0
         rows = np.zeros((limit // int(count[control.EVERY]) + 1, self.trial.rows.shape[1]))
         self.trial = self.trial.replace(rows=rows)
@@ -158,7 +159,7 @@ class _Run:
 
     def apply_laws(self, W: Work) -> None:
         """Ask for the forces in Python at the time of the step."""
-        slopes = W is self.W and not self.T.count[alpha.HAS_FACTOR]
+        slopes = W is self.W and not self.T.count[entry.HAS_FACTOR]
         apply_laws(self.forces, W, float(self.now.number[control.REACHED]), slopes=slopes)
 
     def sample(self) -> None:
@@ -186,7 +187,7 @@ class _Run:
         fresh, _ = begin(self.record, self.W, self.state, self.forces, h)
         for name in METHOD_FIELDS:
             getattr(self.T, name)[:] = getattr(fresh, name)
-        self.T.count[[alpha.HAS_FACTOR, alpha.STEP_PASSES]] = 0
+        self.T.count[[entry.HAS_FACTOR, entry.STEP_PASSES]] = 0
         self.now.count[control.STAGE] = self.now.count[control.NEXT]
 
     def failure(self, answer: int) -> SolverError:
@@ -211,23 +212,12 @@ class _Run:
             "there is kept in error.solution.",
         )
 
-    def columns(self, rows: Array) -> tuple[Array, ...]:
-        """Times, q, v, a, lam, work and base of saved rows."""
-        T, now = self.T, self.now
-        sizes = [1, T.q.size, now.v.size, now.v.size, now.lam.size, now.base.size]
-        t, q, v, a, lam, base, work = np.split(rows, np.cumsum(sizes), axis=1)
-        return t[:, 0], q, v, a, lam, work, base
-
-    def give_back(self) -> None:
-        """Go back to where the step under way began."""
-        for name in ("reals", "wholes", "lu"):
-            getattr(self.now, name)[:] = getattr(self.back, name)
-
     def note(self, before: State) -> None:
         """Keep the saved instants and stand at the last one, where the step under way began."""
         record, now = self.record, self.now
         if now.count[control.STAGE] != control.BEGINS:
-            self.give_back()
+            for name in ("reals", "wholes", "lu"):
+                getattr(now, name)[:] = getattr(self.back, name)
         shortest, longest = now.number[[control.SHORTEST, control.LONGEST]].tolist()
         record.counts = counts(self.T) | {"rejected": int(now.count[control.REJECTED])}
         record.counts |= {"shortest": shortest, "longest": longest}
@@ -235,10 +225,12 @@ class _Run:
             record.reach(before, record.noted)
             return
         every, kept = record.settings.save_every, int(now.count[control.SAVED])
-        t, *out = self.columns(self.trial.rows[:kept])
-        steps = int(self.T.count[alpha.STEPS]) - np.arange(kept)[::-1]
+        sizes = [1, self.T.q.size, now.v.size, now.v.size, now.lam.size, now.base.size]
+        t, *x, base, work = np.split(self.trial.rows[:kept], np.cumsum(sizes), axis=1)
+        t, out = t[:, 0], (*x, work, base)
+        steps = int(self.T.count[entry.STEPS]) - np.arange(kept)[::-1]
         saved = steps % every == 0 if record.watch else np.full(kept, True)
-        steps_seen = self.beside, self.forces, t, tuple(out), saved
+        steps_seen = self.beside, self.forces, t, out, saved
         if record.watch and kept_before_the_end(record, *steps_seen):
             return
         if saved.any():
@@ -249,7 +241,7 @@ class _Run:
         record.reach(replace(record.final, memory=self.remembered()))
 
 
-def _control(W: Work, step: alpha.Step, start: State) -> tuple[Work, Control]:
+def _control(W: Work, step: Step, start: State) -> tuple[Work, Control]:
     """What changes from step to step, at the start; and the memory of the method, which shares it.
 
     The memory keeps of a step its factor, and what belongs to it.
@@ -269,7 +261,7 @@ def _control(W: Work, step: alpha.Step, start: State) -> tuple[Work, Control]:
     fields: dict[str, Any] = {name: parts[name] for name in (*own, *counts)}
     fields |= {"reals": reals[0], "wholes": wholes[0], "lu": W.lu.reshape(-1)}
     fields["instant"] = reals[0][: sum(own[name].size for name in INSTANT_FIELDS)]
-    fields["step"] = alpha.Step(**{name: parts[f"step {name}"] for name, _ in step.items()})
+    fields["step"] = Step(**{name: parts[f"step {name}"] for name, _ in step.items()})
     return W, Control(**fields, by_blocks=W.by_blocks, W_base=W.base)
 
 

@@ -54,7 +54,7 @@ class Instant(Whereabouts):
             coordinate: "angle" or "displacement"; None for the only or the first one.
         """
         row = coordinate_of(self.mechanism.joints, name, coordinate, "an event")
-        for k, known in enumerate(self.packed.coordinate_rows):
+        for k, (_, known) in enumerate(self.packed.places.coordinates):
             if known is row:
                 self._evaluate()
                 return float(self.W.x[k]), float(self.W.xd[k])
@@ -173,10 +173,3 @@ class Watch:
             columns = (np.array([item[k] for item in items]) for k in range(3))
             found[name] = Occurrences(*map(np.reshape, columns, shapes))
         return found
-
-
-def watch_of(mechanism: Mechanism, packed: Packed, start: float) -> Watch | None:
-    """The watch over the events of a mechanism; None if it has none."""
-    if not mechanism.events:
-        return None
-    return Watch(dict(mechanism.events), Instant(mechanism, packed), start, packed)

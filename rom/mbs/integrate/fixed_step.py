@@ -14,19 +14,18 @@ from rom.mbs.integrate import generalized_alpha as alpha
 from rom.mbs.integrate.consistent_start import assembled, fitting_velocity
 from rom.mbs.integrate.dop853 import first_steps
 from rom.mbs.integrate.events import Noted
-from rom.mbs.integrate.generalized_alpha import Step
 from rom.mbs.integrate.run import Record, standing_at
 from rom.mbs.integrate.step_memory import (
     RUN_COUNTS,
     accelerated,
     begin,
-    copied,
     recall,
     remember,
     signals_at,
 )
+from rom.mbs.kernels import work as entry
 from rom.mbs.kernels.system import ANGLE
-from rom.mbs.kernels.work import Work
+from rom.mbs.kernels.work import Step, Work
 from rom.mbs.parts.signals import padded, sampled
 from rom.mbs.results.interpolation import Point, between
 from rom.mbs.results.state import State
@@ -49,7 +48,7 @@ def run_implicit(record: Record, W: Work, state: State) -> None:
     record.start(state, step.work)
     record.clock = perf_counter()
     done, n = settings.begun, settings.steps
-    if step.bdf.size != 3 and not step.count[alpha.HAS_FACTOR]:
+    if step.bdf.size != 3 and not step.count[entry.HAS_FACTOR]:
         with standing_at(record, record.given):
             done = _first(record, W, step, forces)
 
@@ -78,7 +77,7 @@ def in_chunks(record: Record, take: Callable[[int], int], goes_on: Callable[[], 
 def _first(record: Record, W: Work, step: Step, forces: Laws) -> int:
     """Take the steps before a multistep method can begin; returns how many there were."""
     t, rows = first_steps(record, W, step)
-    step.count[alpha.STEPS_BEFORE] = 0
+    step.count[entry.STEPS_BEFORE] = 0
     if not record.watch:
         every = record.settings.save_every
         rows = tuple(x[every - 1 :: every] for x in rows)
@@ -104,13 +103,13 @@ def _chunk(record: Record, W: Work, step: Step, forces: Laws, done: int, count: 
     good = min(len(table), count)
     every = 1 if record.watch else settings.save_every
     out = space(W, step, (done + good) // every - done // every)
-    step.count[alpha.STEPS_BEFORE] = before = step.count[alpha.STEPS]
-    mark = Mark(copied(step), record.final, record.noted)
+    step.count[entry.STEPS_BEFORE] = before = step.count[entry.STEPS]
+    mark = Mark(Step(*(x.copy() for _, x in step.items())), record.final, record.noted)
     try:
         try:
             answer = _advance(record, W, step, forces, (t, table[:good], out))
         finally:
-            taken = int(step.count[alpha.STEPS] - before)
+            taken = int(step.count[entry.STEPS] - before)
             _note(record, W, step, forces, t[:taken], out)
         if record.stopped:
             return taken
@@ -169,8 +168,8 @@ def _advance(record: Record, W: Work, step: Step, forces: Laws, chunk: Chunk) ->
         answer = alpha.advance(system, W, step, rank, table, every, out)
         record.compiled += perf_counter() - clock
         if answer == alpha.NEEDS_LAWS:
-            t = times[step.count[alpha.STEPS] - step.count[alpha.STEPS_BEFORE]]
-            apply_laws(forces, W, float(t), slopes=not step.count[alpha.HAS_FACTOR])
+            t = times[step.count[entry.STEPS] - step.count[entry.STEPS_BEFORE]]
+            apply_laws(forces, W, float(t), slopes=not step.count[entry.HAS_FACTOR])
     return answer
 
 
@@ -185,7 +184,7 @@ def _note(
 ) -> None:
     """Keep the saved steps of a chunk, finished or not."""
     record.counts = counts(step)
-    done = int(step.count[alpha.STEPS_BEFORE])
+    done = int(step.count[entry.STEPS_BEFORE])
     saved = np.arange(done + 1, done + t.size + 1) % record.settings.save_every == 0
     if record.watch and kept_before_the_end(record, W, forces, t, out, saved):
         return
@@ -200,7 +199,7 @@ def _note(
 def _state(record: Record, W: Work, step: Step) -> State:
     """The last state with all that the next step depends on."""
     q, v, a, lam = (x.copy() for x in (step.q, step.v, step.vd, step.lam))
-    memory = remember(record.settings, W, step, int(step.count[alpha.STEPS]))
+    memory = remember(record.settings, W, step, int(step.count[entry.STEPS]))
     before = None if record.settings.method == "bdf" else step.a.copy()
     return State(record.t, q, v, a, lam, record.final.rank, before, W.base.copy(), memory)
 
@@ -208,7 +207,7 @@ def _state(record: Record, W: Work, step: Step) -> State:
 def failed_step(record: Record, W: Work, step: Step, answer: int, t: float) -> SolverError:
     """The error that says why a step did not succeed."""
     what = {
-        alpha.FAILED: f"Newton did not converge in {step.count[alpha.STEP_PASSES]} corrections",
+        alpha.FAILED: f"Newton did not converge in {step.count[entry.STEP_PASSES]} corrections",
         alpha.NOT_FINITE: "the motion is no longer finite",
         alpha.SINGULAR: "the iteration matrix is singular",
     }[int(answer)]

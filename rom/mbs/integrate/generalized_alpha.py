@@ -31,6 +31,7 @@ from rom.mbs.equations.linear_solve import (
 from rom.mbs.equations.renewal import add_renewed, keep_pair_tangents, renew_pair_tangents
 from rom.mbs.integrate.bdf import follow_increment, is_multistep, keep_past, predict_multistep
 from rom.mbs.integrate.index2 import close_gaps, fit_velocities, velocity_gaps
+from rom.mbs.kernels import work as entry
 from rom.mbs.kernels.algebra import dot, row, scale, spatial_tangent, unit, vec
 from rom.mbs.kernels.compiled import copy, inner
 from rom.mbs.kernels.constraints import constraint_gradient
@@ -38,20 +39,7 @@ from rom.mbs.kernels.coordinates import follow_coordinates
 from rom.mbs.kernels.markers import own_corner
 from rom.mbs.kernels.stages import REAL_MATRIX, stage
 from rom.mbs.kernels.system import ALONG, DISTANCE, POINT, ROLL, TOUCH, System
-from rom.mbs.kernels.work import BOTH_LEVELS as BOTH_LEVELS
-from rom.mbs.kernels.work import FACTOR_USES as FACTOR_USES
-from rom.mbs.kernels.work import FACTORISATIONS as FACTORISATIONS
-from rom.mbs.kernels.work import HALVINGS as HALVINGS
-from rom.mbs.kernels.work import HAS_FACTOR as HAS_FACTOR
-from rom.mbs.kernels.work import ITERATIONS as ITERATIONS
-from rom.mbs.kernels.work import LAST_ITERATIONS as LAST_ITERATIONS
-from rom.mbs.kernels.work import LAWS_ASKED as LAWS_ASKED
-from rom.mbs.kernels.work import STEP_PASSES as STEP_PASSES
-from rom.mbs.kernels.work import STEPS as STEPS
-from rom.mbs.kernels.work import STEPS_BEFORE as STEPS_BEFORE
-from rom.mbs.kernels.work import USES_LAWS as USES_LAWS
-from rom.mbs.kernels.work import Step as Step
-from rom.mbs.kernels.work import Work
+from rom.mbs.kernels.work import Step, Work
 from rom.model import Array
 
 # corrections in which a step ends with a fresh factorisation; where films are renewed in a large
@@ -119,8 +107,8 @@ def predict(s, step):
         predict_multistep(s, step)
     copy(step.lam, step.lam1)
     step.size[0] = step.size[4] = 0.0
-    if step.count[LAST_ITERATIONS] > most_corrections(s, step):
-        step.count[HAS_FACTOR] = 0
+    if step.count[entry.LAST_ITERATIONS] > most_corrections(s, step):
+        step.count[entry.HAS_FACTOR] = 0
     retract(s, step.q, step.psi, step.q1)
 
 
@@ -178,17 +166,17 @@ def factorise_step(s, W, step, rank):
     border(W, rank)
     turn_columns(s, W, step, rank)
     load_columns(s, W, step.lam1, rank)
-    step.count[FACTORISATIONS] += 1
-    step.count[HAS_FACTOR], step.count[FACTOR_USES] = 1, 0
+    step.count[entry.FACTORISATIONS] += 1
+    step.count[entry.HAS_FACTOR], step.count[entry.FACTOR_USES] = 1, 0
     return factorise_bordered(s, W, rank)
 
 
 @inner
 def has_matrix(s, W, step, rank, c):
     """Renew the matrix at hand, or factorise a new one; False when it is singular."""
-    if step.count[HAS_FACTOR] == 1 and s.renewed.shape[0] > 0:
-        step.count[HAS_FACTOR] = 1 if renew_pair_tangents(s, W, c[2], c[1], rank) else 0
-    if step.count[HAS_FACTOR] == 1:
+    if step.count[entry.HAS_FACTOR] == 1 and s.renewed.shape[0] > 0:
+        step.count[entry.HAS_FACTOR] = 1 if renew_pair_tangents(s, W, c[2], c[1], rank) else 0
+    if step.count[entry.HAS_FACTOR] == 1:
         return True
     tangents(s, W, step.v1, step.vd1, step.lam1, c)
     constraint_gradient(s, W)
@@ -235,24 +223,24 @@ def correct(s, W, step, rank):
     """One Newton correction for the residual at hand; says how it went."""
     h, beta, gamma, _, _ = step.method
     n, bh2, lead = step.v.size, beta * h * h, beta * h / gamma
-    if step.count[STEP_PASSES] >= MAX_PASSES:
+    if step.count[entry.STEP_PASSES] >= MAX_PASSES:
         step.size[5] = imbalance(s, W, step)
     for i in range(n):
         W.rhs[i] = -bh2 * W.residual[i]
-    if step.count[BOTH_LEVELS] == 1:
+    if step.count[entry.BOTH_LEVELS] == 1:
         velocity_gaps(s, W, W.part)
     gap = 0.0
     for k in range(step.lam.size):
         gap = max(gap, row_gap(s, W, step, k))
         # a velocity moves gamma / (beta h) as fast as the increment that removes it
-        if step.count[BOTH_LEVELS] == 1:
+        if step.count[entry.BOTH_LEVELS] == 1:
             W.part[k] *= -lead
         else:
             W.part[k] = -W.value[k] * (lead if s.rows.kind[k] == ROLL else 1.0)
     solve_bordered(s, W, rank, W.delta, W.dlam)
-    if s.renewed.shape[0] > 0 and step.count[FACTOR_USES] > 0:
+    if s.renewed.shape[0] > 0 and step.count[entry.FACTOR_USES] > 0:
         add_renewed(s, W, W.delta, W.dlam)
-    step.count[FACTOR_USES] += 1
+    step.count[entry.FACTOR_USES] += 1
     for i in range(n):
         step.vd1[i] += mass_factor(step) / bh2 * W.delta[i]
         step.v1[i] += gamma / (beta * h) * W.delta[i]
@@ -260,7 +248,7 @@ def correct(s, W, step, rank):
     for k in range(step.lam.size):
         step.lam1[k] += W.dlam[k] / bh2
     size = increment_norm(W, step)
-    if step.count[BOTH_LEVELS] == 1:
+    if step.count[entry.BOTH_LEVELS] == 1:
         close_gaps(s, W, n, rank, lead)
         size += increment_norm(W, step)
         for i in range(n):
@@ -269,15 +257,15 @@ def correct(s, W, step, rank):
     if is_multistep(step):
         follow_increment(s, step)
     retract(s, step.q, step.psi, step.q1)
-    step.count[STEP_PASSES] += 1
-    step.count[ITERATIONS] += 1
+    step.count[entry.STEP_PASSES] += 1
+    step.count[entry.ITERATIONS] += 1
     return verdict(W, step, size, gap)
 
 
 @inner
 def may_halve(step):
     """Whether the last correction, or the prediction, is at hand and can be shortened."""
-    return step.count[BOTH_LEVELS] == 0 and step.count[HALVINGS] < MAX_HALVINGS
+    return step.count[entry.BOTH_LEVELS] == 0 and step.count[entry.HALVINGS] < MAX_HALVINGS
 
 
 @inner
@@ -308,9 +296,9 @@ def overshoots(s, W, step):
     Source:
         Armijo, Pacific J. Math. 16 (1966) 1.
     """
-    if step.count[STEP_PASSES] <= MAX_PASSES:
+    if step.count[entry.STEP_PASSES] <= MAX_PASSES:
         return False
-    part = 0.5 ** step.count[HALVINGS]
+    part = 0.5 ** step.count[entry.HALVINGS]
     return imbalance(s, W, step) > (1.0 - BALANCE_SHARE * part) * step.size[5]
 
 
@@ -330,7 +318,7 @@ def halve_correction(s, W, step):
     It led where forces have no value, as through an oil film, or are farther from balance.
     """
     h, beta, gamma, _, _ = step.method
-    if step.count[STEP_PASSES] == 0 and step.count[HALVINGS] == 0:
+    if step.count[entry.STEP_PASSES] == 0 and step.count[entry.HALVINGS] == 0:
         W.dlam[:] = 0.0
         for i in range(step.v.size):
             W.delta[i] = step.psi[i] - h * step.v[i]
@@ -342,8 +330,8 @@ def halve_correction(s, W, step):
     for k in range(step.lam.size):
         W.dlam[k] *= 0.5
         step.lam1[k] -= W.dlam[k] / (beta * h * h)
-    step.count[HALVINGS] += 1
-    step.count[HAS_FACTOR] = 0
+    step.count[entry.HALVINGS] += 1
+    step.count[entry.HAS_FACTOR] = 0
     if is_multistep(step):
         follow_increment(s, step)
     retract(s, step.q, step.psi, step.q1)
@@ -353,7 +341,7 @@ def halve_correction(s, W, step):
 def row_gap(s, W, step, k):
     """Gap of constraint k as far as increments close it, in rad or lengths of the mechanism."""
     kind = s.rows.kind[k]
-    if step.count[BOTH_LEVELS] == 1 or kind == ROLL:
+    if step.count[entry.BOTH_LEVELS] == 1 or kind == ROLL:
         return 0.0
     is_length = kind in (POINT, ALONG, DISTANCE, TOUCH)
     return abs(W.value[k]) / (step.size[1] if is_length else 1.0)
@@ -372,12 +360,12 @@ def verdict(W, step, size, gap):
     closing = shrink < 1.0 and size * shrink / (1.0 - shrink) <= goal
     if size <= INCREMENT_SHARE * floor or (closing and closed):
         return CONVERGED
-    if shrink > 0.5 and size < 100 * floor and step.count[STEP_PASSES] > 3:
+    if shrink > 0.5 and size < 100 * floor and step.count[entry.STEP_PASSES] > 3:
         return CONVERGED
-    if step.count[STEP_PASSES] >= most_passes(step):
+    if step.count[entry.STEP_PASSES] >= most_passes(step):
         return FAILED
-    if (last > 0.0 and shrink > 0.2) or step.count[STEP_PASSES] >= MAX_PASSES:
-        step.count[HAS_FACTOR] = 0
+    if (last > 0.0 and shrink > 0.2) or step.count[entry.STEP_PASSES] >= MAX_PASSES:
+        step.count[entry.HAS_FACTOR] = 0
     return UNFINISHED
 
 
@@ -385,7 +373,7 @@ def verdict(W, step, size, gap):
 def accept(s, W, step, rank):
     """Make the trial state the present one, multipliers of least norm, and add up the work."""
     h, _, _, alpha_m, alpha_f = step.method
-    if step.count[BOTH_LEVELS] == 1:
+    if step.count[entry.BOTH_LEVELS] == 1:
         fit_velocities(s, W, step, rank)
     if is_multistep(step):
         keep_past(s, step)
@@ -399,15 +387,15 @@ def accept(s, W, step, rank):
     if rank < step.lam.size or s.graph.shares != 0:
         constraint_gradient(s, W)
         least_multipliers(s, W, rank, step.lam)
-        step.count[HAS_FACTOR] *= 1 - s.graph.shares
+        step.count[entry.HAS_FACTOR] *= 1 - s.graph.shares
     follow_coordinates(W)
     drive_power(s, W, step.lam)  # the last correction moved the multipliers
     for k in range(3):
         step.work[k] += 0.5 * h * (W.power[k] + step.lost[k])
         step.lost[k] = W.power[k]
-    step.count[STEPS] += 1
-    step.count[LAST_ITERATIONS] = step.count[STEP_PASSES]
-    step.count[STEP_PASSES] = 0
+    step.count[entry.STEPS] += 1
+    step.count[entry.LAST_ITERATIONS] = step.count[entry.STEP_PASSES]
+    step.count[entry.STEP_PASSES] = 0
 
 
 @stage(
@@ -423,24 +411,24 @@ def advance(s, W, step, rank, signals, every, out):
     """
     h, beta, gamma, _, _ = step.method
     c = (mass_factor(step), gamma * h, beta * h * h)
-    while step.count[STEPS] - step.count[STEPS_BEFORE] < signals.shape[0]:
-        if step.count[LAWS_ASKED] == 0:
-            if step.count[STEP_PASSES] + step.count[HALVINGS] == 0:
-                copy(signals[step.count[STEPS] - step.count[STEPS_BEFORE]], W.signal)
+    while step.count[entry.STEPS] - step.count[entry.STEPS_BEFORE] < signals.shape[0]:
+        if step.count[entry.LAWS_ASKED] == 0:
+            if step.count[entry.STEP_PASSES] + step.count[entry.HALVINGS] == 0:
+                copy(signals[step.count[entry.STEPS] - step.count[entry.STEPS_BEFORE]], W.signal)
                 predict(s, step)
             evaluate(s, W, step.q1, step.v1)
-            if step.count[USES_LAWS] == 1:
-                step.count[LAWS_ASKED] = 1
+            if step.count[entry.USES_LAWS] == 1:
+                step.count[entry.LAWS_ASKED] = 1
                 return NEEDS_LAWS
-        step.count[LAWS_ASKED] = 0
+        step.count[entry.LAWS_ASKED] = 0
         residual(s, W, step.q1, step.v1, step.vd1, step.lam1)
         if not all_finite(W.residual) or overshoots(s, W, step):
             if may_halve(step):
                 halve_correction(s, W, step)
                 continue
-            if step.count[STEP_PASSES] > MAX_PASSES:
+            if step.count[entry.STEP_PASSES] > MAX_PASSES:
                 return FAILED
-        step.count[HALVINGS] = 0
+        step.count[entry.HALVINGS] = 0
         if not has_matrix(s, W, step, rank, c):
             return SINGULAR
         answer = correct(s, W, step, rank)
@@ -448,7 +436,7 @@ def advance(s, W, step, rank, signals, every, out):
             return answer
         if answer == CONVERGED:
             accept(s, W, step, rank)
-            done, before = step.count[STEPS], step.count[STEPS_BEFORE]
+            done, before = step.count[entry.STEPS], step.count[entry.STEPS_BEFORE]
             if done % every == 0:
                 save(W, step, out, done // every - before // every - 1)
     return CONVERGED

@@ -14,7 +14,7 @@ from rom.mbs.integrate.adaptive_step import run_variable
 from rom.mbs.integrate.bdf import LARGEST_ORDER
 from rom.mbs.integrate.consistent_start import initial_state
 from rom.mbs.integrate.dop853 import run_explicit
-from rom.mbs.integrate.events import watch_of
+from rom.mbs.integrate.events import Instant, Watch
 from rom.mbs.integrate.fixed_step import run_implicit
 from rom.mbs.integrate.keeping import Keeping, digests_of
 from rom.mbs.integrate.run import Record, Settings
@@ -187,7 +187,9 @@ def _moved(record: Record, t_start: float) -> Solution:
     state = record.given
     _check_fit(state, packed, record.mechanism)
     record.packed = packed = packed.of_rank(state.rank)
-    record.watch = watch_of(record.mechanism, packed, t_start)
+    if record.mechanism.events:
+        instant = Instant(record.mechanism, packed)
+        record.watch = Watch(dict(record.mechanism.events), instant, t_start, packed)
     run = METHODS[settings.method]
     if settings.dt is None and run is run_implicit:
         run = run_variable

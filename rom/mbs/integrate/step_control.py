@@ -13,27 +13,16 @@ import math
 
 from rom.mbs.equations.equations import accelerate, evaluate, factorise_motion
 from rom.mbs.equations.linear_solve import gradient_times
-from rom.mbs.integrate.generalized_alpha import (
-    BOTH_LEVELS,
-    CONVERGED,
-    FACTORISATIONS,
-    HAS_FACTOR,
-    ITERATIONS,
-    NEEDS_LAWS,
-    STEPS,
-    STEPS_BEFORE,
-    USES_LAWS,
-    Step,
-    advance,
-    bdf_weights,
-)
+from rom.mbs.integrate.generalized_alpha import CONVERGED, NEEDS_LAWS, advance, bdf_weights
 from rom.mbs.integrate.index2 import least_motion_across, project_velocity
+from rom.mbs.kernels import work as entry
 from rom.mbs.kernels.algebra import cross, vec
 from rom.mbs.kernels.compiled import inner, kernel
 from rom.mbs.kernels.coordinates import follow_coordinates
 from rom.mbs.kernels.markers import own_block
 from rom.mbs.kernels.system import ROLL
 from rom.mbs.kernels.tables import Array1, Array2, Array3, Index1, Table, table
+from rom.mbs.kernels.work import Step
 
 # what a run stops for, beside what `advance` says: the end of a piece, laws at the instant reached,
 # signals at its time, a first step of another length; then three errors
@@ -191,7 +180,7 @@ def try_step(s, W, now, trial, rank):
             return NEEDS_SIGNALS
         for i in range(W.signal.shape[0]):
             copy(trial.table[k, i], trial.signal[0, i])
-    step.count[STEPS_BEFORE] = step.count[STEPS]
+    step.count[entry.STEPS_BEFORE] = step.count[entry.STEPS]
     x = trial.none
     count[ANSWER] = advance(s, W, step, rank, trial.signal, MAX_INTERVAL, (x, x, x, x, x, x))
     if count[ANSWER] == NEEDS_LAWS:
@@ -222,7 +211,7 @@ def project(s, E, now, trial, rank):
         return CONTRADICTED
     evaluate(s, E, now.step.q, trial.v)
     now.count[STAGE] = JUDGES
-    return NEEDS_LAWS_THERE if now.step.count[USES_LAWS] == 1 else CONVERGED
+    return NEEDS_LAWS_THERE if now.step.count[entry.USES_LAWS] == 1 else CONVERGED
 
 
 @inner
@@ -279,7 +268,7 @@ def accept(now, trial):
     number[TIME], number[BEFORE] = number[REACHED], h
     number[SHORTEST], number[LONGEST] = min(number[SHORTEST], h), max(number[LONGEST], h)
     count[TAKEN], count[ROW], count[AT_HAND] = count[TAKEN] + 1, count[ROW] + 1, 1
-    if now.step.count[STEPS] % count[EVERY] == 0:
+    if now.step.count[entry.STEPS] % count[EVERY] == 0:
         save(now, trial.rows[count[SAVED]])
         count[SAVED] += 1
     count[STAGE] = CHOOSES
@@ -320,11 +309,11 @@ def reject(now, back):
     """Go back to where the step began and ask for a shorter one."""
     step, number, count = now.step, now.number, now.count
     h, error = number[LENGTH], number[ERROR]
-    iterations, factorisations = step.count[ITERATIONS], step.count[FACTORISATIONS]
+    iterations, factorisations = step.count[entry.ITERATIONS], step.count[entry.FACTORISATIONS]
     answer, row, known, rejected = count[ANSWER], count[ROW], count[KNOWN], count[REJECTED]
     copy(back.reals, now.reals)
     copy(back.wholes, now.wholes)
-    step.count[ITERATIONS], step.count[FACTORISATIONS] = iterations, factorisations
+    step.count[entry.ITERATIONS], step.count[entry.FACTORISATIONS] = iterations, factorisations
     count[ANSWER], count[ROW], count[KNOWN], count[REJECTED] = answer, row, known, rejected + 1
     number[ERROR], number[ERROR_BEFORE], count[AT_HAND] = error, 1.0, 0  # no growth at once
     ask_for(now, h * max(MIN_STEP_GROWTH, ERROR_AIM / math.sqrt(error)), TRIES)
@@ -337,7 +326,7 @@ def prepare(now):
     """Let the next step have the length that is asked for."""
     step, number, count = now.step, now.number, now.count
     h, lag = number[WANTED], step.method[3] - step.method[4]
-    if step.count[STEPS] == 0:
+    if step.count[entry.STEPS] == 0:
         return NEEDS_START
     if count[IS_BDF] == 1:
         prepare_bdf(step, h, number[BEFORE])
@@ -348,7 +337,7 @@ def prepare(now):
             step.a[i] += lag * (h - number[LENGTH]) * now.jerk[i]
         step.method[0] = h
         count[STAGE] = RESETS
-    number[LENGTH], step.count[HAS_FACTOR] = h, 0
+    number[LENGTH], step.count[entry.HAS_FACTOR] = h, 0
     return CONVERGED
 
 
@@ -393,7 +382,7 @@ def wanted(s, now, level, out):
         for i in range(out.size):
             out[i] = now.a[i] + (lag * h * now.jerk[i] if level == 1 else 0.0)
         return
-    ahead = 0.0 if now.step.count[BOTH_LEVELS] == 1 else h**2
+    ahead = 0.0 if now.step.count[entry.BOTH_LEVELS] == 1 else h**2
     for i in range(out.size):
         out[i] = now.v[i] + ahead * (1 / 6 - beta - 0.5 * lag) * now.jerk[i]
     for t in s.bodies.v_at:

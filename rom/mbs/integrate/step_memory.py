@@ -12,6 +12,7 @@ from rom.mbs.integrate import generalized_alpha as alpha
 from rom.mbs.integrate.bdf import multistep_coefficients
 from rom.mbs.integrate.consistent_start import factorised, least_motion, with_accelerations
 from rom.mbs.integrate.run import Record, Settings
+from rom.mbs.kernels import work as entry
 from rom.mbs.kernels.stages import link
 from rom.mbs.kernels.system import ROLL
 from rom.mbs.kernels.work import Step, Work
@@ -25,9 +26,9 @@ FACTOR_FIELDS = (
     *("pairs_lu", "approach", "response", "yielding", "has_response"),
 )
 # counts that say whether it goes on to be used
-FACTOR_COUNTS = (alpha.LAST_ITERATIONS, alpha.HAS_FACTOR, alpha.FACTOR_USES)
+FACTOR_COUNTS = (entry.LAST_ITERATIONS, entry.HAS_FACTOR, entry.FACTOR_USES)
 # counts of a whole run
-RUN_COUNTS = (alpha.STEPS, alpha.ITERATIONS, alpha.FACTORISATIONS)
+RUN_COUNTS = (entry.STEPS, entry.ITERATIONS, entry.FACTORISATIONS)
 # of the step itself, and what memories call its algorithmic accelerations
 STEP_FIELDS = {name: name for name in ("method", "bdf", "psi", "past", "work", "lost")}
 STEP_FIELDS["before"] = "a"
@@ -70,7 +71,7 @@ def begin(record: Record, W: Work, state: State, forces: Laws, h: float) -> tupl
         state = replace(state, algorithmic=before)
     copies = (x.copy() for x in (state.q, v, before, state.a, state.lam))
     count, work = np.zeros(12, dtype=np.int64), np.zeros(3)
-    count[alpha.USES_LAWS], count[alpha.BOTH_LEVELS] = bool(forces), settings.both
+    count[entry.USES_LAWS], count[entry.BOTH_LEVELS] = bool(forces), settings.both
     signals_at(record, W, state.t)
     evaluate(record.packed.system, W, state.q, state.v)
     apply_laws(forces, W, state.t)
@@ -144,11 +145,6 @@ def recall(memory: Memory, W: Work, step: Step) -> None:
     for name in (*FACTOR_FIELDS, "factor" if memory.arrays["by_blocks"][0] else "lu"):
         getattr(W, name)[:] = memory.arrays[name]
     step.count[list(FACTOR_COUNTS)] = memory.arrays["count"]
-
-
-def copied(step: Step) -> Step:
-    """A step memory of its own with the same content."""
-    return Step(*(x.copy() for _, x in step.items()))
 
 
 def fits(memory: Memory | None, method: Array, weights: Array) -> bool:

@@ -103,12 +103,6 @@ def coincidence() -> tuple[Row, ...]:
     return tuple(Row(POINT, e, NO_VECTOR, NO_VECTOR) for e in np.eye(3))
 
 
-def joint_with_axis(joints: Mapping[str, Joint], joint: str, what: str) -> Joint:
-    """The joint of a name, which must have a coordinate."""
-    coordinate_of(joints, joint, None, what)
-    return joints[joint]
-
-
 def coordinate_of(joints: Mapping[str, Joint], joint: str, which: str | None, what: str) -> Row:
     """The row of the coordinate "angle" or "displacement" of a joint; None for the first."""
     if joint not in joints:

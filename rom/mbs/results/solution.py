@@ -15,7 +15,7 @@ from rom.io.history import data_frame, data_set
 from rom.mbs.equations.packing import Packed
 from rom.mbs.kernels.system import WORK
 from rom.mbs.mechanism import Mechanism
-from rom.mbs.parts.joints import joint_with_axis
+from rom.mbs.parts.joints import coordinate_of
 from rom.mbs.parts.signals import sample_all
 from rom.mbs.results import recomputed
 from rom.mbs.results.element_record import (
@@ -238,7 +238,8 @@ class Solution(Whereabouts, Columns, metaclass=Open, kind="columns", bound=typed
             ConfigError: if there is no such joint, or it leaves no angle about an axis and no
                 displacement along one.
         """
-        joint = joint_with_axis(self.mechanism.joints, name, "motion of a joint")
+        coordinate_of(self.mechanism.joints, name, None, "motion of a joint")
+        joint = self.mechanism.joints[name]
         one, two = (self._at_marker(self.packed.row(marker)) for marker in joint.markers)
         row, slide = joint.turn, joint.displacement
         angle = (None, None) if row is None else recomputed.angles(row, self.t, one, two)

@@ -15,6 +15,7 @@ from cases.beam import elastica
 from cases.long import few
 from cases.mbs.mechanisms import random_body, slider_crank
 from cases.mbs.parts import ORIGIN, X, Y, Z, held_rod, on_guide
+from cases.refusals import refuses
 from rom.errors import ConfigError, ModelError, ModesMissedError, RomWarning, SolverError
 from rom.mbs.analysis import campbell as campbell_module
 from rom.mbs.analysis import few_modes, local_equations
@@ -147,19 +148,14 @@ def test_a_mode_that_lanczos_leaves_out_is_missed(monkeypatch):
         return np.delete(squares, 1), np.delete(U, 1, axis=1)
 
     monkeypatch.setattr(few_modes.Pencil, "near", all_but_the_second)
-    with pytest.raises(ModesMissedError, match="but there are"):
-        rom.linearize(mech, n=6)
+    refuses(ModesMissedError, "but there are", rom.linearize, mech, n=6)
 
 
 def test_wrong_wishes_are_refused():
-    for why, wish in {
-        "n = 0": {"n": 0},
-        "from 1 to 33: the motions that the joints leave": {"n": 500},
-        "at most one of n and band": {"n": 3, "band": (1, 2)},
-        "two growing frequencies": {"band": (3.0, 2.0)},
-    }.items():
-        with pytest.raises(ConfigError, match=why):
-            rom.linearize(rod_on("fixed", 5), **wish)
+    rod = rod_on("fixed", 5)
+    refuses(ConfigError, "from 1 to 33: the motions that the joints", rom.linearize, rod, n=500)
+    refuses(ConfigError, "at most one of n and band", rom.linearize, rod, n=3, band=(1, 2))
+    refuses(ConfigError, "two growing frequencies", rom.linearize, rod, band=(3.0, 2.0))
     for n in (5, 40):
         low = rom.linearize(rod_on("fixed", n)).frequencies
         empty = (low[1] + 0.1, low[2] - 0.1)

@@ -13,7 +13,7 @@ from scipy.special import gamma
 
 import rom
 from cases.mbs.mechanisms import prepared, random_state, stored_at, two_soft
-from cases.mbs.parts import boxed, refused_on
+from cases.mbs.parts import X, Y, Z, boxed, refused_on
 from cases.mbs.tangents import (
     by_position,
     by_velocity,
@@ -22,6 +22,7 @@ from cases.mbs.tangents import (
     forces_at,
     shifted,
 )
+from cases.refusals import refuses
 from cases.solid import block, reduced
 from rom import rotation
 from rom.errors import ConfigError, ModelError
@@ -33,7 +34,6 @@ from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import Marker, surface_place
 from rom.mbs.results.audit import audit
 
-X, Y, Z = np.eye(3)
 TILTED = np.array([1.0, 2.0, 2.0]) / 3
 g = 9.81
 CAPSULES, INSIDE = {"radius1": 7.0, "radius2": 5.0, "axis1": TILTED, "axis2": X}, {"inside": True}
@@ -535,16 +535,12 @@ def test_a_round_thing_presses_as_the_sum_over_the_points(brick, kind):
 def test_messages(brick):
     mech, part = on_floor(brick)
     floor = mech.ground.marker((0, 0, 0))
-    with pytest.raises(ConfigError, match="used twice"):
-        mech.surface_on_plane("floor", floor, part, LAW, normal=(0, 0, 1), where=below)
     box = mech.add_rigid("box", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0))
-    with pytest.raises(ConfigError, match="body 'box' is rigid, it has no surface"):
-        mech.surface_on_sphere("ball", floor, box, LAW, radius=1.0)
-    with pytest.raises(ConfigError, match="with itself"):
-        mech.surface_on_sphere("ball", part.marker("root"), part, LAW, radius=1.0)
-    with pytest.raises(ConfigError, match="is flexible; use its markers"):
-        part.marker((0.0, 0.0, 0.0))
+    add, ball = mech.surface_on_sphere, {"law": LAW, "radius": 1.0}
+    refuses(ConfigError, "used twice", add, "floor", floor, part, **ball)
+    refuses(ConfigError, "body 'box' is rigid, it has no surface", add, "x", floor, box, **ball)
+    refuses(ConfigError, "with itself", add, "x", part.marker("root"), part, **ball)
+    refuses(ConfigError, "is flexible; use its markers", part.marker, (0.0, 0.0, 0.0))
     bare = rom.Mechanism()
     bald = bare.add_flexible("brick", replace(brick, surface=None))
-    with pytest.raises(ModelError, match="carries no surface"):
-        bare.surface_on_sphere("ball", floor, bald, LAW, radius=1.0)
+    refuses(ModelError, "carries no surface", bare.surface_on_sphere, "x", floor, bald, **ball)

@@ -5,6 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
+from cases.refusals import refuses
 from rom.components import cosserat
 from rom.errors import ConfigError
 from rom.io.history import channels
@@ -142,7 +143,5 @@ def test_what_has_no_markers_is_refused():
     mech.force("push", rod.marker("end"), (0.05, 0, 0))
     sol = rom.simulate(mech, t_end=2e-3, dt=1e-3)
     assert sol.elements == ("push",)
-    with pytest.raises(ConfigError, match=r"'rod' .* acts on whole bodies, not on markers"):
-        sol.element("rod")
-    with pytest.raises(ConfigError, match=r"no element 'pull'; there are \['push', 'rod'\]"):
-        sol.element("pull")
+    refuses(ConfigError, r"'rod' .* acts on whole bodies, not on markers", sol.element, "rod")
+    refuses(ConfigError, r"no element 'pull'; there are \['push', 'rod'\]", sol.element, "pull")

@@ -183,17 +183,6 @@ def test_the_audit_counts_on_momentum_where_a_family_says_so():
         assert ("change of linear momentum" in [row.quantity for row in rows]) == counts
 
 
-@pytest.mark.once
-@pytest.mark.parametrize("add", WAYS)
-def test_a_run_that_was_saved_goes_on_to_the_same_bits(add, tmp_path):
-    whole = simulate_quietly(bob(add), t_end=0.2, dt=1e-3)
-    first = simulate_quietly(bob(add), t_end=0.1, dt=1e-3)
-    rom.save_state(first.final, tmp_path / "state.npz")
-    state = rom.load_state(tmp_path / "state.npz")
-    rest = simulate_quietly(bob(add), t_end=0.2, dt=1e-3, state=state)
-    np.testing.assert_array_equal(rest.q[-1], whole.q[-1])
-
-
 @pytest.mark.parametrize("add", COMPILED)
 def test_a_wrong_tangent_would_cost_newton_passes(add):
     sol = simulate_quietly(bob(add), t_end=0.2, dt=1e-2)

@@ -7,9 +7,10 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
 from cases.mbs import mechanisms
-from cases.mbs.mechanisms import simulate_quietly, slider_crank, tangents_at
-from cases.mbs.parts import on_axle, on_guide, refused_on
-from cases.mbs.tangents import difference, forces_at, shifted
+from cases.mbs.mechanisms import simulate_quietly, slider_crank
+from cases.mbs.parts import X, Y, Z, on_axle, on_guide, refused_on
+from cases.mbs.tangents import by_position, by_velocity, difference, forces_at
+from cases.refusals import refuses
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.mbs.analysis.equilibrium import equilibrium
 from rom.mbs.analysis.linearize import linearize
@@ -29,7 +30,6 @@ def columns_at(s, W, lam):
     load_columns(s, W, lam, lam.size)
 
 
-X, Y, Z = np.eye(3)
 METHODS = ("generalized-alpha", "dop853")
 g = 9.81
 
@@ -149,8 +149,7 @@ def test_a_law_that_keeps_newton_from_ending_is_named():
     mech = wheel(J=1e-3)
     mech.motor("calm", "axle", lambda t, x, v: 1.0)
     mech.motor("servo", "axle", lambda t, x, v: noise.normal(), compiled=False)
-    with pytest.raises(SolverError, match="the law of 'servo' still changes by"):
-        simulate(mech, t_end=1.0, dt=1e-2)
+    refuses(SolverError, "the law of 'servo' still changes by", simulate, mech, t_end=1.0, dt=1e-2)
 
 
 def test_a_law_with_a_memory_is_left_to_python():
@@ -214,25 +213,17 @@ def test_tangents_are_derivatives_of_the_forces(seed):
     packed.system.markers.twist[:] *= 1e-3
     s, (q, v, a, lam) = packed.system, mechanisms.random_state(rng, packed)
     packed.elements[motors.MOTORS_FAMILY].answer[:] = 1.7
-    n, m = v.size, lam.size
-
-    def at(dq, dv, dlam):
-        return forces_at(packed, W, shifted(packed, q, dq), v + dv, a, lam + dlam)
-
-    no, still = np.zeros(n), np.zeros(m)
-    C = difference(lambda x: at(no, x, still), n)
-    tangents_at(s, W, q, v, a, lam, (0.0, 1.0, 0.0))
-    assert_allclose(W.S, C, atol=1e-7 * np.abs(C).max())
-    by_load = difference(lambda x: at(no, no, x), m)
-    at(no, no, still)
+    found, C = by_velocity(packed, W, q, v, a, lam)
+    assert_allclose(found, C, atol=1e-7 * np.abs(C).max())
+    by_load = difference(lambda x: forces_at(packed, W, q, v, a, lam + x), lam.size)
+    forces_at(packed, W, q, v, a, lam)
     columns_at(s, W, lam)
     assert_allclose(W.UG.T, by_load, atol=1e-6 * np.abs(by_load).max())
     assert np.abs(W.UG - W.G).max() > 0.01
     v[:] = 0.0  # the turning of a torque axis holds where the joint is closed
     packed.elements[motors.MOTORS_FAMILY].answer[:] = 0.0
-    K = difference(lambda x: at(x, no, still), n)
-    tangents_at(s, W, q, v, a, lam, (0.0, 0.0, 1.0))
-    assert_allclose(W.Kt, K, atol=1e-6 * np.abs(K).max())
+    found, K = by_position(packed, W, q, v, a, lam, 1e-6)
+    assert_allclose(found, K, atol=1e-6 * np.abs(K).max())
 
 
 def test_friction_by_load_takes_few_newton_passes():
@@ -427,8 +418,7 @@ test_wrong_joint_forces_are_refused_by_name = refused_on(joints_of_three_kinds, 
 def test_laws_that_return_nonsense_are_named():
     mech = wheel()
     mech.motor("motor", "axle", lambda t, x, v: "full", compiled=False)
-    with pytest.raises(ConfigError, match="law of motor 'motor' returned 'full'"):
-        simulate(mech, t_end=0.1, dt=1e-2)
+    refuses(ConfigError, "law of motor 'motor' returned 'full'", simulate, mech, t_end=0.1, dt=1e-2)
     mech = wheel()
     mech.motor("motor", "axle", lambda t, x, v: np.nan if t > 0.05 else 1.0, compiled=False)
     with pytest.raises(SolverError, match=r"'motor' gives nan at t = 0\.06") as caught:

@@ -10,6 +10,7 @@ import rom
 from cases.mbs.mechanisms import nodal_body, prepared, random_nodes, random_pose, random_state
 from cases.mbs.motions import swing
 from cases.mbs.tangents import check_tangents, forces_at
+from cases.refusals import refuses
 from cases.solid import block
 from rom import rotation
 from rom.body.records import Surface
@@ -168,7 +169,5 @@ def test_messages():
         (ModelError, "do not tell its inside from its outside", inside_out, {"pressure": 1.0}),
         (ModelError, "carries no surface", replace(body, surface=None), {"pressure": 1.0}),
     ):  # fmt: skip
-        with pytest.raises(error, match=words):
-            rom.surface_load(on, **given)
-    with pytest.raises(ConfigError, match="is not one of body 'box'"):
-        mech.spread_load("pull", box, load)
+        refuses(error, words, rom.surface_load, on, **given)
+    refuses(ConfigError, "is not one of body 'box'", mech.spread_load, "pull", box, load)

@@ -216,14 +216,6 @@ def test_dop853_takes_the_steps_of_scipy_on_the_same_equation():
     assert_allclose(sol.v[:, 2], own.y[1], rtol=0, atol=1e-7)
 
 
-def test_dop853_without_an_interval_finds_events():
-    for terminal, end in ((True, np.sqrt(2 / G)), (False, 1.0)):
-        sol = simulate(motions.falling(terminal), t_end=1.0, method="dop853")
-        assert_allclose([sol.t[-1], *sol.events["floor"].t], [end, np.sqrt(2 / G)], atol=1e-10)
-        assert sol.status.startswith("Stopped by event 'floor'") == terminal
-        assert (np.diff(sol.t) > 0).all()
-
-
 def test_dop853_without_an_interval_goes_on_to_the_same_bits(tmp_path):
     options = {"t_end": 0.5, "method": "dop853", "rtol": 1e-9, "save_every": 2}
     count = Brake()

@@ -94,8 +94,7 @@ def test_a_run_tells_itself_what_the_audit_finds_wrong():
         sol = weight_on_a_spring(dt=0.05, rho_inf=0.5)
     assert len(told) == 1
     assert all(what in str(told[0].message) for what in failures(sol)) and failures(sol)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with warnings.catch_warnings(action="error"):
         assert audit(weight_on_a_spring(dt=0.002)).ok
 
 

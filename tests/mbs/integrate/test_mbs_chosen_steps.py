@@ -9,10 +9,10 @@ from cases.beam import stiffened_beam
 from cases.long import few
 from cases.mbs.mechanisms import simeon_crank, simulate_quietly
 from cases.mbs.motions import flexible_four_bar, four_links, heavy_top, hub_and_panel, pendulum
+from cases.mbs.parts import ORIGIN, X, Z, on_guide
 from rom.components import cosserat
 from rom.mbs.mechanism import Mechanism
 
-X, Z, ORIGIN = np.array([1.0, 0, 0]), (0, 0, 1), (0.0, 0.0, 0.0)
 STEEL_BAR = {"EI": 2800.0, "rhoA": 3.1, "n_modes": 5, "stiffened": False}  # 20 mm square
 
 
@@ -95,9 +95,7 @@ def test_finer_rods_take_no_more_steps():
 def test_a_step_does_not_leap_to_another_equilibrium():
     """A spring whose mass has come to rest has one on its other side, too."""
     mech, end = Mechanism(gravity=(0, 0, 0)), 1e5
-    mass = mech.add_rigid("mass", mass=1.0, inertia=(1, 1, 1), at=(1.2, 0, 0)).marker(ORIGIN)
-    base = mech.ground.marker(ORIGIN)
-    mech.prismatic("guide", base, mass, axis=(1, 0, 0))
-    mech.spring_damper("spring", base, mass, stiffness=1e8, damping=1.8e4, free_length=1.0)
+    law = {"stiffness": 1e8, "damping": 1.8e4, "free_length": 1.0}
+    mech.spring_damper("spring", mech.ground.marker(ORIGIN), on_guide(mech, at=1.2 * X), **law)
     sol = rom.simulate(mech, t_end=end, rtol=0.5)
     assert_allclose(sol.position("mass")[-1], X, atol=1e-3)

@@ -42,15 +42,13 @@ def test_a_start_far_from_joints_or_drives_is_refused_unless_asked_for(asked):
     for fault, name in (({"gap": 0.0051}, "pin"), ({"angle": 0.3}, "turn")):
         with pytest.raises(ModelError, match=rf"^{name}: the start contra.*open by .*=True"):
             asked(rod_on_a_pin(**fault))
-        with warnings.catch_warnings():
-            warnings.simplefilter("error", RomWarning)
+        with warnings.catch_warnings(action="error", category=RomWarning):
             asked(rod_on_a_pin(**fault | {"rate": 0.0}), assemble=True)
 
 
 @pytest.mark.parametrize(("gap", "told"), [(1e-9, False), (1e-4, True), (0.0049, True)])
 def test_a_small_gap_is_told_and_recorded(gap, told):
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+    with warnings.catch_warnings(record=True, action="always") as caught:
         sol = moved(rod_on_a_pin(gap))
     assert [("'pin' was open by" in str(w.message)) for w in caught] == [True] * told
     assert_allclose(sol.statistics["closed"], gap / 0.5, rtol=1e-6)
@@ -83,8 +81,7 @@ def test_a_given_velocity_that_a_drive_contradicts_is_told_or_refused(omega, rat
     mech, said = rod_on_a_pin(omega=omega, rate=rate), f"the velocity of 'rod' changes by {told} of"
     if told and float(told) > 1e-2:
         refuses(ModelError, f"^rod: the start contradicts .*{said}", moved, mech)
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+    with warnings.catch_warnings(record=True, action="always") as caught:
         sol = moved(mech, assemble=bool(told) and float(told) > 1e-2)
     assert [said in str(w.message) for w in caught] == [True] * (told == "0.005")
     assert_allclose(sol.omega("rod")[0, 2], rate, rtol=1e-6)

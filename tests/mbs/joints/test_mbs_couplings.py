@@ -5,8 +5,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 from cases.mbs.mechanisms import prepared, random_pose, random_state, simulate_quietly, two_soft
-from cases.mbs.parts import boxed, on_axle, on_guide, refused_on
+from cases.mbs.parts import X, Y, Z, boxed, on_axle, on_guide, refused_on
 from cases.mbs.tangents import GRAVITY, check_tangents, constraint_derivatives
+from cases.refusals import refuses
 from rom.errors import ModelError, SolverError
 from rom.mbs.equations.equations import evaluate, linearize_constraints
 from rom.mbs.integrate.simulation import simulate
@@ -14,7 +15,6 @@ from rom.mbs.kernels.system import ROLL
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.results.audit import audit
 
-X, Y, Z = np.eye(3)
 AXIS, ACROSS = np.array([1.0, 2.0, 2.0]) / 3, np.array([2.0, 1.0, -2.0]) / 3
 BALL = (0.2, 0.2, 0.2)
 
@@ -114,7 +114,7 @@ def test_a_gear_that_turns_by_half_a_turn_a_step_is_named_with_the_step_it_takes
 def test_a_gear_that_turns_slowly_is_not_blamed_for_a_force_that_breaks_down():
     mech = gear_pair(3.0, 0.0, speed=1.0)
     mech.motor("brake", "axle of pinion", lambda t, x, v: 0.0 if t < 0.1 else np.nan)
-    with pytest.raises(SolverError, match="'brake' gives no finite number") as caught:
+    with pytest.raises(SolverError, match="the law of 'brake' gives no finite number") as caught:
         simulate(mech, t_end=1.0, dt=0.04)
     assert "Take a smaller step than 0.04 s" in caught.value.hint
     assert "turns" not in caught.value.hint
@@ -152,16 +152,6 @@ def test_a_screw_turns_torque_into_thrust(pitch):
     assert_allclose(sol.reaction("thread")[-1, 0], m * pitch / (2 * np.pi) * alpha, rtol=1e-7)
     assert abs(turns[-1]) > 10
     assert audit(sol).ok, audit(sol)
-
-
-def test_a_gear_run_in_two_pieces_is_the_run_in_one():
-    """The angles go on from where they were, over whole turns."""
-    whole = simulate(gear_pair(2.7, 5.0), t_end=2.0, dt=2e-3)
-    mech = gear_pair(2.7, 5.0)
-    first = simulate(mech, t_end=1.0, dt=2e-3)
-    second = simulate(mech, t_end=2.0, dt=2e-3, state=first.final)
-    assert_allclose(second.base[-1], whole.base[-1], rtol=1e-9)
-    assert_allclose(second.v[-1], whole.v[-1], atol=1e-8)
 
 
 def test_a_planetary_gear_turns_as_willis_says():
@@ -276,5 +266,4 @@ def test_gears_that_contradict_each_other_are_refused():
     mech = gear_pair(2.0, 1.0)
     mech.gear("other teeth", "axle of pinion", "axle of wheel", ratio=3.0)
     mech.drive("motor", "axle of pinion", lambda t: t)
-    with pytest.raises(ModelError, match="misses"):
-        simulate_quietly(mech, t_end=0.1, dt=1e-3)
+    refuses(ModelError, "misses", simulate_quietly, mech, t_end=0.1, dt=1e-3)

@@ -8,7 +8,8 @@ from numpy.testing import assert_allclose
 from scipy.interpolate import CubicSpline
 
 from cases.mbs.mechanisms import random_body, simulate_quietly
-from cases.mbs.parts import on_axle
+from cases.mbs.parts import Z, on_axle
+from cases.refusals import refuses
 from rom import rotation
 from rom.errors import ConfigError, ModelError, RomWarning
 from rom.mbs.integrate.simulation import simulate
@@ -18,7 +19,6 @@ from rom.mbs.parts.joints import NO_VECTOR, Row
 from rom.mbs.parts.signals import Signal
 from rom.mbs.results.recomputed import displacements
 
-Z = np.array([0.0, 0.0, 1.0])
 AXIS = np.array([1.0, 2.0, 2.0]) / 3
 
 
@@ -262,10 +262,8 @@ def test_joints_without_a_coordinate_are_named():
     mech = spinning_ball(1.0, "revolute")
     mech.spherical("ball joint", mech.ground.marker((1, 2, 3)), mech.part("ball").marker((0, 0, 0)))
     sol = simulate(mech, t_end=0.01, dt=1e-3)
-    with pytest.raises(ConfigError, match="'ball joint' is spherical: it has no angle"):
-        sol.joint("ball joint")
-    with pytest.raises(ConfigError, match=r"no joint 'pine'; there are \['ball joint', 'pin'\]"):
-        sol.joint("pine")
+    refuses(ConfigError, "'ball joint' is spherical: it has no angle", sol.joint, "ball joint")
+    refuses(ConfigError, r"no joint 'pine'; there are \['ball joint', 'pin'\]", sol.joint, "pine")
 
 
 POLYNOMIAL = np.polynomial.Polynomial([0.3, -1.0, 2.0, 0.7, -0.4])

@@ -13,13 +13,12 @@ from scipy.special import ellipj, ellipk
 
 from cases.mbs.lagrange import jacobian, lagrange, potential_force
 from cases.mbs.mechanisms import simulate_quietly
-from cases.mbs.parts import slender, turned
+from cases.mbs.parts import X, Y, Z, slender, turned
 from rom.errors import RomWarning
 from rom.mbs.integrate.simulation import simulate
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.results.audit import audit
 
-X, Y, Z = np.eye(3)
 g = 9.81
 
 

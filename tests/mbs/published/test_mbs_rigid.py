@@ -99,8 +99,7 @@ def test_turns_that_a_step_cannot_count_are_told(dt, lost):
     mech = Mechanism(gravity=(0, 0, 0))
     on_axle(mech, omega=(0, 0, 200))
     mech.motor("drag", "axle", lambda t, x, v: -1e-6 * x)
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+    with warnings.catch_warnings(record=True, action="always") as caught:
         simulate(mech, t_end=0.2, dt=dt)
     told = [str(w.message) for w in caught if "rad a step" in str(w.message)]
     assert bool(told) == lost

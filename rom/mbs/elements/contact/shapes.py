@@ -19,18 +19,8 @@ import numpy as np
 from rom import rotation
 from rom.arguments import Direction, Length, NotNegative, unit_vector
 from rom.errors import ConfigError
+from rom.mbs.elements.contact import points
 from rom.mbs.elements.contact.impact import Impact, checked_law
-from rom.mbs.elements.contact.points import (
-    BORE,
-    CAPSULE,
-    CONTACTS_FAMILY,
-    CYLINDER,
-    DISC,
-    PLANE,
-    SPHERE,
-    Contact,
-    distance,
-)
 from rom.mbs.parts.bodies import Marker, Part, surface_place
 from rom.mbs.parts.joints import Whole
 from rom.model import Array
@@ -63,7 +53,7 @@ def sphere_on_plane(
         ConfigError: for a name in use, an unknown marker, one body twice, a law that is no
             `rom.mbs.Impact`, or no direction.
     """
-    _enter(self, name, PLANE, (m1, m2), law, (normal, None), (radius, 0.0))
+    _enter(self, name, points.PLANE, (m1, m2), law, (normal, None), (radius, 0.0))
 
 
 def disc_on_plane(  # noqa: PLR0913  two surfaces and a law
@@ -92,7 +82,7 @@ def disc_on_plane(  # noqa: PLR0913  two surfaces and a law
         ConfigError: for a name in use, an unknown marker, one body twice, a law that is no
             `rom.mbs.Impact`, or no direction.
     """
-    _enter(self, name, DISC, (m1, m2), law, (normal, axis), (radius, 0.0))
+    _enter(self, name, points.DISC, (m1, m2), law, (normal, axis), (radius, 0.0))
 
 
 def sphere_on_sphere(
@@ -111,7 +101,7 @@ def sphere_on_sphere(
         ConfigError: for a name in use, an unknown marker, one body twice, a law that is no
             `rom.mbs.Impact`, or a radius not above zero.
     """
-    _enter(self, name, SPHERE, (m1, m2), law, (None, None), (radius2, radius1))
+    _enter(self, name, points.SPHERE, (m1, m2), law, (None, None), (radius2, radius1))
 
 
 def sphere_on_cylinder(  # noqa: PLR0913  two surfaces and a law
@@ -149,7 +139,7 @@ def sphere_on_cylinder(  # noqa: PLR0913  two surfaces and a law
             f"contact {name!r}: the sphere of {radius2:g} m must be smaller than the bore of "
             f"{radius1:g} m; leave inside out for a sphere outside."
         )
-    kind, radii = BORE if inside else CYLINDER, (radius2, radius1)
+    kind, radii = points.BORE if inside else points.CYLINDER, (radius2, radius1)
     _enter(self, name, kind, (m1, m2), law, (axis, None), radii)
 
 
@@ -200,12 +190,12 @@ def capsule_on_capsule(  # noqa: PLR0913  two bodies and a law
     self.check_markers(name, m1, m2)
     gap = self.design_point(m2) - self.design_point(m1)
     e, s = (unit_vector(f"axis of {name}", axis) for axis in axes)
-    if not distance(gap, e, s, half[1], half[0]) > 0.0:
+    if not points.distance(gap, e, s, half[1], half[0]) > 0.0:
         raise ConfigError(
             f"contact {name!r}: the axes cross at the start; nothing tells the side on which the "
             "bodies touch. Move one of them away."
         )
-    _enter(self, name, CAPSULE, (m1, m2), law, axes, (radius2, radius1), half)
+    _enter(self, name, points.CAPSULE, (m1, m2), law, axes, (radius2, radius1), half)
 
 
 def surface_on_plane(
@@ -232,7 +222,7 @@ def surface_on_plane(
         ConfigError: for a wrong argument.
         ModelError: if the body carries no surface.
     """
-    _cover(self, name, PLANE, m1, part, law, (normal, 0.0, where))
+    _cover(self, name, points.PLANE, m1, part, law, (normal, 0.0, where))
 
 
 def surface_on_sphere(
@@ -259,7 +249,7 @@ def surface_on_sphere(
         ConfigError: for a wrong argument.
         ModelError: if the body carries no surface.
     """
-    _cover(self, name, SPHERE, m1, part, law, (None, radius, where))
+    _cover(self, name, points.SPHERE, m1, part, law, (None, radius, where))
 
 
 def surface_on_cylinder(  # noqa: PLR0913  two surfaces and a law
@@ -290,7 +280,7 @@ def surface_on_cylinder(  # noqa: PLR0913  two surfaces and a law
         ConfigError: for a wrong argument.
         ModelError: if the body carries no surface.
     """
-    kind = BORE if inside else CYLINDER
+    kind = points.BORE if inside else points.CYLINDER
     _cover(self, name, kind, m1, part, law, (axis, radius, where))
 
 
@@ -326,8 +316,8 @@ def _cover(
             tangential_damping=law.tangential_damping * area,
         )
         marker = Marker(part.name, surface_place(int(k)))
-        contact = Contact(kind, m1, marker, e, np.zeros(3), (0.0, radius), own)
-        self.add(f"{name} {k}", contact, CONTACTS_FAMILY)
+        contact = points.Contact(kind, m1, marker, e, np.zeros(3), (0.0, radius), own)
+        self.add(f"{name} {k}", contact, points.CONTACTS_FAMILY)
 
 
 def _enter(  # noqa: PLR0913  what the record holds
@@ -344,7 +334,7 @@ def _enter(  # noqa: PLR0913  what the record holds
     self.check_apart(name, *markers)
     e, s = (_carried(self, name, *side) for side in zip(markers, axes, strict=True))
     law = checked_law(name, law, *(self.part(marker.body) for marker in markers))
-    self.add(name, Contact(kind, *markers, e, s, radius, law, half), CONTACTS_FAMILY)
+    self.add(name, points.Contact(kind, *markers, e, s, radius, law, half), points.CONTACTS_FAMILY)
 
 
 def _carried(self: Whole, name: str, marker: Marker, axis: Direction | None) -> Array:
