@@ -12,8 +12,7 @@ from typing import Annotated, Literal
 import numpy as np
 from scipy.linalg import block_diag
 
-from rom.arguments import positive, typed
-from rom.arguments.quantities import Between, Positive
+from rom.arguments import Between, Count, Positive, typed
 from rom.components.updating.family_model import (
     Attached,
     Family,
@@ -75,10 +74,10 @@ def update(  # noqa: PLR0913  keywords of one call
     attached: Attached | None = None,
     candidates: Attached | None = None,
     damping: Annotated[float, Between(*DAMPING_RANGE)] = 0.01,
-    prior: dict[str, float] | Updated | None = None,
+    prior: dict[str, Annotated[float, Positive()]] | Updated | None = None,
     tolerance: float | None = None,
     residual: Literal["responses", "equations", "response-function"] = "responses",
-    rank: int | None = None,
+    rank: Annotated[int, Count(1)] | None = None,
     beside_poles: Annotated[float, Positive()] | None = None,
 ) -> Updated:
     """Find the factors of a family, and damping ratios, that explain measured responses.
@@ -132,7 +131,10 @@ def update(  # noqa: PLR0913  keywords of one call
     attached, candidates = dict(attached or {}), dict(candidates or {})
     rows = test.rows(bodies, tolerance)
     model = family_model(family, rows, attached, candidates, fixed)
-    unknown = _unknown(model, free, attached, candidates)
+    chosen = set(model.names) - set(candidates) if free is None else {*free, *attached}
+    for name in sorted(chosen):
+        check_known(name, model.names, f"no parameter {name!r}; there are", ParameterError)
+    unknown = np.array([name in chosen for name in model.names])
     if isinstance(prior, Updated) and residual != "responses":
         raise ConfigError('the update by another test as a prior needs residual="responses".')
     before = _Before.of(prior or {}, model)
@@ -157,16 +159,6 @@ def update(  # noqa: PLR0913  keywords of one call
     return replace(_found(family, search.moved(found)), covariance=found.covariance)
 
 
-def _unknown(
-    model: FamilyModel, free: tuple[str, ...] | None, attached: Attached, candidates: Attached
-) -> Mask:
-    """(n_p,) which parameters are unknown."""
-    chosen = set(model.names) - set(candidates) if free is None else {*free, *attached}
-    for name in sorted(chosen):
-        check_known(name, model.names, f"no parameter {name!r}; there are", ParameterError)
-    return np.array([name in chosen for name in model.names])
-
-
 @dataclass(frozen=True, slots=True)
 class _Before:
     """What is known of the logarithms of factors before a test.
@@ -187,8 +179,6 @@ class _Before:
         names, precision = model.names, np.zeros((len(model.names),) * 2)
         if not isinstance(prior, Updated):
             check_prior(prior, names)
-            for name in prior:
-                positive(f"prior of {name}", prior[name])
             sigma = np.array([prior.get(name, np.inf) for name in names])
             return _Before(np.zeros(len(names)), np.diag(sigma**-2.0))
         known = [name for name in prior.names if name in names]

@@ -149,7 +149,11 @@ class Operation:
     def at(self, x: Array) -> Linear:
         """The equations at logarithms x (n_p,) of factors."""
         m, n_e = self.driven.shape
-        acc, dacc = self._accelerations(x)
+        (K, dK), (M, dM) = (summed(self.K, self.k_powers, x), summed(self.M, self.m_powers, x))
+        acc = np.linalg.solve(M, np.hstack([-K / self.scale, -self.XI, self.driven]))
+        right = -dM @ acc
+        right[..., :m] -= dK / self.scale
+        dacc = np.linalg.solve(M, right)
         A = np.zeros((2 * m + n_e,) * 2)
         A[:m, m : 2 * m], A[m : 2 * m] = np.diag(self.scale), acc
         dA = np.zeros((x.size, *A.shape))
@@ -164,14 +168,6 @@ class Operation:
             dC[..., :m] += dy / self.scale
             found += [C, dC]
         return Linear(A, dA, *found)
-
-    def _accelerations(self, x: Array) -> tuple[Array, Array]:
-        """(m, n) accelerations of the modes by the state, and (n_p, m, n) their derivatives."""
-        (K, dK), (M, dM) = (summed(self.K, self.k_powers, x), summed(self.M, self.m_powers, x))
-        acc = np.linalg.solve(M, np.hstack([-K / self.scale, -self.XI, self.driven]))
-        right = -dM @ acc
-        right[..., : len(K)] -= dK / self.scale
-        return acc, np.linalg.solve(M, right)
 
 
 def operation(
@@ -254,7 +250,15 @@ def stress_rows(
     The latter (k, 6 + r), of rigid and elastic coordinates, is that of modes left out. Of chosen
     channels (k,), or all.
     """
-    recovery = _linear_stress(body)
+    recovery = body.stress
+    if recovery is None:
+        raise ModelError(f"body {body.name!r} carries no stress.", hint="Reduce with stress=True.")
+    if not isinstance(recovery, StressRecovery):
+        raise ModelError(
+            f"the stress of body {body.name!r} is that of large deflection, and what is estimated "
+            "here is linear.",
+            hint="Reduce without nonlinear.",
+        )
     reach = POINT_RTOL * np.ptp(recovery.points, axis=0).max()
     n_r, left_out = body.n_modes, np.zeros((len(recovery.operator), 6 + body.n_modes))
     if (extra := recovery.inertial) is not None:
@@ -272,19 +276,6 @@ def stress_rows(
         static.append(along @ recovery.operator[None, 6 * n : 6 * n + 6])
         inertial.append(along @ left_out[None, 6 * n : 6 * n + 6])
     return np.vstack(static), np.vstack(inertial)
-
-
-def _linear_stress(body: FlexibleBody) -> StressRecovery:
-    recovery = body.stress
-    if recovery is None:
-        raise ModelError(f"body {body.name!r} carries no stress.", hint="Reduce with stress=True.")
-    if not isinstance(recovery, StressRecovery):
-        raise ModelError(
-            f"the stress of body {body.name!r} is that of large deflection, and what is estimated "
-            "here is linear.",
-            hint="Reduce without nonlinear.",
-        )
-    return recovery
 
 
 def check_seen(at: Linear, body: Operation) -> None:
