@@ -10,7 +10,7 @@ from scipy.linalg import eigh, solve_sylvester, sqrtm
 
 import rom
 from cases.components import updating
-from cases.components.updating import PARAMETERS, exact_responses, family_of, refuse
+from cases.components.updating import PARAMETERS, family_of, refuse
 from cases.solid import STEEL, composite
 from rom.components.families.layers import Stretch
 from rom.components.updating.estimate import _Before, _Search
@@ -41,14 +41,9 @@ def model_of(family, attached=None, candidates=None, fixed=HELD, sensors=SENSORS
     return updating.model_of(family, (sensors, INPUTS), fixed, attached, candidates)
 
 
-def synthetic(family, level=0.05, seed=0, true=TRUE, zeta=0.02, lines=LINES, **made):
-    """A test with relative noise: coherence c of n averages has the error (1 - c) / (2 n c)."""
-    H = exact_responses(model_of(family, **made), true, lines, zeta)
-    c = 1 / (1 + AVERAGES * level**2)  # level^2 / 2 for each part
-    H = noisy(H, level, np.random.default_rng(seed)) if level else H
-    return Responses(
-        lines, H, made.get("sensors", SENSORS), INPUTS, c if level else 0.999, AVERAGES
-    )
+def synthetic(family, level=0.05, true=TRUE, lines=LINES, sensors=SENSORS, **made):
+    how = {"level": level, "averages": AVERAGES, "fixed": HELD} | made
+    return updating.noisy_test(family, true, (sensors, INPUTS), lines, **how)
 
 
 def at_nodes(model, nodes):

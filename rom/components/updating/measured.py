@@ -95,7 +95,7 @@ class Channels:
         body: FlexibleBody | Mapping[str, FlexibleBody],
         what: str,
         tolerance: float | None = None,
-        gauges: npt.ArrayLike = False,
+        gauges: bool | Sequence[bool] = False,
     ) -> Array:
         """(k, 6 + r) displacement [1] or strain [1/m] along each channel per coordinate.
 
