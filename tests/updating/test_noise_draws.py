@@ -152,7 +152,6 @@ def test_total_least_squares_is_scaled_by_the_ratio_of_noise():
     assert_allclose(estimators(x, f, 0.0)[2], H2)
     H1, H2, Hv, _ = estimators(x, f)
     assert_allclose(np.abs(Hv), np.sqrt(np.abs(H1 * H2)))
-    refuse((lambda: estimators(x, f, -1.0), "ratio = -1 must not be negative"))
 
 
 def test_noise_of_a_force_that_is_taken_for_that_of_sensors_makes_deviations_too_small(drawn):
@@ -349,9 +348,7 @@ def test_noise_of_forces_and_few_averages_are_checked(exact):
     test = measured(exact, np.random.default_rng(0), "H1", 0.0, 0.1)
     named, some = replace(test, force_noise=0.2), replace(test, force_noise=0.01, estimator=None)
     refuse(
-        (lambda: replace(test, force_noise=-0.1), "force_noise .* zero or more"),
         (lambda: replace(test, averages=2), "estimated from 2 averages says nothing"),
-        (lambda: replace(test, estimator="H3"), "estimator = 'H3'"),
         (lambda: replace(test, force_noise=np.zeros(3)), r"force_noise \(3,\) .* \(20, 2\)"),
         (some.logarithm, "the estimator of H is not named"),
         (named.logarithm, r"force_noise alone has .* times the power"),

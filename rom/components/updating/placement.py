@@ -200,7 +200,7 @@ def place(  # noqa: PLR0913  keywords of one call
     fixed: Held = (),
     attached: Attached | None = None,
     damping: float = 0.01,
-    prior: Mapping[str, float] | None = None,
+    prior: Mapping[str, Annotated[float, Positive()]] | None = None,
 ) -> Plan:
     """Choose the sensors and inputs that tell most about the parameters of a family.
 
@@ -297,8 +297,8 @@ def _information(
     told[size < DEAD_RATIO * size.max()] = 0.0  # relative noise makes nothing of round-off
     width = np.log(model.high / model.low)
     sigma = np.array([prior.get(k, w) for k, w in zip(model.names, width, strict=True)])
-    if not (sigma > 0).all():
-        raise ConfigError("prior: each standard deviation must be positive, and low < high.")
+    if not sigma.all():
+        raise ConfigError("a range of one factor says nothing; give low < high or a prior.")
     known = np.diag(np.r_[sigma, np.full(m, DAMPING_LOG_DEVIATION)] ** -2.0)
     return told, known, model.labels(m)
 
