@@ -86,7 +86,7 @@ DAMAGES = {
         {"nodes": {n: tuple(x / 0.0254 for x in p) for n, p in NODES.items()}},
         r"times 0\.0254 all 8 .*: inches"),
     "a node is missing": ({"nodes": {1: NODES[1]}}, "without coordinates: 2, 3, 4"),
-    "units of the header are wrong": ({"unit": "mm/s^2/N"}, "all responses"),
+    "units of the header are wrong": ({"unit": "mm/s^2/N"}, "all responses .*millimetres"),
     "accelerations are said to be displacements": (
         {"unit": "m/N"}, r"\(2 pi f\)\^2: accelerations taken for displacements"),
     "accelerations are said to be velocities": (

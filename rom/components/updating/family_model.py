@@ -314,12 +314,13 @@ class FamilyModel:
         lam = self.elastic(x)
         return min(int(np.count_nonzero(lam < (BAND_RATIO * highest) ** 2)) + 1, lam.size)
 
-    def reduced(self, T: Array, free: Mask, x: Array, seen: Array) -> "FamilyModel":
-        """The same in coordinates T (n, r), of parameters that stay free (n_p,), others kept at x.
+    def reduced(self, T: Array, free: Index | Mask, x: Array, seen: Array) -> "FamilyModel":
+        """The same in coordinates T (n, r), of parameters that stay free, others kept at x (n_p,).
 
         Rows of the sensors are given as (n_s, r).
         """
-        kept = np.where(free, 0.0, x)
+        kept = np.array(x)
+        kept[free] = 0.0
         K = (T.T @ self.K @ T) * np.exp(self.k_powers @ kept)[:, None, None]
         M = (T.T @ self.M @ T) * np.exp(self.m_powers @ kept)[:, None, None]
         small = replace(self, K=K, M=M, seen=seen, driven=self.driven @ T, motions=self.motions @ T)

@@ -104,10 +104,15 @@ def receptance(seen: Array, g: Complex, driven: Array) -> Complex:
     return H
 
 
-def _modal_sensitivity(model: ParametricModel, modes: Modal) -> tuple[Array, Array, Array]:
-    """Phi^T dZ Phi = A - omega^2 B + i omega C, each (n_p, n, n), at constant damping ratios.
+def through_modes(
+    model: ParametricModel, modes: Modal, m: int, *, shared: bool = False
+) -> Callable[[Complex, Complex, Array], Complex]:
+    """The function of sides (n_f, a, n), (n_f, n, b) and lines (n_f,) that gives side dZ side.
 
-    The damping changes with its modes; of their derivatives remain divided differences of d.
+    Derivatives (n_f, a, b, n_p + m) are those by p, at the origin of the model, and by logarithms
+    of the damping ratios of its m lowest elastic modes; the last of these may be shared by all
+    other modes. Phi^T dZ Phi is A - omega^2 B + i omega C, each (n_p, n, n), at constant ratios:
+    the damping changes with its modes, of whose derivatives divided differences of d remain.
     """
     A, B = (modes.Phi.T @ dA @ modes.Phi for dA in (model.dK, model.dM))
     lam, d = modes.lam, modes.d
@@ -118,25 +123,13 @@ def _modal_sensitivity(model: ParametricModel, modes: Modal) -> tuple[Array, Arr
     i = np.arange(lam.size)
     own = np.divide(d, 2 * lam, out=np.zeros_like(d), where=lam > 0)  # d = 2 zeta sqrt(lam)
     C[:, i, i] = own * (A[:, i, i] - lam * B[:, i, i]) + d * B[:, i, i]
-    return A, B, C
-
-
-def through_modes(
-    model: ParametricModel, modes: Modal, m: int, *, shared: bool = False
-) -> Callable[[Complex, Complex, Array], Complex]:
-    """The function of sides (n_f, a, n), (n_f, n, b) and lines (n_f,) that gives side dZ side.
-
-    Derivatives (n_f, a, b, n_p + m) are those by p, at the origin of the model, and by logarithms
-    of the damping ratios of its m lowest elastic modes; the last of these may be shared by all
-    other modes.
-    """
-    by_p, last = _modal_sensitivity(model, modes), model.n_rigid + m - 1
+    last = model.n_rigid + m - 1
     e, others = slice(model.n_rigid, last + (not shared)), slice(last, None)
 
     def change(left: Complex, right: Complex, omega: Array) -> Complex:
         damped = left[:, :, None, e] * np.swapaxes(right[:, e], 1, 2)[:, None]
         w = 1j * omega[:, None, None, None]
-        columns = [_through(left, by_p, right, omega), damped * (w * modes.d[e])]
+        columns = [_through(left, (A, B, C), right, omega), damped * (w * modes.d[e])]
         if shared:
             together = (left[:, :, others] * modes.d[others]) @ right[:, others]
             columns.append(w * together[..., None])

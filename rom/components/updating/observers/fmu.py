@@ -74,12 +74,12 @@ def _steady(o: Observer) -> str:
 
 def _changing(tracker: ParameterTracker) -> str:
     """Tables of a filter that linearises its equations again."""
-    o, assumed = tracker.operation, tracker.assumed
+    o, assumed, model = tracker.operation, tracker.assumed, tracker.operation.model
     drifts = tracker.drifts.values()
     tables = {"DT": np.array([assumed.dt]), "REACH": np.array([LINEAR_REACH])}
-    tables |= {"SCALE": o.scale, "STIFFNESS": o.K, "MASS": o.M, "DAMPING": o.XI}
-    tables |= {"DRIVEN": o.driven, "K_POWERS": o.k_powers, "M_POWERS": o.m_powers}
-    tables |= {"LOW": o.low, "HIGH": o.high}
+    tables |= {"SCALE": o.scale, "STIFFNESS": model.K, "MASS": model.M, "DAMPING": o.XI}
+    tables |= {"DRIVEN": o.driven, "K_POWERS": model.k_powers, "M_POWERS": model.m_powers}
+    tables["LOW"], tables["HIGH"] = model.ends
     tables |= {"WHITE": np.diag(assumed.white(o)), "VARIANCES": tracker.R}
     tables["WALKS"] = np.array([d.walk**2 * assumed.dt for d in drifts])
     tables["BEFORE"] = np.r_[np.diag(assumed.before(o)), [d.first**2 for d in drifts]]
@@ -87,9 +87,9 @@ def _changing(tracker: ParameterTracker) -> str:
         tables[f"{name}_STILL"], tables[f"{name}_CARRIED"] = rows.displacement, rows.carried
         tables[f"{name}_MOVING"], tables[f"{name}_PUSHED"] = rows.velocity, rows.acceleration
     m, n_e = o.driven.shape
-    sizes = {"MODES": m, "FORCES": n_e, "PARAMETERS": len(o.names), "TERMS": len(o.K)}
+    sizes = {"MODES": m, "FORCES": n_e, "PARAMETERS": len(model.names), "TERMS": len(model.K)}
     sizes |= {"SENSORS": len(tracker.R), "WANTED": len(o.wanted.displacement)}
     numbers = ", ".join(f"{name} = {size}" for name, size in sizes.items())
-    names = ", ".join(json.dumps(name) for name in o.names)
+    names = ", ".join(json.dumps(name) for name in model.names)
     text = f"enum {{ {numbers} }};\nstatic const char *const NAMES[] = {{{names}}};\n"
     return text + arrays(tables)

@@ -51,8 +51,13 @@ def side_by_side(
         at = sensors.index(sensor), inputs.index(force)
         _check_lines(f, x)
         H[(*at, keep)] = replace(f, x=f.x[keep], y=f.y[keep]).receptance()
-        own = coherences.get((sensor, force))
-        c[at] = coherence if own is None or coherence is not None else _rounded(own, x)
+        if coherence is not None:
+            c[at] = coherence
+            continue
+        _check_lines(own := coherences[sensor, force], x)
+        c[at] = np.real(own.y)
+        if not (c[at] >= 1).all():  # what rounding has made one is taken back by half a digit
+            c[at][c[at] == 1] = 1 - COHERENCE_STEP
     where = [_channels(dofs, points) for dofs in (sensors, inputs)]
     H, c = (np.moveaxis(A, 2, 0)[keep] for A in (H, c))
     return Responses(x[keep], H, where[0], where[1], c, averages)
@@ -107,13 +112,6 @@ def _by_pair(functions: list[Function], bodies: Bodies) -> dict[tuple[Dof, Dof],
             )
         known[pair] = f
     return known
-
-
-def _rounded(f: Function, x: Array) -> Array:
-    """Coherence, with what rounding has made one taken back by half a digit."""
-    _check_lines(f, x)
-    c = np.real(f.y)
-    return c if (c >= 1).all() else np.where(c == 1, 1 - COHERENCE_STEP, c)
 
 
 def _check_lines(f: Function, x: Array) -> None:
