@@ -118,7 +118,7 @@ def terms_of(structure: Structure) -> list[tuple[str, FlexibleBody]]:
     return found
 
 
-class Attachment(ABC):
+class UnknownPart(ABC):
     """What is attached to a structure, its stiffness or mass unknown by a factor.
 
     Attributes:
@@ -155,7 +155,7 @@ class Attachment(ABC):
 
 @typed
 @dataclass(frozen=True, slots=True)
-class GroundSpring(Attachment):
+class GroundSpring(UnknownPart):
     """A spring between an interface and the ground, unknown by a factor.
 
     Attributes:
@@ -175,7 +175,7 @@ class GroundSpring(Attachment):
 
 @typed
 @dataclass(frozen=True, slots=True)
-class JointSpring(Attachment):
+class JointSpring(UnknownPart):
     """A spring between two interfaces of an assembly, unknown by a factor: a bolted joint.
 
     It acts where the first one is; the second one reaches there by a rigid arm.
@@ -201,7 +201,7 @@ class JointSpring(Attachment):
 
 @typed
 @dataclass(frozen=True, slots=True)
-class AddedMass(Attachment):
+class AddedMass(UnknownPart):
     """A point mass on an interface, unknown by a factor.
 
     Attributes:

@@ -67,7 +67,8 @@ class Channels:
     def some(self, chosen: Sequence[int] | Index) -> "Channels":
         """Those with chosen numbers (j,)."""
         bodies = None if self.bodies is None else tuple(self.bodies[k] for k in chosen)
-        points, directions = (np.asarray(A)[chosen] for A in (self.points, self.directions))
+        kept = np.array(chosen, dtype=int)
+        points, directions = (np.asarray(A)[kept] for A in (self.points, self.directions))
         return Channels(points, directions, bodies)
 
     def _elsewhere(self, names: tuple[str, ...], what: str) -> Array:
