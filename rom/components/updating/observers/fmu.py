@@ -39,15 +39,18 @@ def write_observer_fmu(observer: Observer | ParameterTracker, path: str | Path) 
     """
     path = check_writable(path)
     if isinstance(observer, Observer):
-        inputs, outputs, text = observer.inputs, observer.outputs, _steady(observer)
+        o, dt, inputs, outputs = observer, observer.dt, observer.inputs, observer.outputs
         core, when = "observer.c", "one step after their samples"
+        tables = {"DT": np.array([dt]), "CLOSED": o.A - o.A @ o.G @ o.C, "DRIVEN": o.A @ o.G}
+        tables |= {"WANTED": o.W, "DEVIATIONS": o.deviations}
+        n_v, n = o.W.shape
+        text = f"enum {{ STATES = {n}, SENSORS = {len(o.C)}, VALUES = {n_v} }};\n" + arrays(tables)
     else:
-        (inputs, outputs), text = _names(observer), _changing(observer)
+        dt, (inputs, outputs), text = observer.assumed.dt, _names(observer), _changing(observer)
         core, when = "parameter_tracker.c", "at their samples, and of what changes"
     variables = [Variable(f"sensor.{name}", "input", unit, 0.0) for name, unit in inputs]
     for kind in ("estimate", "deviation"):
         variables += [Variable(f"{kind}.{name}", "output", unit) for name, unit in outputs]
-    dt = observer.dt if isinstance(observer, Observer) else observer.assumed.dt
     about = f"Estimates of {path.stem} from a few sensors, {when}."
     headers = ("filter.h", "states.h")
     return write_archive(path, Content(path.stem, about, variables, dt, core, headers, text))
@@ -61,15 +64,6 @@ def _names(tracker: ParameterTracker) -> tuple[Names, Names]:
     forces = [(f"force[{k}]", "N") for k in range(1, tracker.operation.driven.shape[1] + 1)]
     factors = [(structured("factor", name), "1") for name in tracker.names]
     return named_values(tracker.sensors), (*named_values(tracker.wanted), *forces, *factors)
-
-
-def _steady(o: Observer) -> str:
-    """Tables of a filter in its steady state."""
-    tables = {"DT": np.array([o.dt]), "CLOSED": o.A - o.A @ o.G @ o.C, "DRIVEN": o.A @ o.G}
-    tables |= {"WANTED": o.W, "DEVIATIONS": o.deviations}
-    n_v, n = o.W.shape
-    sizes = f"enum {{ STATES = {n}, SENSORS = {len(o.C)}, VALUES = {n_v} }};\n"
-    return sizes + arrays(tables)
 
 
 def _changing(tracker: ParameterTracker) -> str:
