@@ -218,7 +218,7 @@ class Responses:
     estimator: Literal["H1", "Hv", "H2"] | None = None
 
     def __post_init__(self) -> None:
-        f = np.asarray(self.frequencies, dtype=float)
+        f = np.array(self.frequencies, dtype=float)
         object.__setattr__(self, "frequencies", f)
         object.__setattr__(self, "H", np.asarray(self.H, dtype=complex))
         if not f.size or (np.diff(f) <= 0).any():
