@@ -7,7 +7,7 @@ BODY.INTERFACE, and -o writes one body of each, with its name before the ending.
 """
 
 import argparse
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -320,8 +320,9 @@ def _outside(args: argparse.Namespace) -> "Attached":
     from rom.components.updating.family_model import AddedMass, GroundSpring, JointSpring
 
     bodies, found = _files(args), dict[str, Any]()
-    kinds = ("--spring", GroundSpring, 1), ("--joint", JointSpring, 2), ("--mass", AddedMass, 1)
-    for flag, kind, n in kinds:
+    kinds: dict[str, Callable[..., object]] = {"--spring": GroundSpring, "--joint": JointSpring}
+    kinds["--mass"] = AddedMass
+    for flag, kind in kinds.items():
         for name, text in unique(getattr(args, flag[2:]), flag).items():
             shown = f"{flag} {text!r}"
             if name in found:
@@ -329,11 +330,11 @@ def _outside(args: argparse.Namespace) -> "Attached":
             if len(parts := text.split(":")) != 4:
                 raise ConfigError(f"{shown} must be written INTERFACE:VALUE:LOW:HIGH.")
             places = [_place(flag, part, bodies) for part in parts[0].split(",")]
-            if len(places) != n:
+            if len(places) != (n := 1 + (flag == "--joint")):
                 raise ConfigError(f"{shown} names {len(places)} places, needed are {n}.")
             low, high = (typed_number(flag, part) for part in parts[2:])
             value = [typed_number(flag, part) for part in parts[1].split(",")]
-            if kind is AddedMass and len(value) != 1:
+            if flag == "--mass" and len(value) != 1:
                 raise ConfigError(f"{shown}: a mass must be one number [kg].")
-            found[name] = kind(*places, value[0] if kind is AddedMass else value, low, high)
+            found[name] = kind(*places, value[0] if flag == "--mass" else value, low, high)
     return found
