@@ -349,7 +349,7 @@ def test_noise_of_forces_and_few_averages_are_checked(exact):
     named, some = replace(test, force_noise=0.2), replace(test, force_noise=0.01, estimator=None)
     refuse(
         (lambda: replace(test, averages=2), "estimated from 2 averages says nothing"),
-        (lambda: replace(test, force_noise=np.zeros(3)), r"force_noise \(3,\) .* \(20, 2\)"),
+        (lambda: replace(test, force_noise=np.zeros((3, 2))), r"force_noise \(3, 2\) .* \(20, 2\)"),
         (some.logarithm, "the estimator of H is not named"),
         (named.logarithm, r"force_noise alone has .* times the power"),
     )
