@@ -334,7 +334,7 @@ def test_what_does_not_fit_an_assembly_is_named(families, bolted):
         (lambda: updated(fixed=("root",)), place),
         (lambda: updated(fixed="root"), place),
         (lambda: updated(fixed={"root": "x"}), place),
-        (lambda: replace(BOLTS, low=0.0), "has the range"),
+        (lambda: replace(BOLTS, low=20.0), "has the range 20.0 to 10.0"),
         (lambda: FamilyAssembly({}), "there is no family"),
         (lambda: FamilyAssembly({"": arm}), "the name of a family must be a text"),
         (lambda: FamilyAssembly({"a": two, "a.b": arm}), r"have one name among 'a\.b\.E'"),

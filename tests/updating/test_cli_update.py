@@ -15,7 +15,6 @@ from cases.long import ROM_LONG
 from rom import updating
 from rom.cli.main import main
 from rom.cli.schemas import schema
-from rom.components.updating.frf_data import noisy
 from rom.parametric import FamilyAssembly
 
 pytestmark = pytest.mark.once  # the environment without FEniCSx has no h5py
@@ -36,19 +35,13 @@ def folder(tmp_path_factory):
     rom.save(family, path / "family.rom.npz")
     rom.save(family.body, path / "body.rom.npz")
     sensors = crossed([[x, y, 0.08] for x in (0.5, 0.75, 1.0) for y in (0.0, 0.1)])
-    true = family.at(**TRUE)
-    omega, Phi = true.modes(fixed=("root",))
-    f = np.linspace(20, 900, 80)
-    w = 2 * np.pi * f[:, None]
     own = np.delete(np.arange(12), 10)  # of two along y on the rigid face of the tip one is enough
     for name, seeing, force in (
         ("test.h5", sensors, updating.Channels([[0.75, 0.1, 0.0]], [[0, 1, 2]])),
         ("driven.h5", sensors.some(own), sensors.some([7])),
     ):
-        seen, driven = (c.rows(true, "sensor") @ Phi for c in (seeing, force))
-        H = np.einsum("sn,fn,en->fse", seen, 1 / (omega**2 - w**2 + 0.04j * w * omega), driven)
-        H = noisy(H, np.sqrt(2) * 0.02, np.random.default_rng(2))
-        test = updating.Responses(f, H, seeing, force, 1 / (1 + 2 * 50 * 0.02**2), 50)
+        how = {"level": np.sqrt(2) * 0.02, "averages": 50, "seed": 2, "fixed": ("root",)}
+        test = noisy_test(family, TRUE, (seeing, force), np.linspace(20, 900, 80), **how)
         rom.io.write_responses(test, path / name)
     return path
 

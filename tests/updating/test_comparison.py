@@ -7,11 +7,17 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
-from cases.components.updating import exact_responses, family_of, model_of, noisy_test, refuse
+from cases.components.updating import (
+    averaged,
+    exact_responses,
+    family_of,
+    model_of,
+    noisy_test,
+    refuse,
+)
 from cases.long import few
-from rom.components.updating.frf_data import estimators
 from rom.errors import ParameterError
-from rom.updating import AddedMass, Channels, Comparison, GroundSpring, Responses, compare
+from rom.updating import AddedMass, Channels, Comparison, GroundSpring, compare
 
 REGIONS = ("inner", "middle", "outer")
 PARAMETERS = {f"E_{name}": rom.YoungsModulus(name, 0.4, 2.5) for name in REGIONS}
@@ -146,24 +152,12 @@ def found(family, true, seed, on_force=0.0, **there):
     test = noisy_test(family, true, channels, BAND, level=0.03, averages=100, seed=seed, **more)
     if on_force:
         H = exact_responses(model_of(family, channels, **more), true, BAND)
-        test = averaged(H, on_force, np.random.default_rng(seed))
+        rng = np.random.default_rng(seed)
+        test = averaged(H, channels, BAND, rng, noise=(on_force, 0.1), n=50)
     return rom.update(
         family, test, free=MODULI, fixed=HINGE, attached={"clamp": CLAMP}, candidates=OFFERED,
         prior={"clamp": 1e-4}, damping=0.02,
     )  # fmt: skip
-
-
-def averaged(H, on_force, rng, n=50):
-    """H1 of noisy forces, and responses with ten per cent; its coherence is of the same records."""
-
-    def gauss(shape):
-        return rng.standard_normal((*shape, 2)) @ [1, 1j] / np.sqrt(2)
-
-    f = gauss((n, BAND.size, 1, 2))
-    x = H * (f + 0.1 * gauss((n, *H.shape)))
-    f = f + on_force * gauss(f.shape)
-    H1, _, _, coherence = estimators(x, np.broadcast_to(f, x.shape))
-    return Responses(BAND, H1, EIGHT, SHAKERS, coherence, n, force_noise=on_force, estimator="H1")
 
 
 WRONG = [

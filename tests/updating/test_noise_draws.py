@@ -9,7 +9,14 @@ from numpy.testing import assert_allclose
 from scipy.stats import binom, chi2, kstest, norm, truncnorm
 
 import rom
-from cases.components.updating import exact_responses, family_of, model_of, refuse
+from cases.components.updating import (
+    averaged,
+    exact_responses,
+    family_of,
+    gauss,
+    model_of,
+    refuse,
+)
 from cases.long import few
 from rom.components.updating.estimate import DAMPING_LOG_DEVIATION
 from rom.components.updating.frf_data import estimators, pooled, positive_mean
@@ -41,20 +48,9 @@ def exact(family):
     return exact_responses(model_of(family, (SENSORS, INPUTS), HELD), TRUE, LINES)
 
 
-def gauss(rng, shape):
-    return (rng.standard_normal(shape) + 1j * rng.standard_normal(shape)) / np.sqrt(2)
-
-
-def measured(exact, name, on_force, on_response, rng, averages=AVERAGES):
-    """One force drives all sensors; its noise is in all of their responses."""
-    f = gauss(rng, (averages, LINES.size, 1, 2))
-    x = exact * (f + on_response * gauss(rng, (averages, *exact.shape)))
-    f = f + on_force * gauss(rng, f.shape)
-    *H, coherence = estimators(x, np.broadcast_to(f, x.shape))
-    H = H[("H1", "H2", "Hv").index(name)]
-    return Responses(
-        LINES, H, SENSORS, INPUTS, coherence, averages, force_noise=on_force, estimator=name
-    )
+def measured(exact, rng, estimator, *noise, averages=AVERAGES):
+    how = {"noise": noise, "n": averages, "estimator": estimator}
+    return averaged(exact, (SENSORS, INPUTS), LINES, rng, **how)
 
 
 @pytest.fixture(scope="module")
@@ -65,7 +61,7 @@ def drawn(family, exact):
     def draw(name, on_force, on_response, n=DRAWS, seed=0, **changes):
         rng, found = np.random.default_rng(seed), []
         for _ in range(n):
-            test = replace(measured(exact, name, on_force, on_response, rng), **changes)
+            test = replace(measured(exact, rng, name, on_force, on_response), **changes)
             found.append(rom.update(family, test, fixed=HELD, damping=0.02))
         errors = np.log([[u.factors[p] / TRUE[p] for p in PARAMETERS] for u in found])
         return errors / [[u.deviations[p] for p in PARAMETERS] for u in found], errors, found
@@ -156,7 +152,6 @@ def test_total_least_squares_is_scaled_by_the_ratio_of_noise():
     assert_allclose(estimators(x, f, 0.0)[2], H2)
     H1, H2, Hv, _ = estimators(x, f)
     assert_allclose(np.abs(Hv), np.sqrt(np.abs(H1 * H2)))
-    refuse((lambda: estimators(x, f, -1.0), "ratio = -1 must not be negative"))
 
 
 def test_noise_of_a_force_that_is_taken_for_that_of_sensors_makes_deviations_too_small(drawn):
@@ -219,7 +214,7 @@ def test_an_update_weighs_by_the_model_it_found(family, exact):
 
 def test_deviations_say_what_estimated_weights_cost(family, exact):
     """N^-1 + N^-1 Q N^-1 where the search ended; of eight averages by more than a twentieth."""
-    test = measured(exact, "H1", 0.0, 0.1, np.random.default_rng(3), averages=8)
+    test = measured(exact, np.random.default_rng(3), "H1", 0.0, 0.1, averages=8)
     found = rom.update(family, test, fixed=HELD, damping=0.02)
     level = np.log(np.abs(found.responses(LINES))) - test.logarithm().real
     at = sums(found.model, found.logarithms, found.zeta, Data.of(test, level))
@@ -316,7 +311,7 @@ def test_the_limit_is_kept_where_averages_are_few():
 
 @pytest.mark.once
 def test_noise_of_forces_may_differ_between_lines(exact, tmp_path):
-    test = measured(exact, "Hv", 0.1, 0.1, np.random.default_rng(0))
+    test = measured(exact, np.random.default_rng(0), "Hv", 0.1, 0.1)
     same = replace(test, force_noise=np.full((LINES.size, 2), 0.1))
     assert_allclose(same.logarithm(), test.logarithm())
     assert_allclose(same.noise.errors().own, test.noise.errors().own)
@@ -350,13 +345,11 @@ def test_errors_that_sensors_share_are_made_independent():
 
 
 def test_noise_of_forces_and_few_averages_are_checked(exact):
-    test = measured(exact, "H1", 0.0, 0.1, np.random.default_rng(0))
+    test = measured(exact, np.random.default_rng(0), "H1", 0.0, 0.1)
     named, some = replace(test, force_noise=0.2), replace(test, force_noise=0.01, estimator=None)
     refuse(
-        (lambda: replace(test, force_noise=-0.1), "force_noise .* zero or more"),
         (lambda: replace(test, averages=2), "estimated from 2 averages says nothing"),
-        (lambda: replace(test, estimator="H3"), "estimator = 'H3'"),
-        (lambda: replace(test, force_noise=np.zeros(3)), r"force_noise \(3,\) .* \(20, 2\)"),
+        (lambda: replace(test, force_noise=np.zeros((3, 2))), r"force_noise \(3, 2\) .* \(20, 2\)"),
         (some.logarithm, "the estimator of H is not named"),
         (named.logarithm, r"force_noise alone has .* times the power"),
     )

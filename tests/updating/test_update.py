@@ -10,10 +10,10 @@ from scipy.linalg import eigh, solve_sylvester, sqrtm
 
 import rom
 from cases.components import updating
-from cases.components.updating import PARAMETERS, exact_responses, family_of, refuse
+from cases.components.updating import PARAMETERS, family_of, refuse
 from cases.solid import STEEL, composite
 from rom.components.families.layers import Stretch
-from rom.components.updating.estimate import _Before, _Search
+from rom.components.updating.estimate import _before, _Search
 from rom.components.updating.family_model import family_model
 from rom.components.updating.frf_data import noisy
 from rom.components.updating.methods import receptance
@@ -25,7 +25,7 @@ CELLS = (12, 2, 2)
 TRUE = {"E_inner": 1.3, "E_outer": 0.75, "rho_outer": 1.2}
 GRID = [[x, 0.05 * k, 0.04 * m] for x in (0.25, 0.5, 0.75, 1.0) for k, m in ((0, 0), (2, 2))]
 SENSORS = updating.crossed(GRID)
-FEW = SENSORS.some(slice(5, 11))
+FEW = SENSORS.some(range(5, 11))
 INPUTS = Channels([[1.0, 0.0, 0.0], [0.5, 0.1, 0.08]], [[0, 1, 1], [0, 1, -0.5]])
 LINES = np.linspace(20, 1400, 150)
 AVERAGES = 50
@@ -41,14 +41,9 @@ def model_of(family, attached=None, candidates=None, fixed=HELD, sensors=SENSORS
     return updating.model_of(family, (sensors, INPUTS), fixed, attached, candidates)
 
 
-def synthetic(family, level=0.05, seed=0, true=TRUE, zeta=0.02, lines=LINES, **made):
-    """A test with relative noise: coherence c of n averages has the error (1 - c) / (2 n c)."""
-    H = exact_responses(model_of(family, **made), true, lines, zeta)
-    c = 1 / (1 + AVERAGES * level**2)  # level^2 / 2 for each part
-    H = noisy(H, level, np.random.default_rng(seed)) if level else H
-    return Responses(
-        lines, H, made.get("sensors", SENSORS), INPUTS, c if level else 0.999, AVERAGES
-    )
+def synthetic(family, level=0.05, true=TRUE, lines=LINES, sensors=SENSORS, **made):
+    how = {"level": level, "averages": AVERAGES, "fixed": HELD} | made
+    return updating.noisy_test(family, true, (sensors, INPUTS), lines, **how)
 
 
 def at_nodes(model, nodes):
@@ -308,7 +303,7 @@ def test_the_gradient_is_that_of_the_cost_with_its_prior(family):
     """Differences of half the cost, away from the prior; 8 modes lie below 2100 Hz."""
     test = synthetic(family, lines=LINES[::5], sensors=FEW)
     model = model_of(family, sensors=FEW)
-    before = _Before.of({"E_inner": 1e-3, "rho_outer": 0.1}, model)
+    before = _before({"E_inner": 1e-3, "rho_outer": 0.1}, model)
     search = _Search.begun(model, test, np.ones(3, bool), 0.01, before)
     assert search.zeta.size == 9
     search.theta = search.theta + 0.1 * np.random.default_rng(0).standard_normal(12)
@@ -333,8 +328,8 @@ def test_two_tests_with_two_supports_say_more_than_one(family):
     assert_allclose(both.covariance[:3, :3], C, rtol=0.05, atol=0.05 * np.diag(C).min())
     assert_allclose(np.log(list(both.factors.values())), mean, atol=0.2 * np.sqrt(np.diag(C)).min())
     A = np.random.default_rng(0).normal(size=(len(held.names),) * 2)
-    tied = _Before.of(replace(held, covariance=A @ A.T), held.model)  # to damping: it is left open
-    assert_allclose(np.linalg.inv(tied.precision), (A @ A.T)[:3, :3], rtol=1e-9)
+    _, tied, _ = _before(replace(held, covariance=A @ A.T), held.model)  # to damping: left open
+    assert_allclose(np.linalg.inv(tied), (A @ A.T)[:3, :3], rtol=1e-9)
     other = synthetic(family, fixed=(), seed=1, lines=LINES[::2], true=TRUE | {"E_inner": 1.35})
     torn = rom.update(family, other, damping=0.02, prior=held)
     assert any("distance from the test before" in row.quantity for row in torn.verdict.failures)
@@ -354,17 +349,15 @@ def test_wrong_data_are_named(family):
         more = {k: fields.pop(k) for k in ("free", "prior", "attached") if k in fields}
         return rom.update(family, replace(test, **fields), fixed=HELD, **more)
 
-    off, still = (np.array(SENSORS.points) for _ in range(2))
-    off[:, 2], off[0, 2], still[4, 0] = off[:, 2] + 0.999, off[0, 2] + 1.0, 0.0
-    off, still = (Channels(points, SENSORS.directions) for points in (off, still))
+    still = np.array(SENSORS.points)
+    still[4, 0] = 0.0
+    still = Channels(still, SENSORS.directions)
     mass, input_ = AddedMass("tip", 1, 0.5, 2), "responses to input %d are .*1000: millim"
     refuse(
         (lambda: updated(H=test.H * [1000.0, 1.0]), input_ % 0),
         (lambda: updated(H=test.H * [1.0, 1000.0]), input_ % 1),
         (lambda: updated(H=-test.H), "all responses run against the model"),
-        (lambda: updated(sensors=off), "sensor 0 at .* is 0.92 m off the body"),
         (lambda: updated(sensors=still), "sensor 4 moves by .* a support"),
-        (lambda: updated(coherence=1.0), "coherence"),
         (lambda: updated(free=("E_web",)), ParameterError, "no parameter 'E_web'"),
         (lambda: updated(prior={"E": 1.0}), ParameterError, "prior: no parameter 'E'; there are"),
         (lambda: updated(attached={"E_inner": mass}), ParameterError, "names two"),
@@ -444,7 +437,6 @@ def test_gauges_are_sensors(family, tmp_path):
     refuse(
         (lambda: rom.update(family, off, fixed=HELD), "sensor 1 .* lies on no face"),
         (lambda: replace(test, quantity=quantity[1:]), "17 quantities for 18 sensors"),
-        (lambda: replace(test, quantity="volts"), "quantity = 'volts'"),
     )
     pytest.importorskip("h5py", reason="h5py is not installed")
     rom.io.write_responses(test, tmp_path / "test.h5")

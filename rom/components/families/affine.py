@@ -25,7 +25,7 @@ from rom.components.families.parameters import (
 from rom.eigen.attachments import added_mass
 from rom.eigen.verbs import Operators, orthonormal_in, own_points, rigid_motions
 from rom.errors import ModelError, ParameterError
-from rom.model import Array, FEModel, Interface, Layered, Region
+from rom.model import Array, FEModel, Interface, Layered
 from rom.names import check_known
 from rom.reduction.full_model import mesh_operators
 from rom.reduction.interfaces.characteristic import GivenFunctions
@@ -109,18 +109,18 @@ class AffineModel:
         for name, region in self.regions.items():
             integrals = inertia_integrals(ops, points, E, region.M)
             own = symmetric(ops.gram(E, ops.product(region.K, E)))
-            share = Share(name, integrals, own, None if stress is None else self._stress(region, E))
-            yield share
-            remainder, K = weighted(np.array([1, -1]), [remainder, integrals]), K - share.K
-            stress = None if stress is None else stress - share.stress
+            carried_stress = None
+            if stress is not None:
+                alone = replace(self.model, stresses=region.stresses)
+                carried_stress = stress_recovery(alone, E).operator
+                stress = stress - carried_stress
+            yield Share(name, integrals, own, carried_stress)
+            remainder, K = weighted(np.array([1, -1]), [remainder, integrals]), K - own
         if remainder.mass > REMAINDER_RTOL * mass or np.trace(K) > REMAINDER_RTOL * stiffness:
             yield Share(None, remainder, K, stress)
         if carried := carried_integrals(self.model, ops, E):
             together = weighted(np.ones(len(carried)), carried)
             yield Share(None, together, np.zeros_like(K), fixed=True)
-
-    def _stress(self, region: Region, E: Array) -> Array:
-        return stress_recovery(replace(self.model, stresses=region.stresses), E).operator
 
 
 def symmetric(A: Array) -> Array:
@@ -221,7 +221,8 @@ class StretchedModel(AffineModel):
 
     def bare(self, point: Point) -> Operators:
         """The model at some factors."""
-        (k, m), t = factors(self.parameters, tuple(self.regions), point), self._slopes(point)
+        k, m = factors(self.parameters, tuple(self.regions), point)
+        t = [factor(self.parameters, Thickness, name, point) for name in self.regions]
         K, M = [], []
         for i, (name, region) in enumerate(self.regions.items()):
             parts = self.layered[name]
@@ -287,6 +288,3 @@ class StretchedModel(AffineModel):
                     f"the regions {sorted(self.regions)} are not the whole model, whose thickness "
                     "is to change; name all of them."
                 )
-
-    def _slopes(self, point: Point) -> Array:
-        return np.array([factor(self.parameters, Thickness, name, point) for name in self.regions])

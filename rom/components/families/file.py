@@ -33,8 +33,8 @@ def save(family: BodyFamily, path: str | Path) -> Path:
         if share.stress is not None:
             found["stress"] = share.stress
         arrays |= {f"share/{i}/{name}": np.asarray(A, dtype=float) for name, A in found.items()}
-    if family.stretch is not None:
-        arrays["stretch/rigid"] = np.asarray(family.stretch.rigid, dtype=float)
+    if (stretch := family.stretch) is not None:
+        arrays["stretch/rigid"] = np.asarray(stretch.rigid, dtype=float)
     damping, numbers = _damping(family.damping)
     arrays |= numbers
     manifest = native.body_manifest(family.body) | {
@@ -44,7 +44,7 @@ def save(family: BodyFamily, path: str | Path) -> Path:
         "shares": [{"region": s.region, "fixed": s.fixed} for s in family.shares],
         "frame": family.reference,
         "damping": damping,
-        "stretch": _layers(family.stretch),
+        "stretch": None if stretch is None else _layers(stretch),
         "provenance": family.provenance,
         "certificate": None if family.certificate is None else asdict(family.certificate),
     }
@@ -54,33 +54,24 @@ def save(family: BodyFamily, path: str | Path) -> Path:
 def load(manifest: Entry, arrays: dict[str, Array], body: FlexibleBody, path: Path) -> BodyFamily:
     """The family of which a file holds a body; see `rom.load`."""
     with stated(path):
-        family = _family(manifest, arrays, body)
+        frame = manifest["frame"]
+        family = BodyFamily(
+            body,
+            read(manifest["parameters"]),
+            tuple(_share(i, entry, arrays) for i, entry in enumerate(manifest["shares"])),
+            reference=frame if isinstance(frame, str) else tuple(frame),
+            damping=_damping_of(manifest["damping"], arrays),
+            provenance=manifest["provenance"],
+            certificate=native.report_of(manifest["certificate"]),
+            stretch=_stretch(manifest["stretch"], arrays),
+        )
     _verify(family, path)
     return family
 
 
-def _family(manifest: Entry, arrays: dict[str, Array], body: FlexibleBody) -> BodyFamily:
-    frame = manifest["frame"]
-    return BodyFamily(
-        body,
-        read(manifest["parameters"]),
-        tuple(_share(i, entry, arrays) for i, entry in enumerate(manifest["shares"])),
-        reference=frame if isinstance(frame, str) else tuple(frame),
-        damping=_damping_of(manifest["damping"], arrays),
-        provenance=manifest["provenance"],
-        certificate=native.report_of(manifest["certificate"]),
-        stretch=_stretch(manifest["stretch"], arrays),
-    )
-
-
-def _layers(stretch: Stretch | None) -> Entry | None:
-    if stretch is None:
-        return None
-    return {
-        "axis": stretch.axis,
-        "regions": list(stretch.regions),
-        "layers": [[list(ends) for ends in layers] for layers in stretch.layers],
-    }
+def _layers(stretch: Stretch) -> Entry:
+    layers = [[list(ends) for ends in layers] for layers in stretch.layers]
+    return {"axis": stretch.axis, "regions": list(stretch.regions), "layers": layers}
 
 
 def _stretch(entry: Entry | None, arrays: dict[str, Array]) -> Stretch | None:

@@ -109,7 +109,11 @@ def stretched_body(
     Y = _coordinates(body, R, np.einsum("aakl->kl", S_kl[:, :, n:, n:]))
     second = np.einsum("abij,i,j->ab", S_kl[:, :, :n, :n], w, w)
     shapes = np.einsum("abkl,km,ln->abmn", S_kl[:, :, n:, n:], Y, Y, optimize=True)
-    elastic = Y.T @ K @ Y
+    elastic, surface = Y.T @ K @ Y, body.surface
+    if surface is not None:
+        points, middle = (stretch.mapped(surface.points, at) for at in (w, at_centre))
+        shape = np.hstack([rigid_motions(middle), surface.shape]) @ Y
+        surface = Surface(points, surface.triangles, shape)
     return replace(
         body,
         mass=mass,
@@ -124,7 +128,7 @@ def stretched_body(
             name: _marker(marker, stretch.mapped(marker.point[None], w)[0], R, Y)
             for name, marker in body.markers.items()
         },
-        surface=_surface(body.surface, stretch, (w, at_centre), Y),
+        surface=surface,
     )
 
 
@@ -152,13 +156,3 @@ def _marker(marker: Marker, point: Array, R: Array, Y: Array) -> Marker:
     return Marker(
         marker.name, point, motion[:3], motion[3:], "rbe2", np.hstack([rigid, motion]), None
     )
-
-
-def _surface(
-    surface: Surface | None, stretch: Stretch, weights: tuple[Array, Array], Y: Array
-) -> Surface | None:
-    if surface is None:
-        return None
-    points, centre = (stretch.mapped(surface.points, w) for w in weights)
-    shape = np.hstack([rigid_motions(centre), surface.shape]) @ Y
-    return Surface(points, surface.triangles, shape)

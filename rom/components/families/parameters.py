@@ -16,7 +16,7 @@ from rom.names import check_text, named
 from rom.plausible import FACTOR, warn_outside
 
 MAX_CORNER_PARAMETERS = 3  # all corners of the range are visited up to here
-PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29)
+MAX_PARAMETERS = 10  # of one family
 RANGE_RTOL = 1e-12  # round-off by which a value may leave its range
 Point = dict[str, float]
 
@@ -131,8 +131,8 @@ def checked_parameters(parameters: dict[str, Parameter]) -> dict[str, Parameter]
             raise ParameterError(f"{name!r} names no parameter; use letters, as in at(web=1.0).")
     if not parameters:
         raise ParameterError("a family of bodies needs a parameter.", hint="Use rom.reduce.")
-    if len(parameters) > len(PRIMES):
-        raise ParameterError(f"{len(parameters)} parameters must be at most {len(PRIMES)}.")
+    if len(parameters) > MAX_PARAMETERS:
+        raise ParameterError(f"{len(parameters)} parameters must be at most {MAX_PARAMETERS}.")
     axes = {p.axis for p in parameters.values() if isinstance(p, Thickness)}
     if len(axes) > 1:
         raise ParameterError(f"thicknesses along {sorted(axes)} in one family; choose one axis.")
@@ -188,20 +188,14 @@ def scattered(parameters: dict[str, Parameter], n: int, first: int = 1) -> list[
     Source:
         Halton, On the efficiency of certain quasi-random sequences, Numer. Math. 2 (1960) 84.
     """
-    shares = np.array([[_inverse(k, b) for b in PRIMES] for k in range(first, first + n)])
+    from scipy.stats.qmc import Halton  # takes a while to import
+
+    sequence = Halton(len(parameters), scramble=False).fast_forward(first)
+    each = parameters.items()
     return [
-        {name: p.inside(row[j]) for j, (name, p) in enumerate(parameters.items())} for row in shares
+        {name: p.inside(share) for (name, p), share in zip(each, point, strict=True)}
+        for point in sequence.random(n).tolist()
     ]
-
-
-def _inverse(k: int, base: int) -> float:
-    """The digits of k mirrored at the point."""
-    value, weight = 0.0, 1.0 / base
-    while k:
-        k, digit = divmod(k, base)
-        value += digit * weight
-        weight /= base
-    return value
 
 
 def factor(parameters: dict[str, Parameter], kind: type, region: str | None, point: Point) -> float:

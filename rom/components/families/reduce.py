@@ -12,11 +12,11 @@ are estimated as the basis grows, and compared with full models where it was not
 
 import logging
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
-from rom.arguments import between, typed
+from rom.arguments import Between, typed
 from rom.body.damping import ModalDamping, Rayleigh
 from rom.body.projection import elastic_part, stress_recovery
 from rom.checks.certificate import (
@@ -89,7 +89,7 @@ def reduce_parametric(  # noqa: PLR0913  one keyword per choice
     damping: Rayleigh | ModalDamping | None = None,
     name: str = "body",
     stress: bool = False,
-    tol: float = 1e-3,
+    tol: Annotated[float, Between(0, 1, "()")] = 1e-3,
     certify: bool = True,
 ) -> BodyFamily:
     """Flexible bodies for a range of moduli, densities and thicknesses, from one reduction.
@@ -136,8 +136,12 @@ def reduce_parametric(  # noqa: PLR0913  one keyword per choice
         57 (2015) 483.
     """
     check_name(name, "a body")
-    between("tol", tol, 0, 1, "()")
-    affine = _affine(model, checked_parameters(parameters), stress)
+    parameters = checked_parameters(parameters)
+    thick = any(isinstance(p, Thickness) for p in parameters.values())
+    if thick and stress:
+        text = "stress is not recovered from bodies with a parameter of thickness."
+        raise ParameterError(text, hint="Reduce with stress=False.")
+    affine = (StretchedModel if thick else AffineModel)(model, parameters)
     middle = centre(affine.parameters)
     draft = FamilyDraft(
         model=affine.model_at(middle), method=method, interfaces=affine.kinds(interfaces),
@@ -180,15 +184,6 @@ def share_out(draft: FamilyDraft) -> None:
     body, shares, stretch = draft.affine.terms(draft.body, draft.E)
     family = BodyFamily(body, draft.affine.parameters, shares, damping=draft.damping)
     draft.body = replace(family, provenance=provenance, stretch=stretch)
-
-
-def _affine(model: FEModel, parameters: dict[str, Parameter], stress: bool) -> AffineModel:
-    if not any(isinstance(p, Thickness) for p in parameters.values()):
-        return AffineModel(model, parameters)
-    if stress:
-        text = "stress is not recovered from bodies with a parameter of thickness."
-        raise ParameterError(text, hint="Reduce with stress=False.")
-    return StretchedModel(model, parameters)
 
 
 def join_bases(draft: FamilyDraft) -> None:

@@ -12,8 +12,7 @@ from typing import Annotated, Literal
 import numpy as np
 from scipy.linalg import block_diag
 
-from rom.arguments import positive, typed
-from rom.arguments.quantities import Between, Positive
+from rom.arguments import Between, Count, Positive, typed
 from rom.components.updating.family_model import (
     Attached,
     Family,
@@ -75,10 +74,10 @@ def update(  # noqa: PLR0913  keywords of one call
     attached: Attached | None = None,
     candidates: Attached | None = None,
     damping: Annotated[float, Between(*DAMPING_RANGE)] = 0.01,
-    prior: dict[str, float] | Updated | None = None,
+    prior: dict[str, Annotated[float, Positive()]] | Updated | None = None,
     tolerance: float | None = None,
     residual: Literal["responses", "equations", "response-function"] = "responses",
-    rank: int | None = None,
+    rank: Annotated[int, Count(1)] | None = None,
     beside_poles: Annotated[float, Positive()] | None = None,
 ) -> Updated:
     """Find the factors of a family, and damping ratios, that explain measured responses.
@@ -132,17 +131,20 @@ def update(  # noqa: PLR0913  keywords of one call
     attached, candidates = dict(attached or {}), dict(candidates or {})
     rows = test.rows(bodies, tolerance)
     model = family_model(family, rows, attached, candidates, fixed)
-    unknown = _unknown(model, free, attached, candidates)
+    chosen = set(model.names) - set(candidates) if free is None else {*free, *attached}
+    for name in sorted(chosen):
+        check_known(name, model.names, f"no parameter {name!r}; there are", ParameterError)
+    unknown = np.array([name in chosen for name in model.names])
     if isinstance(prior, Updated) and residual != "responses":
         raise ConfigError('the update by another test as a prior needs residual="responses".')
-    before = _Before.of(prior or {}, model)
+    before = _before(prior or {}, model)
     search = _Search.begun(model, test, unknown, damping, before)
     check_channels(search.extremes(), search.data.roughly())
     if beside_poles is not None:
         search = search.near().beside(beside_poles)
     if residual == "responses":
         return _found(family, search.run())
-    root = np.sqrt(np.diag(before.precision))
+    root = np.sqrt(np.diag(before[1]))
     sigma = np.divide(1.0, root, out=np.full(root.size, np.inf), where=root > 0)
     if residual == "equations":
         found = by_equations(model, search.data, search.x, unknown, damping, prior=sigma, rank=rank)
@@ -157,47 +159,23 @@ def update(  # noqa: PLR0913  keywords of one call
     return replace(_found(family, search.moved(found)), covariance=found.covariance)
 
 
-def _unknown(
-    model: FamilyModel, free: tuple[str, ...] | None, attached: Attached, candidates: Attached
-) -> Mask:
-    """(n_p,) which parameters are unknown."""
-    chosen = set(model.names) - set(candidates) if free is None else {*free, *attached}
-    for name in sorted(chosen):
-        check_known(name, model.names, f"no parameter {name!r}; there are", ParameterError)
-    return np.array([name in chosen for name in model.names])
+def _before(prior: dict[str, float] | Updated, model: FamilyModel) -> tuple[Array, Array, int]:
+    """Logarithms of factors (n_p,) before a test, the inverse (n_p, n_p) of their covariance.
 
-
-@dataclass(frozen=True, slots=True)
-class _Before:
-    """What is known of the logarithms of factors before a test.
-
-    Attributes:
-        x: (n_p,) where they are.
-        precision: (n_p, n_p) inverse of their covariance.
-        n_known: number of those that another test found; 0 without.
+    From standard deviations about one, or from the update by another test; and how many that found.
     """
-
-    x: Array
-    precision: Array
-    n_known: int = 0
-
-    @staticmethod
-    def of(prior: dict[str, float] | Updated, model: FamilyModel) -> "_Before":
-        """From standard deviations about one, or from the update by another test."""
-        names, precision = model.names, np.zeros((len(model.names),) * 2)
-        if not isinstance(prior, Updated):
-            check_prior(prior, names)
-            for name in prior:
-                positive(f"prior of {name}", prior[name])
-            sigma = np.array([prior.get(name, np.inf) for name in names])
-            return _Before(np.zeros(len(names)), np.diag(sigma**-2.0))
-        known = [name for name in prior.names if name in names]
-        if not known:
-            raise ConfigError(f"prior: the test before found none of {named(names)}.")
-        here, there = ([those.index(n) for n in known] for those in (names, prior.names))
-        precision[np.ix_(here, here)] = np.linalg.inv(prior.covariance[np.ix_(there, there)])
-        x = [np.log(prior.factors.get(name, 1.0) or 1.0) for name in names]
-        return _Before(np.array(x), precision, len(known))
+    names, precision = model.names, np.zeros((len(model.names),) * 2)
+    if not isinstance(prior, Updated):
+        check_prior(prior, names)
+        sigma = np.array([prior.get(name, np.inf) for name in names])
+        return np.zeros(len(names)), np.diag(sigma**-2.0), 0
+    known = [name for name in prior.names if name in names]
+    if not known:
+        raise ConfigError(f"prior: the test before found none of {named(names)}.")
+    here, there = ([those.index(n) for n in known] for those in (names, prior.names))
+    precision[np.ix_(here, here)] = np.linalg.inv(prior.covariance[np.ix_(there, there)])
+    x = [np.log(prior.factors.get(name, 1.0) or 1.0) for name in names]
+    return np.array(x), precision, len(known)
 
 
 @dataclass(slots=True)
@@ -218,10 +196,14 @@ class _Search:
 
     @staticmethod
     def begun(
-        model: FamilyModel, test: Responses, unknown: Mask, damping: float, prior: _Before
+        model: FamilyModel,
+        test: Responses,
+        unknown: Mask,
+        damping: float,
+        prior: tuple[Array, Array, int],
     ) -> "_Search":
-        data = Data.of(test)
-        x = np.clip(prior.x, *model.ends)
+        data, (first, known, n_known) = Data.of(test), prior
+        x = np.clip(first, *model.ends)
         m = model.n_ratios(x, data.omega[-1])
         free = np.r_[unknown, np.ones(m, dtype=bool)]
         if data.n_values <= free.sum():
@@ -229,9 +211,9 @@ class _Search:
                 f"{data.n_values} usable numbers for {free.sum()} unknowns.",
                 hint="Measure more lines, or fix parameters; lines of low coherence do not count.",
             )
-        precision = block_diag(prior.precision, np.eye(m) * DAMPING_LOG_DEVIATION**-2.0)
-        before, theta = (np.r_[y, np.full(m, np.log(damping))] for y in (prior.x, x))
-        return _Search(model, test, data, theta, free, precision, before, prior.n_known)
+        precision = block_diag(known, np.eye(m) * DAMPING_LOG_DEVIATION**-2.0)
+        before, theta = (np.r_[y, np.full(m, np.log(damping))] for y in (first, x))
+        return _Search(model, test, data, theta, free, precision, before, n_known)
 
     def extremes(self) -> Iterator[Complex]:
         """Responses where the search begins, then with each factor at both ends of its range."""

@@ -6,14 +6,16 @@ All parameters are factors and enter by their logarithm. Rigid coordinates come 
 elastic ones of the family; what is held is eliminated.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
 from scipy.linalg import block_diag
 
-from rom.arguments import finite, positive
+from rom.arguments import Positive, typed
 from rom.assembly.assembly import Assembly
 from rom.body.flexible import FlexibleBody
 from rom.body.records import Marker, still_motions
@@ -36,6 +38,7 @@ Family = BodyFamily | FamilyAssembly
 Structure = Family | FlexibleBody | Assembly
 Place = str | tuple[str, str]  # interface of a body alone; body and interface of an assembly
 Held = Fixed | tuple[Place, ...]
+Factor = Annotated[float, Positive()]
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,86 +118,10 @@ def terms_of(structure: Structure) -> list[tuple[str, FlexibleBody]]:
     return found
 
 
-@dataclass(frozen=True, slots=True)
-class GroundSpring:
-    """A spring between an interface and the ground, unknown by a factor.
+class UnknownPart(ABC):
+    """What is attached to a structure, its stiffness or mass unknown by a factor.
 
     Attributes:
-        at: name of the interface; (body, interface) of an assembly.
-        stiffness: (3,) translations, (6,) with rotations, or (6, 6) at a factor of one
-            [N/m, N m/rad].
-        low: smallest factor [1].
-        high: largest factor [1].
-
-    Raises:
-        ConfigError: unless 0 < low <= high.
-    """
-
-    at: Place
-    stiffness: npt.ArrayLike
-    low: float
-    high: float
-
-    def __post_init__(self) -> None:
-        check_range(f"the spring at {self.at!r}", self.low, self.high)
-
-    def term(self, structure: FlexibleBody | Parts) -> tuple[Array, Array]:
-        """Stiffness [N/m] and mass [kg] (n, n) that it adds to a body at a factor of one.
-
-        Raises:
-            ConfigError, InterfaceError: for a wrong stiffness or interface.
-        """
-        parts = Parts.of(structure)
-        H = parts.motion(self.at)
-        return H.T @ _stiffness(self.at, self.stiffness) @ H, np.zeros((parts.n,) * 2)
-
-
-@dataclass(frozen=True, slots=True)
-class JointSpring:
-    """A spring between two interfaces of an assembly, unknown by a factor: a bolted joint.
-
-    It acts where the first one is; the second one reaches there by a rigid arm.
-
-    Attributes:
-        one: (body, interface).
-        other: (body, interface).
-        stiffness: (3,) translations, (6,) with rotations, or (6, 6) at a factor of one
-            [N/m, N m/rad].
-        low: smallest factor [1].
-        high: largest factor [1].
-
-    Raises:
-        ConfigError: unless 0 < low <= high.
-    """
-
-    one: tuple[str, str]
-    other: tuple[str, str]
-    stiffness: npt.ArrayLike
-    low: float
-    high: float
-
-    def __post_init__(self) -> None:
-        check_range(f"the joint of {self.one!r} and {self.other!r}", self.low, self.high)
-
-    def term(self, structure: FlexibleBody | Parts) -> tuple[Array, Array]:
-        """Stiffness [N/m] and mass [kg] (n, n) that it adds to a body at a factor of one.
-
-        Raises:
-            ConfigError, InterfaceError: for a wrong stiffness, body or interface.
-        """
-        parts, arm = Parts.of(structure), np.eye(6)
-        arm[:3, 3:] = -skew(parts.marker(self.one)[1].point - parts.marker(self.other)[1].point)
-        H = parts.motion(self.one) - arm @ parts.motion(self.other)
-        return H.T @ _stiffness(self.one, self.stiffness) @ H, np.zeros((parts.n,) * 2)
-
-
-@dataclass(frozen=True, slots=True)
-class AddedMass:
-    """A point mass on an interface, unknown by a factor.
-
-    Attributes:
-        at: name of the interface; (body, interface) of an assembly.
-        mass: at a factor of one [kg].
         low: smallest factor [1].
         high: largest factor [1].
 
@@ -202,23 +129,93 @@ class AddedMass:
         ConfigError: unless 0 < low <= high and the mass is positive.
     """
 
-    at: Place
-    mass: float
+    __slots__ = ()
     low: float
     high: float
 
     def __post_init__(self) -> None:
-        check_range(f"the mass at {self.at!r}", self.low, self.high)
-        positive(f"the mass at {self.at!r}", self.mass)
+        if self.low > self.high:
+            raise ConfigError(f"{self} has the range {self.low} to {self.high}; it must ascend.")
 
     def term(self, structure: FlexibleBody | Parts) -> tuple[Array, Array]:
         """Stiffness [N/m] and mass [kg] (n, n) that it adds to a body at a factor of one.
 
         Raises:
-            InterfaceError: for a wrong interface.
+            ConfigError, InterfaceError: for a wrong stiffness, body or interface.
         """
-        H = Parts.of(structure).motion(self.at)[:MASS_DOFS]
-        return np.zeros((H.shape[1],) * 2), self.mass * H.T @ H
+        parts = Parts.of(structure)
+        H, k = self._acts(parts)
+        added, nothing = H.T @ k @ H, np.zeros((parts.n,) * 2)
+        return (nothing, added) if isinstance(self, AddedMass) else (added, nothing)
+
+    @abstractmethod
+    def _acts(self, parts: Parts) -> tuple[Array, Array]:
+        """Motion (d, n) by all coordinates, and the stiffness or mass (d, d) it meets."""
+
+
+@typed
+@dataclass(frozen=True, slots=True)
+class GroundSpring(UnknownPart):
+    """A spring between an interface and the ground, unknown by a factor.
+
+    Attributes:
+        at: name of the interface; (body, interface) of an assembly.
+        stiffness: (3,) translations, (6,) with rotations, or (6, 6) at a factor of one
+            [N/m, N m/rad].
+    """
+
+    at: Place
+    stiffness: npt.ArrayLike
+    low: Factor
+    high: Factor
+
+    def _acts(self, parts: Parts) -> tuple[Array, Array]:
+        return parts.motion(self.at), _stiffness(self.at, self.stiffness)
+
+
+@typed
+@dataclass(frozen=True, slots=True)
+class JointSpring(UnknownPart):
+    """A spring between two interfaces of an assembly, unknown by a factor: a bolted joint.
+
+    It acts where the first one is; the second one reaches there by a rigid arm.
+
+    Attributes:
+        one: (body, interface).
+        other: (body, interface).
+        stiffness: as of `GroundSpring` [N/m, N m/rad].
+    """
+
+    one: tuple[str, str]
+    other: tuple[str, str]
+    stiffness: npt.ArrayLike
+    low: Factor
+    high: Factor
+
+    def _acts(self, parts: Parts) -> tuple[Array, Array]:
+        arm = np.eye(6)
+        arm[:3, 3:] = -skew(parts.marker(self.one)[1].point - parts.marker(self.other)[1].point)
+        motion = parts.motion(self.one) - arm @ parts.motion(self.other)
+        return motion, _stiffness(self.one, self.stiffness)
+
+
+@typed
+@dataclass(frozen=True, slots=True)
+class AddedMass(UnknownPart):
+    """A point mass on an interface, unknown by a factor.
+
+    Attributes:
+        at: name of the interface; (body, interface) of an assembly.
+        mass: at a factor of one [kg].
+    """
+
+    at: Place
+    mass: Annotated[float, Positive("kg")]
+    low: Factor
+    high: Factor
+
+    def _acts(self, parts: Parts) -> tuple[Array, Array]:
+        return parts.motion(self.at)[:MASS_DOFS], self.mass * np.eye(MASS_DOFS)
 
 
 def check_units(structure: Structure) -> None:
@@ -231,12 +228,6 @@ def check_prior(prior: Iterable[str], names: tuple[str, ...]) -> None:
     """Refuse a prior of parameters that there are not."""
     for name in prior:
         check_known(name, names, f"prior: no parameter {name!r}; there are", ParameterError)
-
-
-def check_range(what: str, low: float, high: float) -> None:
-    """Refuse a range that is not one of positive factors."""
-    if not 0 < finite("low", low, ()) <= finite("high", high, ()):
-        raise ConfigError(f"{what} has the range {low} to {high}, needed is 0 < low <= high.")
 
 
 def _stiffness(place: Place, stiffness: npt.ArrayLike) -> Array:
@@ -323,12 +314,13 @@ class FamilyModel:
         lam = self.elastic(x)
         return min(int(np.count_nonzero(lam < (BAND_RATIO * highest) ** 2)) + 1, lam.size)
 
-    def reduced(self, T: Array, free: Mask, x: Array, seen: Array) -> "FamilyModel":
-        """The same in coordinates T (n, r), of parameters that stay free (n_p,), others kept at x.
+    def reduced(self, T: Array, free: Index | Mask, x: Array, seen: Array) -> "FamilyModel":
+        """The same in coordinates T (n, r), of parameters that stay free, others kept at x (n_p,).
 
         Rows of the sensors are given as (n_s, r).
         """
-        kept = np.where(free, 0.0, x)
+        kept = np.array(x)
+        kept[free] = 0.0
         K = (T.T @ self.K @ T) * np.exp(self.k_powers @ kept)[:, None, None]
         M = (T.T @ self.M @ T) * np.exp(self.m_powers @ kept)[:, None, None]
         small = replace(self, K=K, M=M, seen=seen, driven=self.driven @ T, motions=self.motions @ T)

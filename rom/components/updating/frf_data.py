@@ -9,13 +9,14 @@ Source:
 
 import warnings
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
 from scipy.special import digamma, erfcx, polygamma
 from scipy.stats import norm
 
-from rom.arguments import not_negative, one_each, whole
+from rom.arguments import Count, NotNegative, one_each, typed
 from rom.errors import ConfigError
 from rom.model import Array, Mask
 
@@ -52,8 +53,9 @@ def noisy(H: Complex, level: float, rng: np.random.Generator) -> Complex:
     return H * (1 + level * (real + 1j * imaginary) / np.sqrt(2))
 
 
+@typed
 def estimators(
-    x: Complex, f: Complex, ratio: float = 1.0
+    x: Complex, f: Complex, ratio: Annotated[float, NotNegative()] = 1.0
 ) -> tuple[Complex, Complex, Complex, Array]:
     """H1, H2, Hv and the coherence of averaged spectra.
 
@@ -81,21 +83,17 @@ def estimators(
     shapes = np.shape(x), np.shape(f)
     if len(x) < 2 or shapes[0] != shapes[1]:
         raise ConfigError(f"{shapes[0]}, {shapes[1]}: at least two averages of both are needed.")
-    not_negative("ratio", ratio)
     S_ff, S_xx = ((np.abs(a) ** 2).mean(axis=0) for a in (f, x))
     S_fx = (f.conj() * x).mean(axis=0)
     H1, H2 = S_fx / S_ff, S_xx / S_fx.conj()
     coherence = np.real(H1 / H2)
-    return H1, H2, H1 * (1 + _force_noise(coherence, ratio)), coherence
-
-
-def _force_noise(coherence: Array, ratio: float) -> Array:
-    """The positive root v of (1 + v) (1 + ratio^2 v) = 1 / coherence."""
     rest, r2 = (1 - coherence) / coherence, ratio**2
-    return 2 * rest / (1 + r2 + np.sqrt((1 + r2) ** 2 + 4 * r2 * rest))
+    v = 2 * rest / (1 + r2 + np.sqrt((1 + r2) ** 2 + 4 * r2 * rest))  # the positive root
+    return H1, H2, H1 * (1 + v), coherence
 
 
-def random_error(coherence: npt.ArrayLike, n_averages: int) -> Array:
+@typed
+def random_error(coherence: npt.ArrayLike, n_averages: Annotated[int, Count(1)]) -> Array:
     """(...,) relative standard deviation of |H1| under noise on the response [1].
 
     Raises:
@@ -104,7 +102,6 @@ def random_error(coherence: npt.ArrayLike, n_averages: int) -> Array:
     Source:
         Bendat and Piersol, Random data: sqrt((1 - g^2) / (2 n g^2)) with the coherence g^2.
     """
-    whole("n_averages", n_averages, 1)
     g2 = np.asarray(coherence, dtype=float)
     return np.sqrt((1 - g2) / (2 * n_averages * g2))
 

@@ -8,8 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
-from rom.arguments import finite, one_each, one_of, typed, whole
-from rom.arguments.quantities import Count
+from rom.arguments import Count, NotNegative, Number, Positive, one_each, typed, whole
 from rom.body.flexible import FlexibleBody
 from rom.body.surface import strain_rows, surface_of
 from rom.components.updating.frf_data import FREEDOM_LOST, Complex, Noise
@@ -19,6 +18,7 @@ from rom.model import Array, Index
 from rom.names import named
 from rom.rotation import skew
 
+Measured = Literal["displacement", "velocity", "acceleration", "strain"]
 DERIVATIVES = {"displacement": 0, "velocity": 1, "acceleration": 2}
 LENGTHS = {  # factors by which points that are off a body may all lie on it
     1e-3: "millimetres taken for metres",
@@ -31,6 +31,7 @@ SAME_RTOL = 1e-6  # distance of surfaces that touch, of the size of all
 MAX_LINES_NAMED = 5  # in a message
 
 
+@typed
 @dataclass(frozen=True, slots=True)
 class Channels:
     """Where and along which direction something is measured or driven.
@@ -46,35 +47,28 @@ class Channels:
             many bodies are named.
     """
 
-    points: npt.ArrayLike
-    directions: npt.ArrayLike
+    points: Annotated[npt.ArrayLike, Number("m", (3,), (None, 3))]
+    directions: Annotated[npt.ArrayLike, Number("1", (3,), (None, 3))]
     bodies: str | tuple[str, ...] | None = None
 
     def __post_init__(self) -> None:
         for name in ("points", "directions"):
-            value = np.atleast_2d(finite(name, getattr(self, name), None))
-            object.__setattr__(self, name, finite(name, value, (None, 3)))
+            value = np.array(getattr(self, name), dtype=float, ndmin=2)
+            object.__setattr__(self, name, value)
         k = len(np.asarray(self.points))
         one_each("directions", len(np.asarray(self.directions)), "points", k)
         if not np.linalg.norm(self.directions, axis=1).all():
             raise ConfigError("a direction of a channel has length zero; give one as (0, 0, 1).")
-        self._name_bodies(k)
-
-    def _name_bodies(self, k: int) -> None:
-        """Keep a name of each of k channels, where there are any."""
-        given: object = self.bodies
-        if given is None:
-            return
-        each = (given,) * k if isinstance(given, str) else given
-        if not isinstance(each, list | tuple) or not all(isinstance(name, str) for name in each):
-            raise ConfigError(f"bodies = {given!r} must be a name, or one of each channel.")
-        one_each("names of bodies", len(each), "channels", k)
-        object.__setattr__(self, "bodies", tuple(each))
+        if self.bodies is not None:
+            given = (self.bodies,) * k if isinstance(self.bodies, str) else self.bodies
+            one_each("names of bodies", len(given), "channels", k)
+            object.__setattr__(self, "bodies", given)
 
     def some(self, chosen: Sequence[int] | Index) -> "Channels":
         """Those with chosen numbers (j,)."""
         bodies = None if self.bodies is None else tuple(self.bodies[k] for k in chosen)
-        points, directions = (np.asarray(A)[chosen] for A in (self.points, self.directions))
+        kept = np.array(chosen, dtype=int)
+        points, directions = (np.asarray(A)[kept] for A in (self.points, self.directions))
         return Channels(points, directions, bodies)
 
     def _elsewhere(self, names: tuple[str, ...], what: str) -> Array:
@@ -102,7 +96,7 @@ class Channels:
         body: FlexibleBody | Mapping[str, FlexibleBody],
         what: str,
         tolerance: float | None = None,
-        gauges: npt.ArrayLike = False,
+        gauges: bool | Sequence[bool] = False,
     ) -> Array:
         """(k, 6 + r) displacement [1] or strain [1/m] along each channel per coordinate.
 
@@ -213,29 +207,27 @@ class Responses:
         ConfigError: if these do not fit each other, or values are not finite.
     """
 
-    frequencies: Array
+    frequencies: Annotated[Array, Positive("Hz", (None,))]
     H: Complex
     sensors: Channels
     inputs: Channels
     coherence: npt.ArrayLike
     averages: Annotated[int, Count(1)]
-    quantity: str | tuple[str, ...] = "displacement"
-    force_noise: npt.ArrayLike = 0.0
+    quantity: Measured | tuple[Measured, ...] = "displacement"
+    force_noise: Annotated[npt.ArrayLike, NotNegative("1", (), (None, None))] = 0.0
     estimator: Literal["H1", "Hv", "H2"] | None = None
 
     def __post_init__(self) -> None:
-        f = finite("frequencies", self.frequencies, None)
+        f = np.array(self.frequencies, dtype=float)
         object.__setattr__(self, "frequencies", f)
         object.__setattr__(self, "H", np.asarray(self.H, dtype=complex))
-        for one in self.quantities:
-            one_of("quantity", one, (*DERIVATIVES, "strain"))
-        if f.ndim != 1 or not f.size or f[0] <= 0 or (np.diff(f) <= 0).any():
-            raise ConfigError("frequencies must ascend and lie above zero.")
+        if not f.size or (np.diff(f) <= 0).any():
+            raise ConfigError("frequencies must ascend, and there must be one.")
         wanted = (f.size, len(np.asarray(self.sensors.points)), len(np.asarray(self.inputs.points)))
         if self.H.shape != wanted:
             raise ConfigError(f"H is {self.H.shape}, needed are lines, sensors, inputs {wanted}.")
         one_each("quantities", len(self.quantities), "sensors", wanted[1])
-        c = finite("coherence", self.coherence, None)
+        c = np.asarray(self.coherence, dtype=float)
         if c.shape not in ((), wanted) or not ((c >= 0) & (c < 1)).all():
             raise ConfigError(
                 f"coherence {c.shape} must be one number or {wanted}, from 0 up to below 1.",
@@ -246,10 +238,8 @@ class Responses:
                 f"coherence estimated from {self.averages} averages says nothing of the noise.",
                 hint="Average more, or give one number that is known.",
             )
-        noise = finite("force_noise", self.force_noise, None)
-        if noise.shape not in ((), wanted[::2]) or not (noise >= 0).all():
-            needed = f"must be a number or {wanted[::2]}, zero or more"
-            raise ConfigError(f"force_noise {noise.shape} {needed}.")
+        if (noise := np.shape(self.force_noise)) not in ((), wanted[::2]):
+            raise ConfigError(f"force_noise {noise} must be a number or {wanted[::2]}.")
         self._check_values()
 
     def _check_values(self) -> None:

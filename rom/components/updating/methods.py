@@ -6,12 +6,13 @@ Source:
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 
-from rom.arguments import matrix, whole
+from rom.arguments import Count, matrix, typed, whole
 from rom.components.updating.frf_data import Complex
 from rom.components.updating.models import (
     AtSensors,
@@ -19,9 +20,10 @@ from rom.components.updating.models import (
     Modal,
     Model,
     ParametricModel,
-    explained,
+    likeness,
     modal,
     sensor_dofs,
+    worst_rows,
 )
 from rom.errors import ConfigError
 from rom.model import Array, Report
@@ -33,6 +35,7 @@ STEP_ATOL = 1e-8  # in standard deviations, below which equations are solved
 MAX_PARAMETER_CHANGE = 0.2  # in one step
 SHRINKING_RATIO = 0.5  # of a step over the one before, above which noise does not lead
 MIN_PARAMETER = -0.95  # change that leaves a twentieth of the stiffness or mass
+ROUND_OFF = 1e-6  # of a relative error of responses: what is below has no pattern to be judged by
 EQUAL_EIGENVALUE_RTOL = 1e-12  # distance of eigenvalues whose modes have no derivative
 
 
@@ -101,10 +104,15 @@ def receptance(seen: Array, g: Complex, driven: Array) -> Complex:
     return H
 
 
-def _modal_sensitivity(model: ParametricModel, modes: Modal) -> tuple[Array, Array, Array]:
-    """Phi^T dZ Phi = A - omega^2 B + i omega C, each (n_p, n, n), at constant damping ratios.
+def through_modes(
+    model: ParametricModel, modes: Modal, m: int, *, shared: bool = False
+) -> Callable[[Complex, Complex, Array], Complex]:
+    """The function of sides (n_f, a, n), (n_f, n, b) and lines (n_f,) that gives side dZ side.
 
-    The damping changes with its modes; of their derivatives remain divided differences of d.
+    Derivatives (n_f, a, b, n_p + m) are those by p, at the origin of the model, and by logarithms
+    of the damping ratios of its m lowest elastic modes; the last of these may be shared by all
+    other modes. Phi^T dZ Phi is A - omega^2 B + i omega C, each (n_p, n, n), at constant ratios:
+    the damping changes with its modes, of whose derivatives divided differences of d remain.
     """
     A, B = (modes.Phi.T @ dA @ modes.Phi for dA in (model.dK, model.dM))
     lam, d = modes.lam, modes.d
@@ -115,25 +123,13 @@ def _modal_sensitivity(model: ParametricModel, modes: Modal) -> tuple[Array, Arr
     i = np.arange(lam.size)
     own = np.divide(d, 2 * lam, out=np.zeros_like(d), where=lam > 0)  # d = 2 zeta sqrt(lam)
     C[:, i, i] = own * (A[:, i, i] - lam * B[:, i, i]) + d * B[:, i, i]
-    return A, B, C
-
-
-def through_modes(
-    model: ParametricModel, modes: Modal, m: int, *, shared: bool = False
-) -> Callable[[Complex, Complex, Array], Complex]:
-    """The function of sides (n_f, a, n), (n_f, n, b) and lines (n_f,) that gives side dZ side.
-
-    Derivatives (n_f, a, b, n_p + m) are those by p, at the origin of the model, and by logarithms
-    of the damping ratios of its m lowest elastic modes; the last of these may be shared by all
-    other modes.
-    """
-    by_p, last = _modal_sensitivity(model, modes), model.n_rigid + m - 1
+    last = model.n_rigid + m - 1
     e, others = slice(model.n_rigid, last + (not shared)), slice(last, None)
 
     def change(left: Complex, right: Complex, omega: Array) -> Complex:
         damped = left[:, :, None, e] * np.swapaxes(right[:, e], 1, 2)[:, None]
         w = 1j * omega[:, None, None, None]
-        columns = [_through(left, by_p, right, omega), damped * (w * modes.d[e])]
+        columns = [_through(left, (A, B, C), right, omega), damped * (w * modes.d[e])]
         if shared:
             together = (left[:, :, others] * modes.d[others]) @ right[:, others]
             columns.append(w * together[..., None])
@@ -340,8 +336,14 @@ def _equations(here: ParametricModel, test: Measurement, ratios: Array, rank: in
     return R
 
 
+@typed
 def response_function_method(
-    model: ParametricModel, test: Measurement, p: ArrayLike, C: Array, *, steps: int = 1
+    model: ParametricModel,
+    test: Measurement,
+    p: ArrayLike,
+    C: Array,
+    *,
+    steps: Annotated[int, Count(1)] = 1,
 ) -> Update:
     """Solve H - H_test = H dZ(p) H_test, linear in p.
 
@@ -364,7 +366,6 @@ def response_function_method(
     """
     test.check(model)
     matrix("C", C, (len(model.K), len(model.K)))
-    whole("steps", steps, 1)
     p, path, s = np.array(p, dtype=float), [], sensor_dofs(model)
     clip = MAX_PARAMETER_CHANGE if steps > 1 else np.inf
     o = np.setdiff1d(np.arange(len(model.K)), s)
@@ -422,9 +423,21 @@ def _update(x: Array, n_p: int, r: Array, J: Array, path: list[Array]) -> Update
 
 
 def _judged(found: Update, model: Model, test: Measurement) -> Update:
-    """The same with the verdict on its responses."""
+    """The same with the verdict: whether its responses leave noise alone, of an unknown size.
+
+    What is left of noise with the weights of the test has one size at all sensors and in all
+    bands, and the responses are alike.
+    """
     H = responses(model, found.p, found.zeta, test.omega, test.inputs)
-    return replace(found, verdict=explained(H, test, found.p.size + found.zeta.size))
+    weight = np.broadcast_to(np.asarray(test.weights, dtype=float), test.H.shape)
+    used = weight > 0
+    rows = [likeness(H, test.H, used)]
+    squares = np.abs(np.log(H / test.H) * weight) ** 2
+    freedom = max(2 * int(used.sum()) - found.p.size - found.zeta.size, 1)
+    variance = squares.sum() / freedom
+    if variance > ROUND_OFF**2:
+        rows += worst_rows(squares / variance, used, test.omega, scale=2 / freedom)
+    return replace(found, verdict=Report("updating", tuple(rows)))
 
 
 def weighted(weights: Array | float, r: Complex) -> Array:

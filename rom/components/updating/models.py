@@ -6,7 +6,7 @@ Source:
 """
 
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Annotated, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,10 +14,10 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve, eigh
 from scipy.stats import chi2
 from scipy.stats import f as f_ratio
 
-from rom.arguments import finite, one_each
+from rom.arguments import Count, finite, one_each, typed
 from rom.components.updating.frf_data import Complex, frac
 from rom.errors import ConfigError, ModelError
-from rom.model import Array, Index, Mask, Report, Row
+from rom.model import Array, Index, Mask, Row
 from rom.reduction.bases.fixed_interface import craig_bampton
 from rom.rows import row
 
@@ -26,7 +26,6 @@ MAX_FALSE_REFUSAL = 1e-3  # probability that a row refuses a right model
 MIN_SCALE = 1e-8  # variance of a scale that is worth a thought
 N_BANDS = 8  # of lines, in which the misfit is looked for
 MAX_UNLIKE = 0.5  # one less the median FRAC: more is another body
-ROUND_OFF = 1e-6  # of a relative error of responses: what is below has no pattern to be judged by
 DEAD_RATIO = 1e-8  # of the largest response: below it, round-off of those who compute responses
 RANK_RTOL = 1e-7  # singular value of dependent columns of a basis, of the largest one
 
@@ -242,7 +241,10 @@ def damping_matrix(model: ParametricModel, zeta: ArrayLike) -> Array:
     return (model.M @ modes.Phi * modes.d) @ (model.M @ modes.Phi).T
 
 
-def parametric_basis(model: ParametricModel, n_modes: int, samples: ArrayLike) -> Array:
+@typed
+def parametric_basis(
+    model: ParametricModel, n_modes: Annotated[int, Count(1)], samples: ArrayLike
+) -> Array:
     """(n, r) basis [1] for a range of p: Craig-Bampton at samples, held at the sensors.
 
     Args:
@@ -253,8 +255,6 @@ def parametric_basis(model: ParametricModel, n_modes: int, samples: ArrayLike) -
     Raises:
         ConfigError: without a mode, or if sensors are no dofs.
     """
-    if n_modes < 1:
-        raise ConfigError(f"n_modes = {n_modes}: a basis needs one or more between the sensors.")
     s = sensor_dofs(model)
     at = [model.at(p) for p in np.atleast_2d(np.asarray(samples, dtype=float))]
     Psi = np.hstack([craig_bampton(here.K, here.M, s, n_modes).Psi for here in at])
@@ -268,23 +268,6 @@ def sensor_dofs(model: ParametricModel) -> Index:
     if not np.array_equal(model.sensors, np.eye(len(model.K))[s]):
         raise ConfigError("the sensors must be dofs of the model; condense before reducing.")
     return s
-
-
-def explained(H: Complex, test: Measurement, n: int) -> Report:
-    """Whether the responses of a corrected model leave noise alone, of a size that is not known.
-
-    What is left of noise with the weights of the test has one size at all sensors and in all
-    bands, and the responses (n_f, n_s, n_e) of the model with n unknowns are alike.
-    """
-    weight = np.broadcast_to(np.asarray(test.weights, dtype=float), test.H.shape)
-    used = weight > 0
-    rows = [likeness(H, test.H, used)]
-    squares = np.abs(np.log(H / test.H) * weight) ** 2
-    freedom = max(2 * int(used.sum()) - n, 1)
-    variance = squares.sum() / freedom
-    if variance > ROUND_OFF**2:
-        rows += worst_rows(squares / variance, used, test.omega, scale=2 / freedom)
-    return Report("updating", tuple(rows))
 
 
 def likeness(H: Complex, measured: Complex, used: Mask) -> Row:
@@ -306,14 +289,9 @@ def worst_rows(
     bands = [(f"worst band, {f[b[0]]:.4g} to {f[b[-1]]:.4g} Hz", np.s_[b]) for b in blocks]
     for parts in (sensors, bands):
         found = [(name, squares[at].sum(), 2.0 * used[at].sum()) for name, at in parts]
-        worst = max((x for x in found if x[2]), key=lambda x: deviation(*x[1:]))
-        rows.append(chi_row(*worst, len(parts), known, scale))
+        off = [(x[1] - x[2]) / np.sqrt(2 * x[2]) if x[2] else -np.inf for x in found]
+        rows.append(chi_row(*found[int(np.argmax(off))], len(parts), known, scale))
     return rows
-
-
-def deviation(value: float, freedom: float) -> float:
-    """Standard deviations of chi-square above its expectation."""
-    return float((value - freedom) / np.sqrt(2 * max(freedom, 1.0)))
 
 
 def chi_row(

@@ -197,10 +197,12 @@ def in_sensors(model: FamilyModel, x: Array, free: Mask) -> FamilyModel:
     Of logarithms x (n_p,) of factors those that are not sought stay.
     """
     S = model.seen
-    if follow := sorted(_followers(S)):
+    R, order = qr(S.T, mode="r", pivoting=True)
+    size = np.abs(np.diag(R))
+    if (rank := int(np.count_nonzero(size > SENSOR_RTOL * size[0]))) < len(S):
         raise ConfigError(
-            f"sensors {named(follow)} of {len(S)} follow from others in a family of "
-            f"{S.shape[1]} coordinates: equations need independent ones.",
+            f"sensors {named(sorted(map(int, order[rank:])))} of {len(S)} follow from others in a "
+            f"family of {S.shape[1]} coordinates: equations need independent ones.",
             hint="Leave them out, reduce with more modes, or update by responses.",
         )
     basis = np.hstack([np.linalg.pinv(S), null_space(S)])
@@ -302,14 +304,6 @@ def _whole_lines(data: Data) -> Index:
             hint="Leave out the sensor of low coherence, or update by responses.",
         )
     return lines
-
-
-def _followers(S: Array) -> list[int]:
-    """Numbers of the rows (n_s, n) that follow from the others."""
-    R, order = qr(S.T, mode="r", pivoting=True)
-    size = np.abs(np.diag(R))
-    rank = int(np.count_nonzero(size > SENSOR_RTOL * size[0]))
-    return [int(k) for k in order[rank:]]
 
 
 def _collocated(model: FamilyModel) -> tuple[tuple[int, ...], Array]:

@@ -11,12 +11,12 @@ Source:
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import finite, typed, whole
+from rom.arguments import NotNegative, Positive, typed, vector, whole
 from rom.body.flexible import FlexibleBody
 from rom.body.surface import surface_of
 from rom.components.updating.estimate import DAMPING_LOG_DEVIATION
@@ -190,17 +190,17 @@ def place(  # noqa: PLR0913  keywords of one call
     family: Family,
     sensors: Channels,
     inputs: Channels,
-    frequencies: npt.ArrayLike,
+    frequencies: Annotated[npt.ArrayLike, Positive("Hz", (), (None,))],
     *,
     n_sensors: int,
     n_inputs: int = 1,
-    noise: float = 0.0,
-    floor: float | None = None,
+    noise: Annotated[float, NotNegative()] = 0.0,
+    floor: Annotated[float, NotNegative()] | None = None,
     quantity: Literal["displacement", "velocity", "acceleration"] = "acceleration",
     fixed: Held = (),
     attached: Attached | None = None,
     damping: float = 0.01,
-    prior: Mapping[str, float] | None = None,
+    prior: Mapping[str, Annotated[float, Positive()]] | None = None,
 ) -> Plan:
     """Choose the sensors and inputs that tell most about the parameters of a family.
 
@@ -236,12 +236,9 @@ def place(  # noqa: PLR0913  keywords of one call
     check_damping_ratio(damping)
     bodies = Parts.of(family).bodies
     check_units(family)
-    least = 0.0 if floor is None else floor
-    if min(noise, least) < 0 or not 0 < finite("noise + floor", noise + least, ()):
-        raise ConfigError("noise and floor must not be negative, and one of them must be positive.")
-    omega = 2 * np.pi * np.atleast_1d(finite("frequencies", frequencies, None))
-    if not omega.size or omega.min() <= 0:
-        raise ConfigError("frequencies must lie above zero.")
+    if not noise and not floor:
+        raise ConfigError("noise and floor are zero, and one of them must be positive.")
+    omega = 2 * np.pi * vector("frequencies", frequencies)
     rows = sensors.rows(bodies, "sensor"), inputs.rows(bodies, "input")
     whole("n_sensors", n_sensors, 1, len(rows[0]), reason="candidates")
     whole("n_inputs", n_inputs, 1, len(rows[1]), reason="candidates")
@@ -300,8 +297,8 @@ def _information(
     told[size < DEAD_RATIO * size.max()] = 0.0  # relative noise makes nothing of round-off
     width = np.log(model.high / model.low)
     sigma = np.array([prior.get(k, w) for k, w in zip(model.names, width, strict=True)])
-    if not (sigma > 0).all():
-        raise ConfigError("prior: each standard deviation must be positive, and low < high.")
+    if not sigma.all():
+        raise ConfigError("a range of one factor says nothing; give low < high or a prior.")
     known = np.diag(np.r_[sigma, np.full(m, DAMPING_LOG_DEVIATION)] ** -2.0)
     return told, known, model.labels(m)
 

@@ -7,8 +7,9 @@ BODY.INTERFACE, and -o writes one body of each, with its name before the ending.
 """
 
 import argparse
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +19,7 @@ from rom.cli.options import (
     count,
     names,
     number,
+    option,
     positive,
     require,
     typed_number,
@@ -53,19 +55,7 @@ PLAN_LINES = 100  # between the first and the last one
 PLAN_POINTS = 20  # of the surface that are offered, each along three axes
 PLAN_ENDINGS = (".csv", ".uff", ".png")
 PLAN_SIZE = (8, 1)  # sensors and forces, where none are asked for
-FACTOR_HELP = "by a factor from LOW to HIGH that is sought; may be repeated"
-STIFFNESS_HELP = f"[N/m, N m/rad], {FACTOR_HELP}"
-JOINT = "NAME=BODY.INTERFACE,BODY.INTERFACE:KX,KY,KZ:LOW:HIGH"
-STRUCTURE_OPTIONS = (  # what each takes, names or an assignment that may be repeated; what it says
-    ("--couple", "BODY.INTERFACE=BODY.INTERFACE", "of an assembly: they move together"),
-    ("--fixed", "NAME,...", "what was held"),
-    ("--free", "NAME,...", "unknown parameters (default: all); springs and masses are always"),
-    ("--spring", "NAME=INTERFACE:KX,KY,KZ:LOW:HIGH", f"interface to ground {STIFFNESS_HELP}"),
-    ("--joint", JOINT, f"between bodies {STIFFNESS_HELP}"),
-    ("--mass", "NAME=INTERFACE:KG:LOW:HIGH", f"on an interface [kg], {FACTOR_HELP}"),
-    ("--candidate", "NAME,...", "springs and masses that the model has not, tried by their score"),
-    ("--prior", "NAME=DEVIATION", "NAME's relative standard deviation about one, before the test"),
-)
+RESIDUALS = ("responses", "equations", "response-function")
 POINT_KEY = each(ratio("[m] and direction"), "x, y, z, dx, dy, dz")
 SCHEMA = record(
     "what a test says about a family of bodies; with --plan, what one will say",
@@ -89,99 +79,77 @@ SCHEMA = record(
 )
 
 
+def _two_counts(text: str) -> tuple[int, int]:
+    parts = text.split(",")
+    if len(parts) != 2:
+        raise argparse.ArgumentTypeError(f"{text!r} is not two whole numbers, as in 8,1")
+    return count(parts[0]), count(parts[1])
+
+
+def _range(text: str) -> tuple[float, float]:
+    parts = text.split(":")
+    if len(parts) != 2:
+        raise argparse.ArgumentTypeError(f"{text!r} is not LOW:HIGH, as in 20:800")
+    low, high = map(positive, parts)
+    if not low < high:
+        raise argparse.ArgumentTypeError(f"{text!r} does not ascend")
+    return low, high
+
+
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Options of the verb."""
-    for part in (_structure, _test, _search, _plan_options):
-        part(parser)
-    parser.add_argument(
-        "-o", "--output", type=Path, help="updated body, .rom.npz; plan, .csv, .uff or .png"
-    )
-    add_force(parser)
-
-
-def _test(parser: argparse.ArgumentParser) -> None:
-    """What was measured."""
-    parser.add_argument("file", type=Path, nargs="?", help="test: .uff, .unv, .csv, .txt or .h5")
-    parser.add_argument("--averages", type=count, help="number of them behind each function")
-    parser.add_argument("--coherence", type=number, help="of all values, where the file has none")
-    parser.add_argument(
-        "--force-noise", type=positive, help="on the signal of a force, over the force itself"
-    )
-    parser.add_argument(
-        "--estimator", choices=("H1", "H2", "Hv"), help="that the functions are, where it matters"
-    )
-    parser.add_argument(
-        "--points", type=Path, help="another file with nodes, and bodies of an assembly"
-    )
-    parser.add_argument("--tolerance", type=positive, help="of points off the body [m]")
-    parser.add_argument(
-        "--picture", type=Path, help="of the points of a test on the body, .png, drawn first"
-    )
-
-
-def _structure(parser: argparse.ArgumentParser) -> None:
-    """What the model is, and what of it is unknown."""
-    text = "family file, .rom.npz; of several, repeated, each with a name: an assembly"
+    """Options: the model and what of it is unknown, what was measured, the search, and the plan."""
+    add = partial(option, parser)
+    about = "family file, .rom.npz; of several, repeated, each with a name: an assembly"
     takes = "FILE or NAME=FILE"
-    parser.add_argument("--family", metavar=takes, action="append", required=True, help=text)
-    for option, metavar, text in STRUCTURE_OPTIONS:
-        kind: dict[str, Any] = {"type": assignment, "action": "append", "default": []}
-        if metavar == "NAME,...":
-            kind = {"type": names, "default": None if option == "--free" else ()}
-        parser.add_argument(option, metavar=metavar, help=text, **kind)
-
-
-def _search(parser: argparse.ArgumentParser) -> None:
-    """How the unknowns are sought."""
-    parser.add_argument(
-        "--residual",
-        choices=("responses", "equations", "response-function"),
-        default="responses",
-        help="what is made small: responses (default), equations of motion at the sensors, or what "
-        "the response function method leaves",
+    parser.add_argument("--family", metavar=takes, action="append", required=True, help=about)
+    add("--couple BODY.INTERFACE=BODY.INTERFACE", "of an assembly: they move together", assignment)
+    add("--fixed NAME,...", "what was held", names)
+    about = "unknown parameters (default: all); springs and masses are always"
+    add("--free NAME,...", about, names, default=None)
+    by = "by a factor from LOW to HIGH that is sought; may be repeated"
+    about = f"[N/m, N m/rad], {by}"
+    add("--spring NAME=INTERFACE:KX,KY,KZ:LOW:HIGH", f"interface to ground {about}", assignment)
+    joint = "--joint NAME=BODY.INTERFACE,BODY.INTERFACE:KX,KY,KZ:LOW:HIGH"
+    add(joint, f"between bodies {about}", assignment)
+    add("--mass NAME=INTERFACE:KG:LOW:HIGH", f"on an interface [kg], {by}", assignment)
+    about = "springs and masses that the model has not, tried by their score"
+    add("--candidate NAME,...", about, names)
+    about = "NAME's relative standard deviation about one, before the test"
+    add("--prior NAME=DEVIATION", about, assignment)
+    parser.add_argument("file", type=Path, nargs="?", help="test: .uff, .unv, .csv, .txt or .h5")
+    add("--averages", "number of them behind each function", count)
+    add("--coherence", "of all values, where the file has none", number)
+    add("--force-noise", "on the signal of a force, over the force itself", positive)
+    about = "that the functions are, where it matters"
+    add("--estimator", about, str, choices=("H1", "H2", "Hv"))
+    add("--points", "another file with nodes, and bodies of an assembly", Path)
+    add("--tolerance", "of points off the body [m]", positive)
+    add("--picture", "of the points of a test on the body, .png, drawn first", Path)
+    about = (
+        "what is made small: responses (default), equations of motion at the sensors, or what the "
+        "response function method leaves"
     )
-    parser.add_argument(
-        "--rank", type=count, help="of the basis of equations (default: one per mode of the band)"
+    add("--residual", about, str, choices=RESIDUALS, default=RESIDUALS[0])
+    add("--rank", "of the basis of equations (default: one per mode of the band)", count)
+    about = "half bandwidths of the poles within which lines count less"
+    add("--beside-poles WIDTH", about, positive)
+    add("--damping", "to start from (default 1 %%)", positive, default=0.01)
+    about = "choose so many for a test to be (8,1 where they are left out)"
+    add("--plan SENSORS,FORCES", about, _two_counts, nargs="?", const=PLAN_SIZE)
+    add("--lines LOW:HIGH", "of the test that is planned [Hz]", _range)
+    add("--noise", "relative, of what is planned (default 5 %%)", positive, default=0.05)
+    about = (
+        "noise of what is planned where nothing moves [m/s^2 per N] (default: a thousandth of the "
+        "largest response)"
     )
-    parser.add_argument(
-        "--beside-poles",
-        metavar="WIDTH",
-        type=positive,
-        help="half bandwidths of the poles within which lines count less",
-    )
-    parser.add_argument(
-        "--damping", type=positive, default=0.01, help="to start from (default 1 %%)"
-    )
-
-
-def _plan_options(parser: argparse.ArgumentParser) -> None:
-    """What a test to be should tell."""
-    parser.add_argument(
-        "--plan",
-        metavar="SENSORS,FORCES",
-        type=_two_counts,
-        nargs="?",
-        const=PLAN_SIZE,
-        help="choose so many for a test to be (8,1 where they are left out)",
-    )
-    parser.add_argument(
-        "--lines", metavar="LOW:HIGH", type=_range, help="of the test that is planned [Hz]"
-    )
-    parser.add_argument(
-        "--noise", type=positive, default=0.05, help="relative, of what is planned (default 5 %%)"
-    )
-    parser.add_argument(
-        "--floor",
-        type=number,
-        help="noise of what is planned where nothing moves [m/s^2 per N] (default: a thousandth of "
-        "the largest response)",
-    )
+    add("--floor", about, number)
+    add("-o --output", "updated body, .rom.npz; plan, .csv, .uff or .png", Path)
+    add_force(parser)
 
 
 def run(args: argparse.Namespace) -> Answer:
     """Read, update, judge."""
     from rom.components.updating.estimate import update
-    from rom.components.updating.family_model import Parts
     from rom.components.updating.responses.reading import read_responses
     from rom.io.bodies import save
 
@@ -189,9 +157,9 @@ def run(args: argparse.Namespace) -> Answer:
         return _plan(args)
     require({"file": args.file}, hint="A test, or --plan for one that is to be made.")
     family = _family(args)
-    outputs = _outputs(args, family)
+    outputs = _outputs(args)
     read = {name: getattr(args, name) for name in ("averages", "coherence", "points")}
-    bodies = [name for name in Parts.of(family).bodies if name]
+    bodies = list(filter(None, _files(args)))
     test = read_responses(args.file, **read, bodies=bodies)
     if args.picture is not None:
         from rom.components.updating.pictures import match
@@ -199,7 +167,7 @@ def run(args: argparse.Namespace) -> Answer:
         match(family, test, checked(args, args.picture, inputs=_files(args).values()))
     noise = {"force_noise": args.force_noise, "estimator": args.estimator}
     test = replace(test, **{name: value for name, value in noise.items() if value is not None})
-    common = _common(args, family)
+    common = _common(args)
     outside = common.pop("attached")
     if wrong := sorted(set(args.candidate) - set(outside)):
         raise ConfigError(f"--candidate {wrong[0]} must name a --spring, --joint or --mass.")
@@ -226,18 +194,17 @@ def run(args: argparse.Namespace) -> Answer:
     return Answer(data, f"{text}\n{found}", write if outputs else None, failures(found.verdict))
 
 
-def _outputs(args: argparse.Namespace, family: "Family") -> dict[str, Path]:
+def _outputs(args: argparse.Namespace) -> dict[str, Path]:
     """{name: file} of the bodies that are written; one alone has no name."""
-    from rom.components.updating.family_model import Parts
-
     if args.output is None:
         return {}
     if not args.output.name:
         raise ConfigError("-o must name a file.")
     stem, paths = args.output.name.removesuffix(".npz").removesuffix(".rom"), {}
-    for name in Parts.of(family).bodies:
+    files = _files(args)
+    for name in files:
         path = args.output.with_name(f"{stem}.{name}.rom.npz") if name else args.output
-        paths[name] = checked(args, path, "npz", inputs=_files(args).values())
+        paths[name] = checked(args, path, "npz", inputs=files.values())
     return paths
 
 
@@ -286,14 +253,12 @@ def _place(option: str, text: str, bodies: Collection[str]) -> Any:
     raise ConfigError(f"{option} {text!r} must be BODY.INTERFACE, of {named(bodies)}.")
 
 
-def _common(args: argparse.Namespace, family: "Family") -> dict[str, Any]:
+def _common(args: argparse.Namespace) -> dict[str, Any]:
     """What an update and a plan know of a family before the test."""
-    from rom.components.updating.family_model import Parts
-
     prior = unique(args.prior, "--prior")
     return {
-        "fixed": tuple(_place("--fixed", text, Parts.of(family).bodies) for text in args.fixed),
-        "attached": _outside(args, family),
+        "fixed": tuple(_place("--fixed", text, _files(args)) for text in args.fixed),
+        "attached": _outside(args),
         "damping": args.damping,
         "prior": {name: typed_number("--prior", text) for name, text in prior.items()},
     }
@@ -313,7 +278,7 @@ def _plan(args: argparse.Namespace) -> Answer:
     if output:
         check_ending(output, "a plan", *PLAN_ENDINGS)
     family = _family(args)
-    common = _common(args, family)
+    common = _common(args)
     offered = candidates(family, PLAN_POINTS, fixed=common["fixed"])
     (n_sensors, n_inputs), (low, high) = args.plan, args.lines
     lines = np.linspace(low, high, PLAN_LINES)
@@ -343,23 +308,6 @@ def _plan(args: argparse.Namespace) -> Answer:
     return Answer(data, str(plan), write)
 
 
-def _two_counts(text: str) -> tuple[int, int]:
-    parts = text.split(",")
-    if len(parts) != 2:
-        raise argparse.ArgumentTypeError(f"{text!r} is not two whole numbers, as in 8,1")
-    return count(parts[0]), count(parts[1])
-
-
-def _range(text: str) -> tuple[float, float]:
-    parts = text.split(":")
-    if len(parts) != 2:
-        raise argparse.ArgumentTypeError(f"{text!r} is not LOW:HIGH, as in 20:800")
-    low, high = map(positive, parts)
-    if not low < high:
-        raise argparse.ArgumentTypeError(f"{text!r} does not ascend")
-    return low, high
-
-
 def _data(args: argparse.Namespace, found: "Updated | Plan") -> dict[str, Any]:
     """What an update and a plan tell."""
     data = {"family": ", ".join(args.family), "deviations": found.deviations}
@@ -367,25 +315,26 @@ def _data(args: argparse.Namespace, found: "Updated | Plan") -> dict[str, Any]:
     return data | {"unseen": list(found.unseen)}
 
 
-def _outside(args: argparse.Namespace, family: "Family") -> "Attached":
+def _outside(args: argparse.Namespace) -> "Attached":
     """Springs, joints and masses by their names."""
-    from rom.components.updating.family_model import AddedMass, GroundSpring, JointSpring, Parts
+    from rom.components.updating.family_model import AddedMass, GroundSpring, JointSpring
 
-    bodies, found = Parts.of(family).bodies, dict[str, Any]()
-    kinds = {"spring": GroundSpring, "joint": JointSpring, "mass": AddedMass}
-    for option, kind in kinds.items():
-        for name, text in unique(getattr(args, option), f"--{option}").items():
-            shown = f"--{option} {text!r}"
+    bodies, found = _files(args), dict[str, Any]()
+    kinds: dict[str, Callable[..., object]] = {"--spring": GroundSpring, "--joint": JointSpring}
+    kinds["--mass"] = AddedMass
+    for flag, kind in kinds.items():
+        for name, text in unique(getattr(args, flag[2:]), flag).items():
+            shown = f"{flag} {text!r}"
             if name in found:
-                raise ConfigError(f"--{option} {name} needs a name of its own.")
+                raise ConfigError(f"{flag} {name} needs a name of its own.")
             if len(parts := text.split(":")) != 4:
                 raise ConfigError(f"{shown} must be written INTERFACE:VALUE:LOW:HIGH.")
-            places = [_place(f"--{option}", part, bodies) for part in parts[0].split(",")]
-            if len(places) != (n := 1 + (option == "joint")):
+            places = [_place(flag, part, bodies) for part in parts[0].split(",")]
+            if len(places) != (n := 1 + (flag == "--joint")):
                 raise ConfigError(f"{shown} names {len(places)} places, needed are {n}.")
-            low, high = (typed_number(f"--{option}", part) for part in parts[2:])
-            value = [typed_number(f"--{option}", part) for part in parts[1].split(",")]
-            if option == "mass" and len(value) != 1:
+            low, high = (typed_number(flag, part) for part in parts[2:])
+            value = [typed_number(flag, part) for part in parts[1].split(",")]
+            if flag == "--mass" and len(value) != 1:
                 raise ConfigError(f"{shown}: a mass must be one number [kg].")
-            found[name] = kind(*places, value[0] if option == "mass" else value, low, high)
+            found[name] = kind(*places, value[0] if flag == "--mass" else value, low, high)
     return found

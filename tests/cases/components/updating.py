@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 import rom
 from cases.solid import STEEL, composite
 from rom.components.updating.family_model import Parts, family_model
-from rom.components.updating.frf_data import noisy
+from rom.components.updating.frf_data import estimators, noisy
 from rom.components.updating.normal_equations import responses_at
 from rom.errors import ConfigError
 from rom.updating import Channels, JointSpring, Responses
@@ -95,7 +95,25 @@ def exact_responses(model, true, lines, zeta=0.02):
 
 
 def noisy_test(family, true, channels, lines, *, level, averages, seed=0, **model):
-    """A test whose noise has a level; of so many averages, its coherence says so."""
+    """A test with relative noise: coherence c of n averages has the error (1 - c) / (2 n c)."""
     H = exact_responses(model_of(family, channels, **model), true, lines)
-    H = noisy(H, level, np.random.default_rng(seed))
-    return Responses(lines, H, *channels, 1 / (1 + averages * level**2), averages)
+    H = noisy(H, level, np.random.default_rng(seed)) if level else H
+    c = 1 / (1 + averages * level**2) if level else 0.999  # level^2 / 2 for each part
+    return Responses(lines, H, *channels, c, averages)
+
+
+def gauss(rng, shape):
+    """Circular complex numbers of the variance one."""
+    return (rng.standard_normal(shape) + 1j * rng.standard_normal(shape)) / np.sqrt(2)
+
+
+def averaged(exact, channels, lines, rng, *, noise, n, estimator="H1"):
+    """A test by n records: one force drives all sensors, its noise is in all responses."""
+    on_force, on_response = noise
+    f = gauss(rng, (n, len(lines), 1, exact.shape[2]))
+    x = exact * (f + on_response * gauss(rng, (n, *exact.shape)))
+    f = f + on_force * gauss(rng, f.shape)
+    *H, coherence = estimators(x, np.broadcast_to(f, x.shape))
+    H = H[("H1", "H2", "Hv").index(estimator)]
+    kind = {"force_noise": on_force, "estimator": estimator}
+    return Responses(lines, H, *channels, coherence, n, **kind)

@@ -39,15 +39,18 @@ def write_observer_fmu(observer: Observer | ParameterTracker, path: str | Path) 
     """
     path = check_writable(path)
     if isinstance(observer, Observer):
-        inputs, outputs, text = observer.inputs, observer.outputs, _steady(observer)
+        o, dt, inputs, outputs = observer, observer.dt, observer.inputs, observer.outputs
         core, when = "observer.c", "one step after their samples"
+        tables = {"DT": np.array([dt]), "CLOSED": o.A - o.A @ o.G @ o.C, "DRIVEN": o.A @ o.G}
+        tables |= {"WANTED": o.W, "DEVIATIONS": o.deviations}
+        n_v, n = o.W.shape
+        text = f"enum {{ STATES = {n}, SENSORS = {len(o.C)}, VALUES = {n_v} }};\n" + arrays(tables)
     else:
-        (inputs, outputs), text = _names(observer), _changing(observer)
+        dt, (inputs, outputs), text = observer.assumed.dt, _names(observer), _changing(observer)
         core, when = "parameter_tracker.c", "at their samples, and of what changes"
     variables = [Variable(f"sensor.{name}", "input", unit, 0.0) for name, unit in inputs]
     for kind in ("estimate", "deviation"):
         variables += [Variable(f"{kind}.{name}", "output", unit) for name, unit in outputs]
-    dt = observer.dt if isinstance(observer, Observer) else observer.assumed.dt
     about = f"Estimates of {path.stem} from a few sensors, {when}."
     headers = ("filter.h", "states.h")
     return write_archive(path, Content(path.stem, about, variables, dt, core, headers, text))
@@ -63,23 +66,14 @@ def _names(tracker: ParameterTracker) -> tuple[Names, Names]:
     return named_values(tracker.sensors), (*named_values(tracker.wanted), *forces, *factors)
 
 
-def _steady(o: Observer) -> str:
-    """Tables of a filter in its steady state."""
-    tables = {"DT": np.array([o.dt]), "CLOSED": o.A - o.A @ o.G @ o.C, "DRIVEN": o.A @ o.G}
-    tables |= {"WANTED": o.W, "DEVIATIONS": o.deviations}
-    n_v, n = o.W.shape
-    sizes = f"enum {{ STATES = {n}, SENSORS = {len(o.C)}, VALUES = {n_v} }};\n"
-    return sizes + arrays(tables)
-
-
 def _changing(tracker: ParameterTracker) -> str:
     """Tables of a filter that linearises its equations again."""
-    o, assumed = tracker.operation, tracker.assumed
+    o, assumed, model = tracker.operation, tracker.assumed, tracker.operation.model
     drifts = tracker.drifts.values()
     tables = {"DT": np.array([assumed.dt]), "REACH": np.array([LINEAR_REACH])}
-    tables |= {"SCALE": o.scale, "STIFFNESS": o.K, "MASS": o.M, "DAMPING": o.XI}
-    tables |= {"DRIVEN": o.driven, "K_POWERS": o.k_powers, "M_POWERS": o.m_powers}
-    tables |= {"LOW": o.low, "HIGH": o.high}
+    tables |= {"SCALE": o.scale, "STIFFNESS": model.K, "MASS": model.M, "DAMPING": o.XI}
+    tables |= {"DRIVEN": o.driven, "K_POWERS": model.k_powers, "M_POWERS": model.m_powers}
+    tables["LOW"], tables["HIGH"] = model.ends
     tables |= {"WHITE": np.diag(assumed.white(o)), "VARIANCES": tracker.R}
     tables["WALKS"] = np.array([d.walk**2 * assumed.dt for d in drifts])
     tables["BEFORE"] = np.r_[np.diag(assumed.before(o)), [d.first**2 for d in drifts]]
@@ -87,9 +81,9 @@ def _changing(tracker: ParameterTracker) -> str:
         tables[f"{name}_STILL"], tables[f"{name}_CARRIED"] = rows.displacement, rows.carried
         tables[f"{name}_MOVING"], tables[f"{name}_PUSHED"] = rows.velocity, rows.acceleration
     m, n_e = o.driven.shape
-    sizes = {"MODES": m, "FORCES": n_e, "PARAMETERS": len(o.names), "TERMS": len(o.K)}
+    sizes = {"MODES": m, "FORCES": n_e, "PARAMETERS": len(model.names), "TERMS": len(model.K)}
     sizes |= {"SENSORS": len(tracker.R), "WANTED": len(o.wanted.displacement)}
     numbers = ", ".join(f"{name} = {size}" for name, size in sizes.items())
-    names = ", ".join(json.dumps(name) for name in o.names)
+    names = ", ".join(json.dumps(name) for name in model.names)
     text = f"enum {{ {numbers} }};\nstatic const char *const NAMES[] = {{{names}}};\n"
     return text + arrays(tables)

@@ -26,6 +26,7 @@ from rom.body.flexible import FlexibleBody
 from rom.body.recovery import StressRecovery
 from rom.components.updating.family_model import (
     Attached,
+    FamilyModel,
     Held,
     Parts,
     Structure,
@@ -114,28 +115,16 @@ class Operation:
     """Modes of a body, forces on them, and what is seen.
 
     Attributes:
-        names: (n_p,) of the parameters.
-        low: (n_p,) smallest logarithms of factors [1].
-        high: (n_p,) largest ones [1].
-        omega: (m,) frequencies at factors of one [rad/s].
-        K: (n_t, m, m) terms of the stiffness.
-        M: (n_t, m, m) terms of the mass.
-        k_powers: (n_t, n_p) one where a parameter multiplies a term of the stiffness.
-        m_powers: (n_t, n_p) likewise of the mass.
+        model: in its modes at factors of one, of the parameters that change.
+        omega: (m,) frequencies of these modes [rad/s].
         XI: (m, m) damping [1/s].
         driven: (m, n_e) forces of the modes per force.
         seen: rows of the sensors.
         wanted: rows of what is wanted.
     """
 
-    names: tuple[str, ...]
-    low: Array
-    high: Array
+    model: FamilyModel
     omega: Array
-    K: Array
-    M: Array
-    k_powers: Array
-    m_powers: Array
     XI: Array
     driven: Array
     seen: Rows
@@ -149,14 +138,18 @@ class Operation:
     def at(self, x: Array) -> Linear:
         """The equations at logarithms x (n_p,) of factors."""
         m, n_e = self.driven.shape
-        acc, dacc = self._accelerations(x)
+        here = self.model.at(x)
+        acc = np.linalg.solve(here.M, np.hstack([-here.K / self.scale, -self.XI, self.driven]))
+        right = -here.dM @ acc
+        right[..., :m] -= here.dK / self.scale
+        dacc = np.linalg.solve(here.M, right)
         A = np.zeros((2 * m + n_e,) * 2)
         A[:m, m : 2 * m], A[m : 2 * m] = np.diag(self.scale), acc
         dA = np.zeros((x.size, *A.shape))
         dA[:, m : 2 * m] = dacc
         found = []
         for rows in (self.seen, self.wanted):
-            y, dy = summed(rows.carried, self.k_powers, x)
+            y, dy = summed(rows.carried, self.model.k_powers, x)
             C = rows.acceleration @ acc
             C[:, :m] += (y + rows.displacement) / self.scale
             C[:, m : 2 * m] += rows.velocity
@@ -164,14 +157,6 @@ class Operation:
             dC[..., :m] += dy / self.scale
             found += [C, dC]
         return Linear(A, dA, *found)
-
-    def _accelerations(self, x: Array) -> tuple[Array, Array]:
-        """(m, n) accelerations of the modes by the state, and (n_p, m, n) their derivatives."""
-        (K, dK), (M, dM) = (summed(self.K, self.k_powers, x), summed(self.M, self.m_powers, x))
-        acc = np.linalg.solve(M, np.hstack([-K / self.scale, -self.XI, self.driven]))
-        right = -dM @ acc
-        right[..., : len(K)] -= dK / self.scale
-        return acc, np.linalg.solve(M, right)
 
 
 def operation(
@@ -209,11 +194,9 @@ def operation(
     terms = terms_of(structure)
     seen = _rows(parts, terms, V, sensors, "sensor", len(attached))
     asked = _rows(parts, terms, V, wanted, "wanted value", len(attached))
-    low, high = (ends[chosen] for ends in model.ends)
-    matrices = U.T @ model.K @ U, U.T @ model.M @ U
-    powers = model.k_powers[:, chosen], model.m_powers[:, chosen]
     driven = (forces.rows(parts.bodies, "force") @ V).T
-    return Operation(tuple(names), low, high, omega, *matrices, *powers, XI, driven, seen, asked)
+    small = model.reduced(U, np.array(chosen, dtype=int), np.zeros(len(model.names)), V)
+    return Operation(small, omega, XI, driven, seen, asked)
 
 
 def _rows(
@@ -254,7 +237,15 @@ def stress_rows(
     The latter (k, 6 + r), of rigid and elastic coordinates, is that of modes left out. Of chosen
     channels (k,), or all.
     """
-    recovery = _linear_stress(body)
+    recovery = body.stress
+    if recovery is None:
+        raise ModelError(f"body {body.name!r} carries no stress.", hint="Reduce with stress=True.")
+    if not isinstance(recovery, StressRecovery):
+        raise ModelError(
+            f"the stress of body {body.name!r} is that of large deflection, and what is estimated "
+            "here is linear.",
+            hint="Reduce without nonlinear.",
+        )
     reach = POINT_RTOL * np.ptp(recovery.points, axis=0).max()
     n_r, left_out = body.n_modes, np.zeros((len(recovery.operator), 6 + body.n_modes))
     if (extra := recovery.inertial) is not None:
@@ -272,19 +263,6 @@ def stress_rows(
         static.append(along @ recovery.operator[None, 6 * n : 6 * n + 6])
         inertial.append(along @ left_out[None, 6 * n : 6 * n + 6])
     return np.vstack(static), np.vstack(inertial)
-
-
-def _linear_stress(body: FlexibleBody) -> StressRecovery:
-    recovery = body.stress
-    if recovery is None:
-        raise ModelError(f"body {body.name!r} carries no stress.", hint="Reduce with stress=True.")
-    if not isinstance(recovery, StressRecovery):
-        raise ModelError(
-            f"the stress of body {body.name!r} is that of large deflection, and what is estimated "
-            "here is linear.",
-            hint="Reduce without nonlinear.",
-        )
-    return recovery
 
 
 def check_seen(at: Linear, body: Operation) -> None:

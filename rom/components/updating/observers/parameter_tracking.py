@@ -90,7 +90,7 @@ class ParameterTracker:
     @property
     def names(self) -> tuple[str, ...]:
         """Of the parameters."""
-        return self.operation.names
+        return self.operation.model.names
 
     def run(self, samples: npt.ArrayLike, times: npt.ArrayLike | None = None) -> Track:
         """Filter a record that begins at rest.
@@ -115,11 +115,11 @@ class ParameterTracker:
         Raises:
             SolverError: if a parameter has left its range.
         """
-        o, dt = self.operation, self.assumed.dt
-        for j in np.flatnonzero(~((o.low <= x) & (x <= o.high)))[:1]:
-            here, low, high = (f"{np.exp(y):.4g}" for y in (x[j], o.low[j], o.high[j]))
+        o, dt, ends = self.operation, self.assumed.dt, self.operation.model.ends
+        for j in np.flatnonzero(~((ends[0] <= x) & (x <= ends[1])))[:1]:
+            here, low, high = (f"{np.exp(y[j]):.4g}" for y in (x, *ends))
             raise SolverError(
-                f"parameter {o.names[j]!r} has reached the factor {here}; the family goes from "
+                f"parameter {self.names[j]!r} has reached the factor {here}; the family goes from "
                 f"{low} to {high}.",
                 hint="See whether forces, noise and support are those of the body, then make a "
                 "family with a wider range.",

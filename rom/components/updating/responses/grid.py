@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rom.components.updating.frf_data import Complex
 from rom.components.updating.measured import Channels, Responses
 from rom.errors import FileFormatError
 from rom.io.fields.universal import FREQUENCY_RESPONSE, Function
@@ -45,15 +44,20 @@ def side_by_side(
         )
     sensors, inputs = (sorted({pair[k] for pair in found}) for k in (0, 1))
     x = next(iter(found.values())).x
+    keep = x > 0  # no displacement follows from motion at 0 Hz
     H = np.full((len(sensors), len(inputs), x.size), np.nan, dtype=complex)
     c = np.zeros(H.shape)
     for (sensor, force), f in found.items():
         at = sensors.index(sensor), inputs.index(force)
         _check_lines(f, x)
-        H[at] = _receptance(f)
-        own = coherences.get((sensor, force))
-        c[at] = coherence if own is None or coherence is not None else _rounded(own, x)
-    keep = x > 0  # no displacement follows from motion at 0 Hz
+        H[(*at, keep)] = replace(f, x=f.x[keep], y=f.y[keep]).receptance()
+        if coherence is not None:
+            c[at] = coherence
+            continue
+        _check_lines(own := coherences[sensor, force], x)
+        c[at] = np.real(own.y)
+        if not (c[at] >= 1).all():  # what rounding has made one is taken back by half a digit
+            c[at][c[at] == 1] = 1 - COHERENCE_STEP
     where = [_channels(dofs, points) for dofs in (sensors, inputs)]
     H, c = (np.moveaxis(A, 2, 0)[keep] for A in (H, c))
     return Responses(x[keep], H, where[0], where[1], c, averages)
@@ -108,20 +112,6 @@ def _by_pair(functions: list[Function], bodies: Bodies) -> dict[tuple[Dof, Dof],
             )
         known[pair] = f
     return known
-
-
-def _receptance(f: Function) -> Complex:
-    used = f.x > 0
-    H = np.full(f.x.shape, np.nan, dtype=complex)
-    H[used] = replace(f, x=f.x[used], y=f.y[used]).receptance()
-    return H
-
-
-def _rounded(f: Function, x: Array) -> Array:
-    """Coherence, with what rounding has made one taken back by half a digit."""
-    _check_lines(f, x)
-    c = np.real(f.y)
-    return c if (c >= 1).all() else np.where(c == 1, 1 - COHERENCE_STEP, c)
 
 
 def _check_lines(f: Function, x: Array) -> None:

@@ -213,8 +213,8 @@ def _test(file: "h5.File") -> Responses:
     noise = where[4] if where[4:] else 0.0
     if FORCE_NOISE in file.attrs:
         noise = _number(file, FORCE_NOISE)
-    quantity, *several = _text(file.attrs["quantity"]).split(",")
-    each = (quantity, *several) if several else quantity
+    quantity: list[Any] = _text(file.attrs["quantity"]).split(",")
+    each = tuple(quantity) if quantity[1:] else quantity[0]
     estimator = texts.get("estimator")
     return Responses(f, H, sensors, inputs, c, int(averages), each, noise, estimator)
 

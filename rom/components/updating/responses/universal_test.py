@@ -104,18 +104,13 @@ def _systems(others: SETS) -> tuple[dict[int, str], set[int]]:
                 names[number] = name.strip()
                 A = np.array([x for row in rows for x in _columns(row, width)]).reshape(-1, 3)
                 if kind == "18":
-                    is_same = reference in same | {number} and _along_axes(A)
+                    along = A[1, 0] > 0 and A[2, 2] > 0 and not (A[0].any() or A[1, 2])
+                    is_same = reference in same | {number} and along and not A[1:, 1].any()
                 else:
                     is_same = np.array_equal(A, np.eye(4, 3))
                 if is_same and shape == CARTESIAN_TYPE:
                     same.add(number)
     return names, same
-
-
-def _along_axes(A: Array) -> bool:
-    return bool(
-        A[1, 0] > 0 and A[2, 2] > 0 and not A[0].any() and not A[1:, 1].any() and not A[1, 2]
-    )
 
 
 def _node(line: str, width: int) -> tuple[int, int, int, Array]:
