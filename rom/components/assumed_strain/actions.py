@@ -5,12 +5,13 @@ Source:
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import finite, is_number, positive, shortened, typed, whole
+from rom.arguments import Count, Length, Number, finite, is_number, shortened, typed, whole
 from rom.components.assumed_strain.triangles import Sheet, endless, sides_of, whole_numbers
 from rom.components.histories import History, straightened
 from rom.errors import ConfigError, MeshError
@@ -131,7 +132,7 @@ class Prepared:
     faces: Array
     first: Index
     friction: Array
-    names: tuple[str, ...] = field(default=())
+    names: tuple[str, ...]
 
     @property
     def forces(self) -> tuple[Array, Index, Array, Index]:
@@ -162,14 +163,16 @@ class Prepared:
 @typed
 def outer_sides(body: Sheet) -> Index:
     """(k, 2) nodes of the sides at the edge of a sheet, the solid on the left."""
-    T = body.triangles
-    every = sides_of(T)
-    alone = (body.patch[:, 3:] == T).T.ravel()
-    return every[alone]
+    return sides_of(body.triangles)[(body.patch[:, 3:] == body.triangles).T.ravel()]
 
 
 @typed
-def disc(center: npt.ArrayLike, radius: float, *, n: int = 120) -> Array:
+def disc(
+    center: Annotated[npt.ArrayLike, Number("m", (2,))],
+    radius: Length,
+    *,
+    n: Annotated[int, Count(3)] = 120,
+) -> Array:
     """(n, 2) corners of a round outline; flat between them, they lie on the circle [m].
 
     Args:
@@ -180,10 +183,8 @@ def disc(center: npt.ArrayLike, radius: float, *, n: int = 120) -> Array:
     Raises:
         ConfigError: for a radius that is not positive, or fewer than three corners.
     """
-    positive("radius [m]", radius)
-    whole("n", n, 3)
     angle = 2 * np.pi * np.arange(n) / n
-    return finite("center", center, (2,)) + radius * np.column_stack([np.cos(angle), np.sin(angle)])
+    return np.asarray(center) + radius * np.column_stack([np.cos(angle), np.sin(angle)])
 
 
 def prepared(body: Sheet, actions: Actions, span: tuple[float, float] = (0.0, 1.0)) -> Prepared:

@@ -6,8 +6,7 @@ import sys
 from mpi4py import MPI
 
 import rom
-
-STEEL = rom.Material(E=210e9, nu=0.3, rho=7850.0)
+from cases.solid import STEEL
 
 SIZE = {"lc": 0.0104}  # 12 edges round the bore
 
