@@ -151,13 +151,16 @@ def _fitted_slopes(
     for k, nodes in enumerate(parts):
         own[k] = np.isin(np.arange(len(X)), nodes)
     there &= own[part[:, None], near]
-    corners = _shared(body.triangles[two])
-    middle = X[corners].mean(axis=1)
-    size = np.linalg.norm(X[corners[:, 1]] - X[corners[:, 0]], axis=1)
+    one, other = np.moveaxis(body.triangles[two], 1, 0)
+    ends = X[one[(one[:, :, None] == other[:, None]).any(axis=2)].reshape(-1, 2)]
+    middle = ends.mean(axis=1)
+    size = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     slope, exact = _fit((X[near] - middle[:, None]) / size[:, None, None], there, normal[e])
     slope[~exact] = 0.0
     place = [(np.repeat(e, 12), near.ravel(), (slope / size[:, None]).ravel())]
-    joined = _joined(body)
+    at = (np.repeat(np.arange(len(body.triangles)), 3), body.triangles.ravel())
+    of = coo_matrix((np.ones(at[0].size), at), shape=(len(body.triangles), len(X))).tocsr()
+    joined = (of.T @ of).tocsr()  # nodes that share a triangle
     for k in np.flatnonzero(~exact):
         found = _wider_fit(X, joined, own[part[k]], near[k][there[k]], middle[k], normal[e[k]])
         place.append((np.full(found[0].size, e[k]), *found))
@@ -171,12 +174,6 @@ def _part_of_sides(body: Sheet, side: Index, parts: tuple[Index, ...]) -> Index:
     for k, nodes in enumerate(parts):
         part[side[np.isin(body.triangles, nodes).all(axis=1)]] = k
     return part
-
-
-def _shared(pair: Index) -> Index:
-    """(s, 2) corners that both of two triangles (s, 2, 3) have."""
-    common = (pair[:, 0, :, None] == pair[:, 1, None, :]).any(axis=2)
-    return pair[:, 0][common].reshape(-1, 2)
 
 
 def _wider_fit(
@@ -210,11 +207,3 @@ def _fit(x: Array, there: Mask, normal: Array) -> tuple[Array, Mask]:
     of_second = np.linalg.pinv(rest, rcond=QUADRATIC_RTOL)
     data = of_plane @ (np.eye(x.shape[1]) - second @ of_second)
     return (normal[:, None, :] @ data[:, 1:])[:, 0] * weight, exact
-
-
-def _joined(body: Sheet) -> csr_matrix:
-    """(n, n) nodes that share a triangle."""
-    t = len(body.triangles)
-    place = (np.repeat(np.arange(t), 3), body.triangles.ravel())
-    of = coo_matrix((np.ones(3 * t), place), shape=(t, len(body.points))).tocsr()
-    return (of.T @ of).tocsr()

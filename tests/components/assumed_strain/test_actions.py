@@ -26,8 +26,7 @@ from rom.components.assumed_strain import (
     sheet,
     tangent,
 )
-from rom.components.assumed_strain.actions import prepared
-from rom.components.assumed_strain.contact import touch
+from rom.components.assumed_strain.actions import prepared, touch
 from rom.components.assumed_strain.implicit import _Way
 from rom.components.masonry import Table, sine
 from rom.errors import ConfigError, MeshError, RomWarning, SolverError

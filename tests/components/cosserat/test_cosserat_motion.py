@@ -259,7 +259,6 @@ def test_bad_runs_are_refused_and_lost_ones_kept():
     one = straight(1.0, 4, stretch=1e3, bend=1.0, mass=1.0, inertia=1e-3)
     load, words = (np.zeros((4, 3)), np.zeros((6, 3))), r"shapes \(\(4, 3\), \(6, 3\)\) and 33 dofs"
     refuses(ConfigError, words, simulate, one, 1.0, 0.1, load=load)
-    refuses(ConfigError, r"rho_inf = 1\.5 must be", simulate, one, 1.0, 0.1, rho_inf=1.5)
     with pytest.raises(SolverError, match="did not converge") as error:
         simulate(one, 100.0, 10.0, load=loads(one, tip=(1e4, 0, 0)))
     t = error.value.solution.t

@@ -1,6 +1,5 @@
 """Loads, moving supports and earthquakes on stones: statics, closed forms of pulses, limits."""
 
-from dataclasses import replace
 from functools import partial
 from itertools import combinations, product
 
@@ -437,8 +436,6 @@ test_what_is_no_masonry_and_no_action_is_named_where_it_is_made = refused(
     (lambda: stone(box()[[0, 0, 1, 2, 3]], **SOFT), "corner 0 is listed twice"),
     (lambda: Masonry((), (), 1e9, 0.5), "all of 0 stones are held"),
     (lambda: Masonry((stone(box(), **SOFT),), (0,), 1e9, 0.5), "all of 1 stones are held"),
-    (lambda: replace(ONE, gravity=(0.0, 0.0, -9.81)), "gravity = .* a row of 2"),
-    (lambda: simulate(ONE, t_end=1.0, dt=0.1, actions=BaseMotion(1.0)), "actions = "),
     (lambda: simulate(ONE, t_end=1.0, dt=0.1, v=np.full((1, 6), np.nan)), "v = .* must be finite"),
     error=(ConfigError, ModelError),
 )  # fmt: skip
@@ -461,11 +458,7 @@ test_histories_with_gaps_are_named = refused(
     (lambda: Table([0.0, 0.0], [0.0, 1.0]), "must grow: 0.0 s comes before 0.0 s"),
     (lambda: Table([0.0], [1.0]), "two or more of each"),
     (lambda: masonry.recorded([0.0, 0.1, 0.2, 0.5, 0.6], np.zeros(5)), "gap from 0.2 s to 0.5 s"),
-    (lambda: sine(1.0, 0.0), "period = "),
-    (lambda: masonry.rectangle(1.0, -1.0), "duration = "),
-    (lambda: ramp(0.0), "duration = 0 must be positive"),
     (lambda: masonry.minimum_thickness(half_angle=np.radians(140)), "nor so far round"),
-    (lambda: arch(10, 5.0, 0.5, half_angle=3.2), "must be"),
     error=ConfigError,
 )
 
