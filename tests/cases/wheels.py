@@ -13,6 +13,8 @@ MARKS = [  # of modules on wheels of finite elements
     pytest.mark.filterwarnings("ignore::rom.errors.RomWarning"),
     pytest.mark.filterwarnings("ignore:Number of integration points"),
 ]
+# of a brick in a grid: its lower corners, then the upper ones
+BRICK = [(*c, s) for s in (0, 1) for c in ((0, 0), (0, 1), (1, 1), (1, 0))]
 
 
 def mass_ring(N, k=3.0e5, coupling=0.7e5, m=0.4):
@@ -132,10 +134,6 @@ def bladed_mesh(  # noqa: PLR0913  one keyword per size
                    "cyclic_high": quads_of(number[-1, : along + 1])}  # fmt: skip
     names = {1: "disk", 2: "blade"} if up else {1: "disk"}
     return _meshed(points, cubes, regions, names, facets)
-
-
-# of a brick in a grid: its lower corners, then the upper ones
-BRICK = [(*c, s) for s in (0, 1) for c in ((0, 0), (0, 1), (1, 1), (1, 0))]
 
 
 def _meshed(points, cubes, regions, names, facets):

@@ -39,6 +39,7 @@ ODD = {  # some take one of these
     "halves": np.full((9, 2), 0.5), "far": [10**6], "minus one": [-1],
 }  # fmt: skip
 
+SOLID = {"body": BODY, "metal": METAL}
 CALLS = {  # a call that works, and its arguments
     "sheet": (sheet, {"points": X, "triangles": T, "element": "F3", "state": "plane stress",
                       "thickness": 1.0}),
@@ -46,22 +47,17 @@ CALLS = {  # a call that works, and its arguments
                               "diagonal": "/"}),
     "disc": (sheets.disc, {"center": (0, 0), "radius": 1.0, "n": 8}),
     "outer_sides": (sheets.outer_sides, {"body": BODY}),
-    "forces": (sheets.forces, {"body": BODY, "metal": METAL, "x": X, "history": HISTORY}),
-    "tangent": (sheets.tangent, {"body": BODY, "metal": METAL, "x": X, "history": HISTORY}),
-    "mass": (sheets.mass, {"body": BODY, "metal": METAL}),
-    "stiffness_by_sides": (sheets.stiffness_by_sides, {"body": BODY, "metal": METAL,
-                                                      "share": (0, 1)}),
-    "in_space": (sheets.in_space, {"body": BODY, "metal": METAL,
-                                   "interfaces": {"all": np.arange(9)}}),
-    "fly": (sheets.fly, {"body": BODY, "metal": METAL, "v": 0 * X, "held": LOW, "t_end": 0.1,
-                         "pictures": 3, "actions": WITH_TOOL}),
-    "equilibrium": (sheets.equilibrium, {"body": BODY, "metal": METAL, "load": 0.001 + 0 * X,
-                                         "held": LOW, "steps": 1}),
-    "quasi_static": (sheets.quasi_static, {"body": BODY, "metal": METAL, "actions": WITH_TOOL,
-                                           "times": [0.0, 1.0]}),
-    "implicit_motion": (sheets.implicit_motion, {
-        "body": BODY, "metal": METAL, "actions": WITH_TOOL, "times": [0.0, 1.0], "v": 0 * X,
-        "rho_inf": 0.5}),
+    "forces": (sheets.forces, SOLID | {"x": X, "history": HISTORY}),
+    "tangent": (sheets.tangent, SOLID | {"x": X, "history": HISTORY}),
+    "mass": (sheets.mass, SOLID),
+    "stiffness_by_sides": (sheets.stiffness_by_sides, SOLID | {"share": (0, 1)}),
+    "in_space": (sheets.in_space, SOLID | {"interfaces": {"all": np.arange(9)}}),
+    "fly": (sheets.fly, SOLID | {"v": 0 * X, "held": LOW, "t_end": 0.1, "pictures": 3,
+                                 "actions": WITH_TOOL}),
+    "equilibrium": (sheets.equilibrium, SOLID | {"load": 0.001 + 0 * X, "held": LOW, "steps": 1}),
+    "quasi_static": (sheets.quasi_static, SOLID | {"actions": WITH_TOOL, "times": [0.0, 1.0]}),
+    "implicit_motion": (sheets.implicit_motion, SOLID | {
+        "actions": WITH_TOOL, "times": [0.0, 1.0], "v": 0 * X, "rho_inf": 0.5}),
     "Metal": (Metal, {"E": 1.0, "nu": 0.3, "rho": 1.0, "yield_stress": 1.0, "hardening": 0.0,
                       "linear": False}),
 }  # fmt: skip
