@@ -154,7 +154,8 @@ class Linkage(ABC):
     @property
     def _links(self) -> tuple[Link, ...]:
         """All links in the order of the attributes, couplers last."""
-        parts = (getattr(self, name) for name in self.__slots__)
+        names: tuple[str, ...] = self.__slots__
+        parts = (getattr(self, name) for name in names)
         each = (part if isinstance(part, tuple) else (part,) for part in parts)
         return tuple(link for part in each for link in part if isinstance(link, Link))
 

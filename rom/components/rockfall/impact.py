@@ -352,7 +352,10 @@ def scaled(g: Gallery, factors: dict[str, float]) -> Gallery:
             raise ConfigError(f"{name} needs a cushion of type Layer.")
         kind = "modulus" if isinstance(g.cushion, Layer) else "stiffness"
         part, _, number = path.format(stiffness=kind).rpartition(".")
-        record = getattr(g, part) if part else g
-        record = replace(record, **{number: factor**power * getattr(record, number)})
-        g = replace(g, **{part: record}) if part else record
+        if part:
+            record = getattr(g, part)
+            changed = replace(record, **{number: factor**power * getattr(record, number)})
+            g = replace(g, **{part: changed})
+        else:
+            g = replace(g, **{number: factor**power * getattr(g, number)})
     return g

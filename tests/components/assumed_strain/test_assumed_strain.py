@@ -394,7 +394,6 @@ def test_plane_matrices_reduce_as_they_are():
 X, T = distorted((2, 2))
 SMALL, SOFT = sheet(X, T), Metal(1.0, 0.3)
 
-
 test_messages_name_what_is_wrong = refused(
     (lambda: Metal(1.0, 0.5), MaterialError, "no solid is .*nu=0.5.* nu < 0.5"),
     (lambda: Metal(-1.0, 0.3), MaterialError, "E, rho, yield_stress > 0"),

@@ -8,7 +8,7 @@ from numpy.polynomial import Polynomial
 from numpy.testing import assert_allclose
 from scipy.linalg import eigh
 
-from cases.components.rods import ALONG_X
+from cases.components.rods import ALONG_X, moved
 from cases.refusals import refuses
 from rom import rotation
 from rom.components import cosserat
@@ -201,10 +201,7 @@ def test_forces_of_steady_rotation_have_their_tangent():
     n = len(K)
 
     def forces(d):
-        rows = np.append(d, np.zeros(3)).reshape(-1, 6)
-        p = [rotation.multiply(q, rotation.exp(e)) for q, e in zip(shape.p, rows[:, :3],
-                                                                  strict=True)]  # fmt: skip
-        there = type(shape)(shape.x + rows[:-1, 3:], np.array(p))
+        there = moved(shape, d)
         return cosserat.linearised(one, there, spin=spin)[0] - cosserat.linearised(one, there)[0]
 
     d = rng.normal(size=n)

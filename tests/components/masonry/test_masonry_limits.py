@@ -177,7 +177,6 @@ test_what_cannot_be_laid_is_refused = refused(
     error=ConfigError,
 )
 
-
 CONCRETE = {"E": 3e10, "nu": 0.2, "rho": 2400.0}
 # slenderness: coefficient of restitution over Housner's, measured by ElGawady, Ma, Butterworth and
 # Ingham, "Effects of interface material on the dynamic behaviour of rigid blocks" (abstract)

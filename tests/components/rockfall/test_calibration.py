@@ -101,7 +101,6 @@ def elastic():
 T = np.linspace(0, 0.1, 50)
 GAP = np.r_[T[:20], T[30:]]
 
-
 test_bad_histories_are_named = refused(
     (lambda: History(GAP, np.sin(GAP)), ConfigError, r"gap from 0.0387\d+ s to 0.0612\d+ s"),
     (lambda: History(T, np.where(T == T[7], np.nan, 1.0)), ConfigError, "value 7 is"),
