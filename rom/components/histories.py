@@ -250,8 +250,7 @@ def values_at(name: str, history: History, t: Array) -> Array:
     Raises:
         ConfigError: if it gives anything but as many finite numbers.
     """
-    if isinstance(history, tuple | list):
-        times, values = corners_of(name, history)
-        return np.interp(t, times, values[:, 0])
-    given = history(t) if callable(history) else np.full(len(t), history)
-    return corners_of(name, (t, given))[1][:, 0]
+    if callable(history):
+        return corners_of(name, (t, history(t)))[1][:, 0]
+    times, values = straightened(name, history, (t[0], t[-1]))
+    return np.interp(t, times, values[:, 0])

@@ -23,8 +23,6 @@ from rom.components.transmission import Disc, Rotor, Shaft, Transmission, rest
 CELLS = (60, 4)
 FORCE_RTOL, MAX_ITERATIONS, MAX_PASSES = 1e-9, 30, 20
 LOADS, MAX_CORRECTIONS, MAX_STEP = (0.01, 0.03, 0.1, 0.25, 0.5, 1.0), 80, 0.1
-
-
 NODES = np.linspace(0, 0.2, 5)
 SPAN = 0.2
 SIZES = ((9.0, 6e-2, 1.3e-2), (60.0, 1.6, 3.0))  # mass, inertia across and about, if rigid

@@ -6,8 +6,6 @@ import rom
 from cases.solid import STEEL, block, reduced
 
 COUPLED = ((("left", "tip"), ("right", "root")),)
-
-
 ROOT = ("left", "root")
 
 

@@ -5,6 +5,11 @@ import numpy as np
 from rom.components.assumed_strain import Metal, in_space, rectangle, sheet
 
 
+def dofs(where, axes=(0, 1)):
+    """Of nodes, by a condition (n,), along some axes."""
+    return (2 * np.flatnonzero(where)[:, None] + np.array(axes)).ravel()
+
+
 def distorted(n=(4, 4), amount=0.25, seed=1):
     """Unit square whose inner nodes moved at random."""
     X, T = rectangle(n, [(0, 0), (1, 0), (1, 1), (0, 1)])

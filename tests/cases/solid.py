@@ -49,12 +49,13 @@ def block(size=(1.0, 0.1, 0.08), cells=(8, 2, 2), material=STEEL, origin=(0.0, 0
     nodes = np.array([[number[tuple(np.array(c) + s)] for s in steps] for c in np.ndindex(*cells)])
     K_e, M_e = brick(size / cells, material)
     dofs = (3 * nodes[:, :, None] + np.arange(3)).reshape(len(nodes), -1)
-    K = _assemble(dofs, K_e, 3 * len(points))
-    M = kron(_assemble(nodes, M_e, len(points)), identity(3), format="csr")
+    K = assembled(dofs, K_e, 3 * len(points))
+    M = kron(assembled(nodes, M_e, len(points)), identity(3), format="csr")
     faces = {"root": number[0], "tip": number[-1]}
     cell = size[1:] / cells[1:]
     interfaces = {name: _interface(name, face, points, cell) for name, face in faces.items()}
-    return FEModel(0.5 * (K + K.T), M, points, interfaces, surface=_surface(number))
+    surface = surface_of(np.take(number, end, axis) for axis in range(3) for end in (0, -1))
+    return FEModel(0.5 * (K + K.T), M, points, interfaces, surface=surface)
 
 
 def reduced(n_modes, model, **how):
@@ -74,17 +75,18 @@ def composite(materials, region, size=(1.0, 0.1, 0.08), cells=(8, 2, 2), origin=
         nodes = np.array([[number[tuple(np.array(c) + s)] for s in steps] for c in own])
         dofs = (3 * nodes[:, :, None] + np.arange(3)).reshape(len(nodes), -1)
         K_e, M_e = brick(np.array(size) / cells, material)
-        K = _assemble(dofs, K_e, plain.n_dofs)
-        M = kron(_assemble(nodes, M_e, plain.n_dofs // 3), identity(3), format="csr")
+        K = assembled(dofs, K_e, plain.n_dofs)
+        M = kron(assembled(nodes, M_e, plain.n_dofs // 3), identity(3), format="csr")
         regions[name] = Region(0.5 * (K + K.T), M)
     K, M = (sum(getattr(part, which) for part in regions.values()) for which in "KM")
     return replace(plain, K=K, M=M, regions=regions)
 
 
-def _assemble(dofs, block_, n):
+def assembled(dofs, blocks, n):
+    """(n, n) sum of blocks (k, k) at dofs (e, k), or of one for each."""
     k = dofs.shape[1]
     rows, columns = np.repeat(dofs, k, axis=1).ravel(), np.tile(dofs, (1, k)).ravel()
-    values = np.tile(block_.ravel(), len(dofs))
+    values = np.broadcast_to(blocks, (len(dofs), k, k)).ravel()
     return csr_matrix(coo_matrix((values, (rows, columns)), shape=(n, n)))
 
 
@@ -98,18 +100,19 @@ def _interface(name, face, points, cell):
         for i in range(face.shape[0] - 1)
         for j in range(face.shape[1] - 1)
     ]
-    S = _assemble(np.array(quads), quad, nodes.size)
+    S = assembled(np.array(quads), quad, nodes.size)
     return Interface(name, nodes, points[nodes], S, points[nodes].mean(axis=0))
 
 
-def _surface(number):
-    quads = []
-    for axis in range(3):
-        for end in (0, -1):
-            face = np.take(number, end, axis=axis)
-            corners = [face[:-1, :-1], face[1:, :-1], face[1:, 1:], face[:-1, 1:]]
-            quads.append(np.stack([c.ravel() for c in corners], axis=1))
-    quads = np.vstack(quads)
+def quads_of(face):
+    """(k, 4) corners of the cells of a grid of nodes."""
+    corners = face[:-1, :-1], face[1:, :-1], face[1:, 1:], face[:-1, 1:]
+    return np.stack([x.ravel() for x in corners], axis=1)
+
+
+def surface_of(faces):
+    """The surface of grids of nodes, each cell in two triangles."""
+    quads = np.vstack([quads_of(face) for face in faces])
     nodes = np.unique(quads)
     local = np.searchsorted(nodes, quads)
     return SurfaceMesh(nodes, np.vstack([local[:, [0, 1, 2]], local[:, [0, 2, 3]]]))

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_matrix, identity, kron
 
+from cases.solid import quads_of
 from rom.components.wheels.modes import cyclic_modes
 from rom.components.wheels.sector import CyclicSector
 
@@ -12,6 +13,8 @@ MARKS = [  # of modules on wheels of finite elements
     pytest.mark.filterwarnings("ignore::rom.errors.RomWarning"),
     pytest.mark.filterwarnings("ignore:Number of integration points"),
 ]
+# of a brick in a grid: its lower corners, then the upper ones
+BRICK = [(*c, s) for s in (0, 1) for c in ((0, 0), (0, 1), (1, 1), (1, 0))]
 
 
 def mass_ring(N, k=3.0e5, coupling=0.7e5, m=0.4):
@@ -102,9 +105,6 @@ def bladed_mesh(  # noqa: PLR0913  one keyword per size
         offset: shifts the nodes inside each sector, so that its faces have other nodes.
         twist: angle of the faces that changes with z [rad].
     """
-    from rom.fe.mesh.solid import SolidMesh
-    from rom.fe.mesh.validate import checked
-
     around, along, up, across = cells
     up = up if tip > rim else 0
     total, closed = around * sectors, sectors == N
@@ -120,33 +120,33 @@ def bladed_mesh(  # noqa: PLR0913  one keyword per size
     r = radii[j]
     points = np.stack([r * np.cos(phi), r * np.sin(phi), z], axis=-1).reshape(-1, 3)
     number = np.arange(len(points)).reshape(i.shape)
-    lower = [(0, 0, 0), (0, 1, 0), (1, 1, 0), (1, 0, 0)]
-    corners = [(*c[:2], s) for s in (0, 1) for c in lower]
     cubes, regions = [], []
     for c in np.ndindex(total, radii.size - 1, across):
         on_blade = c[1] >= along
         if on_blade and not blade[0] <= c[0] % around < blade[1]:
             continue
-        cubes.append([number[(c[0] + a) % columns, c[1] + b, c[2] + d] for a, b, d in corners])
+        cubes.append([number[(c[0] + a) % columns, c[1] + b, c[2] + d] for a, b, d in BRICK])
         regions.append(2 if on_blade else 1)
-    facets = {"bore": _quads(number[:, 0], closed)}
+    inside = number[:, 0]
+    facets = {"bore": quads_of(np.vstack([inside, inside[:1]]) if closed else inside)}
     if not closed:
-        facets |= {"cyclic_low": _quads(number[0, : along + 1]),
-                   "cyclic_high": _quads(number[-1, : along + 1])}  # fmt: skip
+        facets |= {"cyclic_low": quads_of(number[0, : along + 1]),
+                   "cyclic_high": quads_of(number[-1, : along + 1])}  # fmt: skip
+    names = {1: "disk", 2: "blade"} if up else {1: "disk"}
+    return _meshed(points, cubes, regions, names, facets)
+
+
+def _meshed(points, cubes, regions, names, facets):
+    """The bricks with the nodes that they use, tested."""
+    from rom.fe.mesh.solid import SolidMesh
+    from rom.fe.mesh.validate import checked
+
     used, cubes = np.unique(cubes, return_inverse=True)
     place = np.full(len(points), -1)
     place[used] = np.arange(used.size)
-    names = {1: "disk", 2: "blade"} if up else {1: "disk"}
-    return checked(SolidMesh(
-        points[used], cubes.reshape(-1, 8), "hex8", np.array(regions), names,
-        {name: place[quads] for name, quads in facets.items()},
-    ))  # fmt: skip
-
-
-def _quads(face, closed=False):
-    face = np.vstack([face, face[:1]]) if closed else face
-    corners = face[:-1, :-1], face[1:, :-1], face[1:, 1:], face[:-1, 1:]
-    return np.stack([c.ravel() for c in corners], axis=1)
+    facets = {name: place[quads] for name, quads in facets.items()}
+    mesh = points[used], cubes.reshape(-1, 8), "hex8", np.array(regions), names, facets
+    return checked(SolidMesh(*mesh))
 
 
 def revolved_mesh(N, r, z, solid, faces):
@@ -161,22 +161,17 @@ def revolved_mesh(N, r, z, solid, faces):
         solid: (radius, z of the middle of a cell) -> name of its region, or nothing.
         faces: {name: (z line, largest r)} of faces across the axis that are interfaces.
     """
-    from rom.fe.mesh.solid import SolidMesh
-    from rom.fe.mesh.validate import checked
-
     angle = 2 * np.pi / N
     i, j, k = np.meshgrid(np.arange(2), np.arange(len(r)), np.arange(len(z)), indexing="ij")
     R = np.asarray(r)[j] / np.sqrt(np.sin(angle) / angle)
     points = np.stack([R * np.cos(angle * i), R * np.sin(angle * i), np.asarray(z)[k]], axis=-1)
     number = np.arange(i.size).reshape(i.shape)
-    lower = [(0, 0, 0), (0, 1, 0), (1, 1, 0), (1, 0, 0)]
-    corners = [(*c[:2], s) for s in (0, 1) for c in lower]
     made = {c: solid((r[c[0]] + r[c[0] + 1]) / 2, (z[c[1]] + z[c[1] + 1]) / 2)
             for c in np.ndindex(len(r) - 1, len(z) - 1)}  # fmt: skip
     there = [c for c, name in made.items() if name]
     names = dict(enumerate(sorted({made[c] for c in there}), start=1))
     tags = {name: tag for tag, name in names.items()}
-    cubes = np.array([[number[a, j + b, k + d] for a, b, d in corners] for j, k in there])
+    cubes = np.array([[number[a, j + b, k + d] for a, b, d in BRICK] for j, k in there])
     quad = [(0, 0), (1, 0), (1, 1), (0, 1)]
     facets = {
         name: np.array([[number[side, j + b, k + d] for b, d in quad] for j, k in there])
@@ -186,14 +181,8 @@ def revolved_mesh(N, r, z, solid, faces):
         plane = int(np.argmin(abs(np.asarray(z) - at)))
         radial = [j for j in range(len(r) - 1) if r[j + 1] <= outside * (1 + 1e-9)]
         facets[name] = np.array([[number[a, j + b, plane] for a, b in quad] for j in radial])
-    used, cubes = np.unique(cubes, return_inverse=True)
-    place = np.full(i.size, -1)
-    place[used] = np.arange(used.size)
-    return checked(SolidMesh(
-        points.reshape(-1, 3)[used], cubes.reshape(-1, 8), "hex8",
-        np.array([tags[made[c]] for c in there]), names,
-        {name: place[quads] for name, quads in facets.items()},
-    ))  # fmt: skip
+    regions = [tags[made[c]] for c in there]
+    return _meshed(points.reshape(-1, 3), cubes, regions, names, facets)
 
 
 def bladed_model(N, sectors=1, degree=2, material=None, **sizes):

@@ -9,8 +9,8 @@ from scipy.sparse import csr_matrix
 
 import rom
 from cases.components.updating import refuse
-from cases.layers import KINDS, LAYERS, families, panel
 from cases.long import ROM_LONG, SHARED_BY
+from cases.panels import KINDS, LAYERS, family_of_layers, layered_panel
 from cases.paths import RANKS
 from cases.ranks.environment import written_on_each
 from cases.solid import STEEL, block, reduced
@@ -195,7 +195,7 @@ POINT = {"t_core": 1.5, "t_faces": 0.8}
 @pytest.mark.fenicsx
 def test_core_and_faces_of_a_panel_change_their_thickness():
     """The mesh of another thickness is the same mesh stretched."""
-    body, full = families(panel()).at(**POINT), panel(**POINT)
+    body, full = family_of_layers(layered_panel()).at(**POINT), layered_panel(**POINT)
     core, faces = 0.4 * 0.1 * 0.03 * 60.0, 0.4 * 0.1 * 0.0032 * 2700.0
     assert_allclose(body.mass, core + faces, rtol=1e-11)
     assert_allclose(body.first_moment, [0.2 * (core + faces), 0, 0], rtol=1e-10, atol=1e-12)
@@ -214,8 +214,8 @@ def test_core_and_faces_of_a_panel_change_their_thickness():
 @pytest.mark.fenicsx
 def test_faces_of_one_thickness_move_with_the_core():
     """Nothing stretches the faces, but the rigid motions of the whole change."""
-    family = family_of(panel(), {"t": rom.Thickness("core", 0.7, 1.8)}, 16, certify=False)
-    body, full = family.at(t=1.5), panel(t_core=1.5)
+    family = family_of(layered_panel(), {"t": rom.Thickness("core", 0.7, 1.8)}, 16, certify=False)
+    body, full = family.at(t=1.5), layered_panel(t_core=1.5)
     expected = rom.modes(full, 4, fixed=("root",), interfaces=KINDS).frequencies
     assert_allclose(body.frequencies(4, fixed=("root",)), expected, rtol=3e-3)
     assert_allclose(body.mass, full.mass(), rtol=1e-12)
@@ -224,7 +224,7 @@ def test_faces_of_one_thickness_move_with_the_core():
 @pytest.mark.fenicsx
 def test_the_terms_of_the_stiffness_are_those_of_the_stretched_mesh():
     parameters = LAYERS | {"E": rom.YoungsModulus("core", 0.5, 2.0)}
-    model, full = StretchedModel(panel(), parameters), panel(**POINT, E=1.6)
+    model, full = StretchedModel(layered_panel(), parameters), layered_panel(**POINT, E=1.6)
     ops = model.bare(POINT | {"E": 1.6})
     X = np.random.default_rng(2).standard_normal((full.n_dofs, 3))
     assert_allclose(model.model_at(POINT | {"E": 1.6}).points, full.points, atol=1e-12)

@@ -5,18 +5,20 @@ Source:
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import finite, is_number, positive, shortened, typed, whole
+from rom.arguments import Count, Length, Number, finite, is_number, shortened, typed, whole
 from rom.components.assumed_strain.triangles import Sheet, endless, sides_of, whole_numbers
 from rom.components.histories import History, straightened
 from rom.errors import ConfigError, MeshError
 from rom.model import Array, Index
 from rom.names import check_text
 
+SHEAR_RATIO = 0.1  # stiffness along a face before a node slides, over that across
 TOUCH_RTOL = 1e-6  # depth over the longest side of the outline that counts as touching at the start
 
 
@@ -131,7 +133,7 @@ class Prepared:
     faces: Array
     first: Index
     friction: Array
-    names: tuple[str, ...] = field(default=())
+    names: tuple[str, ...]
 
     @property
     def forces(self) -> tuple[Array, Index, Array, Index]:
@@ -159,17 +161,60 @@ class Prepared:
         return self.at(t)[self.table.shape[1] - 2 * tools :].reshape(tools, 2)
 
 
+@dataclass(frozen=True, slots=True)
+class Touch:
+    """What a tool does to nodes.
+
+    Attributes:
+        forces: (n, 2) on the nodes [N].
+        slip: (n,) elastic slip, which the friction holds [m].
+        entries: nodes (k,) and their stiffness (k, 2, 2) [N/m].
+    """
+
+    forces: Array
+    slip: Array
+    entries: tuple[Index, Array]
+
+
+def touch(
+    x: Array, moved: Array, slip: Array, faces: Array, friction: float, stiff: Array
+) -> Touch:
+    """Penalty of a tool of faces (f, 7), as `Prepared` has them, and friction by return mapping.
+
+    Positions x (n, 2) [m] are seen from the tool, along which they ``moved`` (n, 2) in this step,
+    with the elastic slip (n,) before it; ``stiff`` (n,) is the stiffness across a face [N/m].
+    """
+    gaps = np.einsum("nfa,fa->nf", x[:, None] - faces[:, :2], faces[:, 4:6])
+    face, depth = gaps.argmax(axis=1), np.maximum(-gaps.max(axis=1), 0.0)
+    along, normal, inside = faces[face, 2:4], faces[face, 4:6], depth > 0
+    pressed, hold = stiff * depth, SHEAR_RATIO * stiff
+    shear = -hold * np.where(inside, slip + (moved * along).sum(axis=1), 0.0)
+    limit = np.zeros(len(x))
+    limit[inside] = friction * pressed[inside]
+    slides = np.abs(shear) >= limit
+    shear[slides] = np.sign(shear[slides]) * limit[slides]
+    forces = pressed[:, None] * normal + shear[:, None] * along
+    i = np.flatnonzero(inside)
+    n, s, K = normal[i], along[i], stiff[i, None, None]
+    turn = np.where(slides[i], friction * np.sign(shear[i]), 0.0) if friction < np.inf else 0 * i
+    A = K * (n + turn[:, None] * s)[:, :, None] * n[:, None, :]
+    A = A + np.where(slides[i], 0.0, SHEAR_RATIO)[:, None, None] * K * s[:, :, None] * s[:, None, :]
+    return Touch(forces, -shear / hold, (i, A))
+
+
 @typed
 def outer_sides(body: Sheet) -> Index:
     """(k, 2) nodes of the sides at the edge of a sheet, the solid on the left."""
-    T = body.triangles
-    every = sides_of(T)
-    alone = (body.patch[:, 3:] == T).T.ravel()
-    return every[alone]
+    return sides_of(body.triangles)[(body.patch[:, 3:] == body.triangles).T.ravel()]
 
 
 @typed
-def disc(center: npt.ArrayLike, radius: float, *, n: int = 120) -> Array:
+def disc(
+    center: Annotated[npt.ArrayLike, Number("m", (2,))],
+    radius: Length,
+    *,
+    n: Annotated[int, Count(3)] = 120,
+) -> Array:
     """(n, 2) corners of a round outline; flat between them, they lie on the circle [m].
 
     Args:
@@ -180,10 +225,8 @@ def disc(center: npt.ArrayLike, radius: float, *, n: int = 120) -> Array:
     Raises:
         ConfigError: for a radius that is not positive, or fewer than three corners.
     """
-    positive("radius [m]", radius)
-    whole("n", n, 3)
     angle = 2 * np.pi * np.arange(n) / n
-    return finite("center", center, (2,)) + radius * np.column_stack([np.cos(angle), np.sin(angle)])
+    return np.asarray(center) + radius * np.column_stack([np.cos(angle), np.sin(angle)])
 
 
 def prepared(body: Sheet, actions: Actions, span: tuple[float, float] = (0.0, 1.0)) -> Prepared:

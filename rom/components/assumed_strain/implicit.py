@@ -15,8 +15,7 @@ from scipy.sparse.linalg import spsolve
 
 from rom.arguments import Count, Share, finite, typed
 from rom.components.assumed_strain import kernels
-from rom.components.assumed_strain.actions import Actions, Load, Prepared, nodal, prepared
-from rom.components.assumed_strain.contact import touch
+from rom.components.assumed_strain.actions import Actions, Load, Prepared, nodal, prepared, touch
 from rom.components.assumed_strain.motion import Metal, depth_of, forces, mass, tangent
 from rom.components.assumed_strain.triangles import Sheet, placed
 from rom.errors import ConfigError, SolverError, warn

@@ -19,9 +19,9 @@ from rom.components.assumed_strain.triangles import (
     STATES,
     Sheet,
     constant_gradients,
+    each_side,
     endless,
     placed,
-    sides_of,
 )
 from rom.errors import ConfigError, MaterialError, SolverError
 from rom.model import Array, Index
@@ -243,9 +243,11 @@ def stiffness_by_sides(body: Sheet, metal: Metal, *, share: tuple[int, int] = (0
     mine, of = share
     if not 0 <= mine < of or body.state == "axisymmetric":
         raise ConfigError(f"share {mine} of {of}, {body.state}: needed is a share of a plane one.")
-    triangles, there = (rows[mine::of] for rows in _triangles_at_sides(body.triangles))
+    _, _, places, inner = each_side(body.triangles)
+    triangles = places[mine::of] % len(body.triangles)
     G, area = constant_gradients(body.points, body.triangles)
-    parts = area[triangles] * there
+    parts = area[triangles]
+    parts[~inner[mine::of], 1] = 0.0  # at an edge there is but one
     whole = parts.sum(axis=1)
     gradient = (parts / whole[:, None])[..., None, None] * G[triangles, :3]
     B = _strains(gradient.reshape(-1, 6, 2))
@@ -254,17 +256,6 @@ def stiffness_by_sides(body: Sheet, metal: Metal, *, share: tuple[int, int] = (0
     nodes = body.triangles[triangles].reshape(-1, 6)  # some twice: their entries add up
     dofs = (2 * nodes[:, :, None] + np.arange(2)).reshape(-1, 12)
     return placed(K, dofs, dofs, 2 * len(body.points))
-
-
-def _triangles_at_sides(T: Index) -> tuple[Index, Array]:
-    """(m, 2) triangles at each side, and whether they are there; at an edge one is named twice."""
-    sides = np.sort(sides_of(T), axis=1)
-    side = np.unique(sides, axis=0, return_inverse=True)[1].ravel()
-    order, t = np.argsort(side, kind="stable"), np.tile(np.arange(len(T)), 3)
-    first = np.flatnonzero(np.diff(side[order], prepend=-1))
-    last = np.append(first[1:], side.size) - 1
-    pair = np.column_stack([t[order[first]], t[order[last]]])
-    return pair, np.column_stack([np.ones(len(pair)), last > first])
 
 
 def _strains(gradient: Array) -> Array:

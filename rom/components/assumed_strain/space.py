@@ -17,7 +17,7 @@ from scipy.sparse import coo_matrix, csr_matrix, eye, identity, kron, vstack
 
 from rom.arguments import typed
 from rom.components.assumed_strain.motion import Metal, mass, tangent
-from rom.components.assumed_strain.triangles import Sheet, placed, sides_of
+from rom.components.assumed_strain.triangles import Sheet, each_side, placed
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, FEModel, Index, Interface, Mask, SurfaceMesh
 
@@ -87,7 +87,7 @@ def bending(body: Sheet, metal: Metal, parts: tuple[Index, ...] = ()) -> csr_mat
     sides are fitted to their own nodes, so that a held part clamps the sheet where it ends.
     """
     n = len(body.points)
-    ends, side, inner = _sides(body.triangles)
+    ends, side, places, inner = each_side(body.triangles)
     B, normal = _curvatures(body, ends, side)
     nu, D = metal.nu, metal.E * body.thickness**3 / 12 / (1 - metal.nu**2)
     law = D * np.array([[1, nu, 0], [nu, 1, 0], [0, 0, (1 - nu) / 2]])
@@ -96,15 +96,8 @@ def bending(body: Sheet, metal: Metal, parts: tuple[Index, ...] = ()) -> csr_mat
         _free_slopes(K[t], 3 + np.flatnonzero(~inner[side[t]]))
     dofs = np.hstack([body.triangles, n + side])
     whole = placed(K, dofs, dofs, n + len(ends))
-    slopes = vstack([eye(n), _fitted_slopes(body, side, inner, normal, parts)], "csr")
+    slopes = vstack([eye(n), _fitted_slopes(body, side, places, inner, normal, parts)], "csr")
     return (slopes.T @ whole @ slopes).tocsr()
-
-
-def _sides(T: Index) -> tuple[Index, Index, Array]:
-    """Ends (s, 2) of each side, the side (t, 3) opposite to each corner, and which are inner."""
-    every = np.sort(sides_of(T), axis=1)
-    ends, side, count = np.unique(every, axis=0, return_inverse=True, return_counts=True)
-    return ends, side.reshape(3, len(T)).T, count == 2
 
 
 def _curvatures(body: Sheet, ends: Index, side: Index) -> tuple[Array, Array]:
@@ -142,12 +135,15 @@ def _free_slopes(K: Array, free: Index) -> None:
 
 
 def _fitted_slopes(
-    body: Sheet, side: Index, inner: Array, normal: Array, parts: tuple[Index, ...]
+    body: Sheet,
+    side: Index,
+    places: Index,
+    inner: Mask,
+    normal: Array,
+    parts: tuple[Index, ...],
 ) -> csr_matrix:
     """(s, n) normal slope of each inner side from deflections [1/m]; nothing at an edge."""
-    e, X, order = np.flatnonzero(inner), body.points, np.argsort(side, axis=None, kind="stable")
-    first = np.searchsorted(side.ravel()[order], e)
-    two = order[np.column_stack([first, first + 1])] // 3
+    e, X, two = np.flatnonzero(inner), body.points, places[inner] % len(body.triangles)
     near = np.sort(body.patch[two].reshape(-1, 12), axis=1)
     there = np.diff(near, axis=1, prepend=-1) > 0
     part = _part_of_sides(body, side, parts)[e]
@@ -155,13 +151,16 @@ def _fitted_slopes(
     for k, nodes in enumerate(parts):
         own[k] = np.isin(np.arange(len(X)), nodes)
     there &= own[part[:, None], near]
-    corners = _shared(body.triangles[two])
-    middle = X[corners].mean(axis=1)
-    size = np.linalg.norm(X[corners[:, 1]] - X[corners[:, 0]], axis=1)
+    one, other = np.moveaxis(body.triangles[two], 1, 0)
+    ends = X[one[(one[:, :, None] == other[:, None]).any(axis=2)].reshape(-1, 2)]
+    middle = ends.mean(axis=1)
+    size = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     slope, exact = _fit((X[near] - middle[:, None]) / size[:, None, None], there, normal[e])
     slope[~exact] = 0.0
     place = [(np.repeat(e, 12), near.ravel(), (slope / size[:, None]).ravel())]
-    joined = _joined(body)
+    at = (np.repeat(np.arange(len(body.triangles)), 3), body.triangles.ravel())
+    of = coo_matrix((np.ones(at[0].size), at), shape=(len(body.triangles), len(X))).tocsr()
+    joined = (of.T @ of).tocsr()  # nodes that share a triangle
     for k in np.flatnonzero(~exact):
         found = _wider_fit(X, joined, own[part[k]], near[k][there[k]], middle[k], normal[e[k]])
         place.append((np.full(found[0].size, e[k]), *found))
@@ -175,12 +174,6 @@ def _part_of_sides(body: Sheet, side: Index, parts: tuple[Index, ...]) -> Index:
     for k, nodes in enumerate(parts):
         part[side[np.isin(body.triangles, nodes).all(axis=1)]] = k
     return part
-
-
-def _shared(pair: Index) -> Index:
-    """(s, 2) corners that both of two triangles (s, 2, 3) have."""
-    common = (pair[:, 0, :, None] == pair[:, 1, None, :]).any(axis=2)
-    return pair[:, 0][common].reshape(-1, 2)
 
 
 def _wider_fit(
@@ -214,11 +207,3 @@ def _fit(x: Array, there: Mask, normal: Array) -> tuple[Array, Mask]:
     of_second = np.linalg.pinv(rest, rcond=QUADRATIC_RTOL)
     data = of_plane @ (np.eye(x.shape[1]) - second @ of_second)
     return (normal[:, None, :] @ data[:, 1:])[:, 0] * weight, exact
-
-
-def _joined(body: Sheet) -> csr_matrix:
-    """(n, n) nodes that share a triangle."""
-    t = len(body.triangles)
-    place = (np.repeat(np.arange(t), 3), body.triangles.ravel())
-    of = coo_matrix((np.ones(3 * t), place), shape=(t, len(body.points))).tocsr()
-    return (of.T @ of).tocsr()

@@ -6,18 +6,19 @@ Source:
 """
 
 from dataclasses import dataclass
+from typing import Annotated, Literal
 
 import numpy as np
 import numpy.typing as npt
 from scipy.sparse import coo_matrix, csr_matrix
 
-from rom.arguments import finite, one_of, positive, shortened, typed
+from rom.arguments import Count, Length, Number, finite, shortened, typed
 from rom.errors import ConfigError, MeshError
-from rom.model import Array, Index
+from rom.model import Array, Index, Mask
 
 STATES = {"plane stress": 0, "plane strain": 1, "axisymmetric": 2}
+Divisions = Annotated[int, Count(1)]  # of a side
 LARGEST_WHOLE = 2**53  # up to which floats tell all whole numbers apart
-ELEMENTS = ("CST", "F1", "F3")  # constant strain; one point of mean metric; three points
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,16 +59,17 @@ def sheet(
     points: npt.ArrayLike,
     triangles: npt.ArrayLike,
     *,
-    element: str = "F3",
-    state: str = "plane stress",
-    thickness: float = 1.0,
+    element: Literal["CST", "F1", "F3"] = "F3",
+    state: Literal["plane stress", "plane strain", "axisymmetric"] = "plane stress",
+    thickness: Length = 1.0,
 ) -> Sheet:
     """Prepare a mesh.
 
     Args:
         points: (n, 2) coordinates [m].
         triangles: (t, 3) corners, numbers of points, counter-clockwise.
-        element: "F3" for elastic and modal work, "F1" for plastic flow without locking, "CST".
+        element: "F3", of three points, for elastic and modal work, "F1", of one point of mean
+            metric, for plastic flow without locking, "CST", of constant strain.
         state: "plane stress", "plane strain" or "axisymmetric" (first axis is the radius).
         thickness: of a plane solid [m].
 
@@ -76,9 +78,6 @@ def sheet(
         MeshError: if a triangle is turned over or names no point, a point has no triangle, a side
             belongs to three, or a radius is negative.
     """
-    one_of("element", element, ELEMENTS)
-    one_of("state", state, STATES)
-    positive("thickness [m]", thickness)
     X, T = finite("points", points, None), whole_numbers("triangles", triangles)
     _refuse_no_mesh(X, T, state)
     constant, area = constant_gradients(X, T)
@@ -158,18 +157,27 @@ def sides_of(T: Index) -> Index:
     return np.vstack([T[:, [1, 2]], T[:, [2, 0]], T[:, [0, 1]]])
 
 
-def _opposite(T: Index) -> Index:
-    """(t, 3) the node behind the side opposite to each corner; -1 on the boundary."""
-    sides = np.sort(sides_of(T), axis=1)
-    corner, t = T.T.ravel(), len(T)
-    _, place, count = np.unique(sides, axis=0, return_inverse=True, return_counts=True)
+def each_side(T: Index) -> tuple[Index, Index, Index, Mask]:
+    """Each of s sides once: its ends, the sides of triangles, where it is, and which are inner.
+
+    Ends (s, 2) ascend; (t, 3) is the side opposite to each corner; (s, 2) are its places among
+    `sides_of`, one place twice at an edge.
+    """
+    every = np.sort(sides_of(T), axis=1)
+    ends, side, count = np.unique(every, axis=0, return_inverse=True, return_counts=True)
     if count.max() > 2:
         raise MeshError(f"a side belongs to {count.max()} triangles; at most two may meet.")
-    order = np.argsort(place.ravel(), kind="stable")
-    twin = np.flatnonzero(np.diff(place.ravel()[order]) == 0)
-    found = np.full(3 * t, -1)
-    found[order[twin]], found[order[twin + 1]] = corner[order[twin + 1]], corner[order[twin]]
-    return found.reshape(3, t).T
+    last = np.cumsum(count) - 1
+    places = np.argsort(side.ravel(), kind="stable")[np.column_stack([last - count + 1, last])]
+    return ends, side.reshape(3, len(T)).T, places, count == 2
+
+
+def _opposite(T: Index) -> Index:
+    """(t, 3) the node behind the side opposite to each corner; -1 on the boundary."""
+    _, _, places, inner = each_side(T)
+    found = np.full(T.size, -1)
+    found[places[inner]] = T.T.ravel()[places[inner][:, ::-1]]
+    return found.reshape(3, len(T)).T
 
 
 def _side_gradients(X: Array, patch: Index, constant: Array, k: int) -> Array:
@@ -191,7 +199,9 @@ def _side_gradients(X: Array, patch: Index, constant: Array, k: int) -> Array:
 
 @typed
 def rectangle(
-    n: tuple[int, int], corners: npt.ArrayLike, diagonal: str = "/"
+    n: tuple[Divisions, Divisions],
+    corners: Annotated[npt.ArrayLike, Number("m", (4, 2))],
+    diagonal: Literal["/", "\\", "x"] = "/",
 ) -> tuple[Array, Index]:
     """Points and triangles of a quadrilateral.
 
@@ -209,12 +219,10 @@ def rectangle(
     Raises:
         ConfigError: for fewer than one division, other corners, or another way to split.
     """
-    if min(n) < 1 or diagonal not in ("/", "\\", "x"):
-        raise ConfigError(f'n = {n}, diagonal = {diagonal!r}: at least 1, and "/", "\\\\" or "x".')
     s, t = (np.linspace(0, 1, k + 1) for k in n)
-    C = finite("corners", corners, (4, 2))
     a, b = (x.ravel() for x in np.meshgrid(s, t))
-    X = np.column_stack([(1 - a) * (1 - b), a * (1 - b), a * b, (1 - a) * b]) @ C
+    shares = np.column_stack([(1 - a) * (1 - b), a * (1 - b), a * b, (1 - a) * b])
+    X = shares @ np.asarray(corners, dtype=float)
     i = (np.arange(n[1])[:, None] * (n[0] + 1) + np.arange(n[0])).ravel()
     p, q, r, u = i, i + 1, i + n[0] + 2, i + n[0] + 1
     if diagonal == "x":

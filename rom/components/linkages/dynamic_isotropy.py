@@ -27,9 +27,8 @@ from rom.arguments.quantities import Count, Positive
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.model import Array, Index
 
-Assembles = Callable[
-    [Array, Array], npt.ArrayLike
-]  # angles of equal shape (...) -> (...) true or false
+# angles of equal shape (...) -> (...) true or false
+Assembles = Callable[[Array, Array], npt.ArrayLike]
 Inertia = Callable[[Array, Array], Array]  # angles of equal shape (...) -> (..., 2, 2)
 Range = tuple[float, float] | None  # of a coordinate [rad or m]; None: a whole turn
 Ranges = tuple[Range, Range]

@@ -116,11 +116,7 @@ def friction_of_pairs(joints: Sequence[Joint], friction: float, n: int) -> Array
     """
     found = np.full((n, n), float(friction))
     for joint in joints:
-        rows = _pairs(joint, n)
-        if rows is None:
-            found[:] = joint.friction
-        else:
-            found[rows[:, 0], rows[:, 1]] = found[rows[:, 1], rows[:, 0]] = joint.friction
+        found[_pairs(joint, n)] = joint.friction
     return found
 
 
@@ -134,16 +130,14 @@ def bonds(joints: Sequence[Joint], C: Contacts, corners: Array, n: int, reach: f
     """
     strength = np.zeros((n, n, 2))
     for joint in joints:
-        rows = _pairs(joint, n)
-        i, j = (slice(None), slice(None)) if rows is None else np.vstack([rows, rows[:, ::-1]]).T
-        strength[i, j] = joint.tension, joint.cohesion
+        strength[_pairs(joint, n)] = joint.tension, joint.cohesion
     pairs = np.sort(C.who[:, [0, 2]], axis=1)
     close = np.abs(C.gap) < BOND_GAP_RATIO * reach
     length = np.zeros(len(pairs))
     for pair in np.unique(pairs[close], axis=0):
         at = np.flatnonzero(close & (pairs == pair).all(axis=1))
         length[at] = _shares(corners[C.who[at, 1]])
-    _check_touch(joints, pairs[length > 0], n)
+    _check_touch(joints, pairs[length > 0])
     pull, cohesion = length * strength[C.who[:, 0], C.who[:, 2]].T
     kept = (pull > 0) | (cohesion > 0)
     return Bonds(C.who[kept], pull[kept], cohesion[kept], np.ones(int(kept.sum()), dtype=np.int64))
@@ -162,20 +156,20 @@ def _shares(x: Array) -> Array:
     return np.asarray(span * (np.diff(ends) / count)[which])
 
 
-def _pairs(joint: Joint, n: int) -> Index | None:
+def _pairs(joint: Joint, n: int) -> tuple[Index | slice, Index | slice]:
+    """Where the pairs of a joint stand in a table (n, n) of stones, in both orders."""
     if joint.between is None:
-        return None
+        return slice(None), slice(None)
     rows = np.array(joint.between, dtype=np.int64).reshape(-1, 2)
     if rows.size and not (0 <= rows.min() and rows.max() < n and (rows[:, 0] != rows[:, 1]).all()):
         raise ConfigError(f"a joint is between {joint.between}; use stones from 0 to {n - 1}.")
-    return rows
+    return np.append(rows[:, 0], rows[:, 1]), np.append(rows[:, 1], rows[:, 0])
 
 
-def _check_touch(joints: Sequence[Joint], touching: Index, n: int) -> None:
+def _check_touch(joints: Sequence[Joint], touching: Index) -> None:
     there = {tuple(pair) for pair in touching.tolist()}
     for joint in joints:
-        rows = _pairs(joint, n) if joint.cohesion or joint.tension else None
-        for pair in [] if rows is None else np.sort(rows, axis=1).tolist():
-            if tuple(pair) not in there:
+        for pair in (joint.between if joint.cohesion or joint.tension else None) or ():
+            if tuple(sorted(pair)) not in there:
                 text = f"stones {pair[0]} and {pair[1]} do not touch along an edge at the start."
                 raise ConfigError(text, hint="Name pairs that touch, or lay them closer.")

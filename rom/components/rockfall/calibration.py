@@ -143,7 +143,9 @@ def calibrate(
         return np.concatenate([r / d for r, d in zip(residuals(x), deviations, strict=True)])
 
     x, scales = np.zeros(len(names)), [float(np.abs(h.values).max()) for _, h in pieces]
-    bounds = _bounds(g, names)
+    most = np.log(MAX_FACTOR)  # of a logarithm; nothing gives back more than it takes
+    limits = {"recovery of the cushion": min(most, 1e-9 - np.log(g.cushion.recovery))}
+    bounds = np.full(len(names), -most), np.array([limits.get(name, most) for name in names])
     for weights in (scales, None):  # by size first, by scatter then
         sizes = weights or _scatter(residuals(x), pieces, len(names))
         fit = least_squares(weighed, x, "3-point", bounds, args=(sizes,), diff_step=DERIVATIVE_STEP)
@@ -177,13 +179,6 @@ def _scatter(left: list[Array], pieces: list[tuple[str, History]], n: int) -> li
         h.deviation or float(np.sqrt((r**2).mean() * total / max(total - n, 1))) + 1e-12
         for r, (_, h) in zip(left, pieces, strict=True)
     ]
-
-
-def _bounds(g: Gallery, names: Names) -> tuple[Array, Array]:
-    """Logarithms of the factors; nothing gives back more than it takes."""
-    most = np.log(MAX_FACTOR)
-    limits = {"recovery of the cushion": min(most, 1e-9 - np.log(g.cushion.recovery))}
-    return np.full(len(names), -most), np.array([limits.get(name, most) for name in names])
 
 
 def _covariance(J: Array, x: Array, names: Names, bounds: tuple[Array, Array]) -> Array:

@@ -53,18 +53,15 @@ class Resistance(ABC):
         def missing(d: float) -> float:
             return float(quad(lambda x: kernels.cushion(x, x, law), low, d)[0]) - left
 
-        for high in self._marks():
+        halves = 2.0 ** -np.arange(1, 31)  # marks that close in on the limit, or grow without one
+        marks = 1e-3 / halves if self.limit == np.inf else self.limit * (1 - halves)
+        for high in marks:
             if (rest := missing(high)) >= 0:
                 return float(brentq(missing, low, high))
             low, left = high, -rest
         text = f"energy = {energy:.3g} J: the cushion takes up {energy - left:.3g} J before it is"
         hint = "Take a thicker or a stiffer one."
         raise ConfigError(f"{text} pressed through to {self.limit:g} m.", hint=hint)
-
-    def _marks(self) -> Array:
-        """Penetrations that close in on the limit, or grow without one."""
-        halves = 2.0 ** -np.arange(1, 31)
-        return 1e-3 / halves if self.limit == np.inf else self.limit * (1 - halves)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,10 +1,10 @@
 """Families of steel blocks to be updated, and their tests with noise."""
 
 import numpy as np
-import pytest
 from numpy.testing import assert_allclose
 
 import rom
+from cases.refusals import refuses
 from cases.solid import STEEL, composite
 from rom.components.updating.family_model import Parts, family_model
 from rom.components.updating.frf_data import estimators, noisy
@@ -25,8 +25,7 @@ PARAMETERS = {
 def refuse(*rows, error=ConfigError):
     """See that each call is refused: the call, the class where it is another one, and words."""
     for call, *kind, words in rows:
-        with pytest.raises(*kind or [error], match=words):
-            call()
+        refuses(*kind or [error], words, call)
 
 
 def crossed(points, bodies=None):

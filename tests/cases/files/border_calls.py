@@ -4,7 +4,7 @@ import inspect
 import os
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
-from functools import cache
+from functools import cache, partial
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -76,9 +76,17 @@ def mechanism_file():
         return rom.read_mechanism(path)
 
 
-@cache
-def model():
-    return block(cells=(3, 1, 1))
+model = cache(lambda: block(cells=(3, 1, 1)))
+behind = cache(lambda: block(cells=(3, 1, 1), origin=(1.0, 0.0, 0.0)))  # that block
+body = cache(lambda: reduced(3, model()))
+solution = cache(lambda: rom.simulate(mechanism(), t_end=2e-3, dt=1e-3))
+ring = cache(lambda: bladed_ring(4))
+spinning = cache(lambda: beam_ring(6, per_sector=3, EA=1e3, rotary=0.1))
+mistuned = cache(lambda: rom.mistuned_wheel(ring(), 1))
+waves = cache(lambda: rom.cyclic_modes(ring(), 1, 1))
+blade = cache(lambda: rom.reduced_blade(wheel().parts, wheel().model, n_modes=1))
+bladed = cache(lambda: rom.bladed_wheel(wheel().parts, 2))
+reduced_run_up = cache(lambda: wheel().run_up.reduced(1))
 
 
 @cache
@@ -87,17 +95,6 @@ def film_bearing():
     bearing = rom.mbs.JournalBearing(0.1, 0.05, 1e-4, cells=(12, 2))
     table_of("any", bearing)
     return bearing
-
-
-@cache
-def body():
-    return reduced(3, model())
-
-
-@cache
-def behind():
-    """The block behind that one."""
-    return block(cells=(3, 1, 1), origin=(1.0, 0.0, 0.0))
 
 
 @cache
@@ -192,21 +189,6 @@ def rod():
 
 
 @cache
-def solution():
-    return rom.simulate(mechanism(), t_end=2e-3, dt=1e-3)
-
-
-@cache
-def ring():
-    return bladed_ring(4)
-
-
-@cache
-def spinning():
-    return beam_ring(6, per_sector=3, EA=1e3, rotary=0.1)
-
-
-@cache
 def wheel():
     """What only finite elements can make: the sector of a bladed wheel."""
     made = bladed_model(6, degree=1, cells=(4, 2, 2, 2), blade=(1, 3))
@@ -219,31 +201,6 @@ def wheel():
         rom.CyclicSector.from_model(made, fixed=("bore",)), made, speed=10.0, n_states=2
     )
     return SimpleNamespace(model=made, sector=sector, parts=parts, heat=heated, run_up=run_up)
-
-
-@cache
-def blade():
-    return rom.reduced_blade(wheel().parts, wheel().model, n_modes=1)
-
-
-@cache
-def reduced_run_up():
-    return wheel().run_up.reduced(1)
-
-
-@cache
-def mistuned():
-    return rom.mistuned_wheel(ring(), 1)
-
-
-@cache
-def waves():
-    return rom.cyclic_modes(ring(), 1, 1)
-
-
-@cache
-def bladed():
-    return rom.bladed_wheel(wheel().parts, 2)
 
 
 def operators():
@@ -290,11 +247,15 @@ DEFAULTS = {  # argument -> legal value
     "acceleration": lambda: X,
     "body": body,
     "boundary": lambda: np.arange(12),
+    "build": lambda: spring,
+    "diameter": lambda: 1,
     "fixed": lambda: ("root",),
     "heat": lambda: wheel().heat,
+    "interface": lambda: model().interfaces["root"],
     "interfaces": lambda: KINDS,
     "labels": lambda: tuple(f"{k}" for k in range(12)),
     "law": lambda: Impact(stiffness=1.0),
+    "loads": lambda: {"tip": (1.0, 0, 0, 0, 0, 0)},
     "mechanism": driven,
     "method": rom.Guyan,
     "model": model,
@@ -302,18 +263,26 @@ DEFAULTS = {  # argument -> legal value
     "n_blade_modes": lambda: 1,
     "n_modes": lambda: 1,
     "ops": operators,
+    "parameters": lambda: {"stiffness": 2.0},
+    "reference": lambda: "root",
     "sector": lambda: wheel().sector,
     "share": lambda: 0.5,
     "solution": solution,
+    "speed": lambda: 5.0,
     "state": lambda: None,
     "title": lambda: "title",
     "caption": lambda: "caption",
+    "units": lambda: "mm-t-s",
     "blades": lambda: [blade()] * 6,
 }
 
 
 def of_wheel():
     return {"model": wheel().model}
+
+
+def on_its_bore():
+    return of_wheel() | {"fixed": ("bore",)}
 
 
 GIVEN = {  # callable -> legal values of its own
@@ -323,31 +292,25 @@ GIVEN = {  # callable -> legal values of its own
     "check": lambda: {"record": body()},
     "check_law": lambda: {"mechanism": lawful(), "name": "law"},
     "craig_bampton": lambda: {"K": model().K, "M": model().M},
-    "cyclic_modes": lambda: {"sector": ring(), "diameter": 1},
-    "wheel_modes": lambda: {"sector": ring()},
+    **dict.fromkeys(("cyclic_modes", "mistuned_wheel", "wheel_modes"), lambda: {"sector": ring()}),
+    **dict.fromkeys(("heated", "held_solid", "thermal_buckling"), on_its_bore),
+    **dict.fromkeys(
+        ("heated_sector", "rotating_sector", "substructured_sector", "CyclicSector.from_model",
+         "Heat.on"), of_wheel),
     "continuation": lambda: {"span": (0.0, 1e-3)},
-    "equilibrium_sensitivity": lambda: {
-        "build": spring, "parameters": {"stiffness": 2.0}, "output": lambda mech, state: state.q[0],
-    },
+    "equilibrium_sensitivity": lambda: {"output": lambda mech, state: state.q[0]},
     "export": lambda: {"path": "out.SID_FEM"},
     "frequency_response": lambda: {
         "frequencies": [1.0], "force": marked()[1], "motion": marked()[1],
     },
-    "frequency_sensitivity": lambda: {"build": spring, "parameters": {"stiffness": 2.0}},
-    "heated": lambda: of_wheel() | {"fixed": ("bore",)},
-    "heated_sector": of_wheel,
-    "held_solid": lambda: of_wheel() | {"fixed": ("bore",)},
     "inverse_dynamics": lambda: {"mechanism": driven(free=False), "t": [0.0, 1e-3]},
     "linearize": dict,
     "periodic_motion": lambda: {"period": 1.0, "steps": 10},
-    "periodic_path": lambda: {"build": spring, "span": (1.0, 1.1), "period": 1.0, "steps": 2},
+    "periodic_path": lambda: {"span": (1.0, 1.1), "period": 1.0, "steps": 2},
     "load": lambda: {"path": "body.rom.npz"},
     "load_state": lambda: {"path": "state.npz"},
-    "mistuned_wheel": lambda: {"sector": ring()},
     "modes": lambda: {"n": 1},
-    "motion_sensitivity": lambda: {
-        "result": lambda stiffness: 2 * stiffness, "parameters": {"stiffness": 2.0},
-    },
+    "motion_sensitivity": lambda: {"result": lambda stiffness: 2 * stiffness},
     "read_component": lambda: {"path": "body.toml"},
     "read_mechanism": lambda: {"path": "mechanism.toml"},
     "read_model": lambda: {
@@ -363,10 +326,9 @@ GIVEN = {  # callable -> legal values of its own
         "pieces": pieces(), "models": models_in_a_row(),
         "nonlinear": rom.Geometric(loads={"tip": (0, 1.0, 0, 0, 0, 0)}),
     },
-    "reduce_pieces": lambda: {"models": models_in_a_row(), "reference": "root"},
+    "reduce_pieces": lambda: {"models": models_in_a_row()},
     "reduced_blade": lambda: of_wheel() | {"sector": wheel().parts},
     "release": lambda: {"state": rom.equilibrium(driven())},
-    "rotating_sector": of_wheel,
     "save": lambda: {"path": "out.rom.npz"},
     "save_state": lambda: {"path": "out.npz", "state": solution().final},
     "second_order_balanced_truncation": lambda: {
@@ -376,10 +338,8 @@ GIVEN = {  # callable -> legal values of its own
     "simulate": lambda: {"t_end": 1e-3, "dt": 1e-3},
     "snapshot": lambda: {"state": rom.equilibrium(driven())},
     "spin_up": lambda: of_wheel() | {"speed": 10.0, "n_states": 2},
-    "substructured_sector": of_wheel,
     "supported_sector": lambda: {"face": wheel().model.interfaces["bore"], "across": 1.0},
     "surface_load": lambda: {"pressure": 1.0},
-    "thermal_buckling": lambda: of_wheel() | {"fixed": ("bore",)},
     "transmissibility": lambda: {"frequencies": [1.0], "drive": "shaker", "motion": marked()[1]},
     "travelling_modes": lambda: {"sector": spinning(), "diameter": 2, "speed": 0.1},
     "update": lambda: {"family": family(), "test": measured()},
@@ -397,47 +357,27 @@ GIVEN = {  # callable -> legal values of its own
     "Basis.project": lambda: {"A": np.eye(2)},
     "BladedWheel.of_blades": lambda: {"Phi": bladed().modes([blade()] * 6)[1]},
     "BladedWheel.waves": lambda: {"speed": 0.0},
-    "BladedWheel.response": lambda: {
-        "force": np.zeros(blade().Psi.shape[0]), "engine_order": 1, "omega": [1.0], "damping": 0.01,
-        "at": [0],
-    },
-    "BladedWheel.amplification": lambda: {
+    **dict.fromkeys(("BladedWheel.amplification", "BladedWheel.response"), lambda: {
         "force": np.ones(blade().Psi.shape[0]), "engine_order": 1, "omega": [1.0], "damping": 0.01,
         "at": [0],
-    },
-    "BodyFamily.with_reference": lambda: {"reference": "root"},
+    }),
     "Characteristic.kinds": lambda: {"connection": connect(operators(), model(), {"root": "full"})},
-    "CyclicSector.from_model": of_wheel,
-    "CyclicSector.*": lambda: {"diameter": 1, "shapes": waves().shapes},
-    "FlexibleBody.with_reference": lambda: {"reference": "root"},
+    "CyclicSector.*": lambda: {"shapes": waves().shapes},
     "FlexibleBody.rotating_frequencies": lambda: {"speed": 1.0, "axis": Z},
     "FlexibleBody.marker": lambda: {"name": "root"},
-    "FlexibleBody.equilibria": lambda: {"loads": {"tip": (1.0, 0, 0, 0, 0, 0)}},
     "FlexibleBody.beyond_range": lambda: {"q": np.zeros((1, body().n_modes))},
-    "FlexibleBody.critical_loads": lambda: {"loads": {"tip": (1.0, 0, 0, 0, 0, 0)}},
-    "FlexibleBody.forces_on": lambda: {"loads": {"tip": (1.0, 0, 0, 0, 0, 0)}},
     "FlexibleBody.mean_rows": lambda: {"fixed": {"tip": "x"}},
-    "FlexibleBody.in_units": lambda: {"units": "mm-t-s"},
-    "Material.from_units": lambda: {"units": "mm-t-s", "E": 210e3, "nu": 0.3, "rho": 7.85e-9},
+    "Material.from_units": lambda: {"E": 210e3, "nu": 0.3, "rho": 7.85e-9},
     "Orthotropic.from_units": lambda: {
-        "units": "mm-t-s", "E": (1e3,) * 3, "nu": (0.3,) * 3, "G": (4e2,) * 3, "rho": 1e-9,
+        "E": (1e3,) * 3, "nu": (0.3,) * 3, "G": (4e2,) * 3, "rho": 1e-9,
     },
-    "FourierLegendre.functions": lambda: {"interface": model().interfaces["root"]},
     "Pieces.add_to": lambda: {"mech": rom.Mechanism(), "name": "beam"},
-    "Polynomial.functions": lambda: {"interface": model().interfaces["root"]},
-    "Heat.on": of_wheel,
     "Heat.described": lambda: {"share": 0.5},
     "MistunedWheel.*": lambda: {
         "deviations": np.zeros(4), "force": [0.0, 1.0, 0.0], "engine_order": 1, "omega": [1.0],
         "damping": 0.01, "at": [1],
     },
     "ModalDamping.matrix": dict,
-    "ReducedSpinUp.at": lambda: {"speed": 5.0},
-    **{f"{kind}.{name}": lambda more=more: {"speed": 5.0} | more
-       for kind in ("SpinUp", "ReducedSpinUp")
-       for name, more in (("modes", {"diameter": 1}), ("waves", {"diameter": 1}), ("weights", {}))},
-    "SpinUp.at": lambda: {"speed": 5.0},
-    "SpinUp.displacement": lambda: {"speed": 5.0},
     "Solution.*": lambda: {"body": "arm", "t": 1e-3, "marker": "a", "instant": 0, "name": "hinge"},
     "Solution.drive_load": lambda: {"name": "shaker"},
 }  # fmt: skip
@@ -578,47 +518,31 @@ def owner(name):
 
 
 def of_function(label, function):
-    def make():
-        solution()  # compiles what is not yet: no part of the time that a call may take
-        if label in READERS:
-            files()
-        return function, given(label, function)
-
-    return make
+    solution()  # compiles what is not yet: no part of the time that a call may take
+    if label in READERS:
+        files()
+    return function, given(label, function)
 
 
 def of_class(name, kind):
-    def make():
-        made = owner(name)
-        known = {p.name for p in parameters(kind)}
-        return kind, {f.name: getattr(made, f.name) for f in fields(kind) if f.name in known}
-
-    return make
+    made = owner(name)
+    known = {p.name for p in parameters(kind)}
+    return kind, {f.name: getattr(made, f.name) for f in fields(kind) if f.name in known}
 
 
 def of_method(label):
     name, _, method = label.partition(".")
-
-    def make():
-        function = getattr(owner(label if label in OBJECTS else name), method)
-        return function, given(label, function)
-
-    return make
+    function = getattr(owner(label if label in OBJECTS else name), method)
+    return function, given(label, function)
 
 
 def of_mechanism(method):
-    def make():
-        mech = mechanism()
-        cart = mech.add_rigid("cart", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0))
-        mech.prismatic("slide", mech.ground.marker((0, 0, 0)), cart.marker((0, 0, 0)), axis=X)
-        function = getattr(mech, method)
-        needed = [p.name for p in parameters(function) if p.default is p.empty]
-        needed += [name for of, name in JOIN_OWN if of == method and name not in needed]
-        return function, {
-            n: JOIN_OWN.get((method, n), JOIN[n] if n in JOIN else None)(mech) for n in needed
-        }
-
-    return make
+    mech = mechanism()
+    cart = mech.add_rigid("cart", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0))
+    mech.prismatic("slide", mech.ground.marker((0, 0, 0)), cart.marker((0, 0, 0)), axis=X)
+    function, own = getattr(mech, method), {n: x for (of, n), x in JOIN_OWN.items() if of == method}
+    needed = {p.name for p in parameters(function) if p.default is p.empty} | set(own)
+    return function, {n: (own[n] if n in own else JOIN[n])(mech) for n in needed}
 
 
 def methods(kind):
@@ -637,15 +561,15 @@ def calls():
     found = {}
     for name, thing in public.items():
         if not inspect.isclass(thing):
-            found[name] = (thing, of_function(name, thing))
+            found[name] = (thing, partial(of_function, name, thing))
             continue
         if parameters(thing):
-            found[name] = (thing, of_class(name, thing))
+            found[name] = (thing, partial(of_class, name, thing))
         for method in methods(thing):
-            if f"{name}.{method}" in INNER:
-                continue
-            made = of_mechanism(method) if name == "Mechanism" else of_method(f"{name}.{method}")
-            found[f"{name}.{method}"] = (getattr(thing, method), made)
+            label, is_mechanism = f"{name}.{method}", name == "Mechanism"
+            if label not in INNER:
+                make = partial(of_mechanism, method) if is_mechanism else partial(of_method, label)
+                found[label] = (getattr(thing, method), make)
     return {
         label: Call(made, tuple(p.name for p in parameters(thing)),
                     frozenset((a, kind) for (of, a), kinds in SKIPPED.items() if of == label

@@ -24,7 +24,6 @@ two nodes that move and turn in a plane, two of them along x only
 1, 9, 4, 30, 31
 """
 
-
 DECK = """*HEADING
 *NODE, NSET=Left
 3, 0., 0., 0.1
@@ -86,6 +85,4 @@ def dataset(kind, spacing, values, **options):
 
 
 X = np.array([2.0, 2.5, 3.0, 3.5, 4.0])
-
-
 RE, IM = np.array([1.5, -2.25, 3e-7, 4.0, -5e6]), np.array([-1.0, 0.5, 2e-3, -7e-9, 8.0])

@@ -14,7 +14,6 @@ nu = 0.3
 rho = "7.85 g/cm^3"
 """
 
-
 PENDULUM = """\
 name = "pendulum"
 gravity = [0, "-9.81 m/s^2", 0]
@@ -35,7 +34,6 @@ t_end = "0.5 s"
 dt = "0.5 ms"
 rho_inf = 1
 """
-
 
 CRANK = """\
 gravity = [0, "-9.81 m/s^2", 0]
@@ -80,7 +78,6 @@ t_end = "10 ms"
 dt = "0.1 ms"
 rho_inf = 0.8
 """
-
 
 ALL = """\
 gravity = [0, 0, "-9.81 m/s^2"]
@@ -156,7 +153,6 @@ stiffness = 1e6
 [simulation]
 t_end = 1
 """
-
 
 MORE = """\
 gravity = [0, 0, 0]

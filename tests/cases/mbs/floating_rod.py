@@ -17,14 +17,12 @@ Source:
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from scipy.integrate import solve_ivp
 
 from rom import rotation
-from rom.components.cosserat.energy import Rod, internal, work
+from rom.components.cosserat.energy import internal, work
 from rom.components.cosserat.shapes import Shape, reference
 from rom.components.cosserat.statics import add_loads
 from rom.components.cosserat.vibration import lumped_mass
@@ -49,12 +47,12 @@ class Instant:
     theta: Array
     z: Array
 
-    def packed(self) -> Array:
+    def packed(self):
         """All numbers in a row."""
         return np.concatenate([self.r, self.P, self.xi.ravel(), self.theta.ravel(), self.z])
 
     @classmethod
-    def unpacked(cls, y: Array, n: int) -> "Instant":
+    def unpacked(cls, y, n):
         """From the numbers of a rod of n segments; quaternions brought to length one."""
         ends = np.cumsum([3, 4, 3 * (n + 1), 4 * (n + 2)])
         r, P, xi, theta, z = np.split(y, ends)
@@ -63,20 +61,20 @@ class Instant:
         return cls(r, P / np.linalg.norm(P), xi.reshape(-1, 3), theta, z)
 
     @property
-    def shape(self) -> Shape:
+    def shape(self):
         """Positions and quaternions in the world."""
         A = rotation.matrix(self.P)
         p = np.array([rotation.multiply(self.P, q) for q in self.theta])
         return Shape(self.r + self.xi @ A.T, p)
 
     @property
-    def parts(self) -> tuple[Array, Array, Array, Array]:
+    def parts(self):
         """Velocities of the frame (3,), (3,), of vertices (N + 1, 3), of sections (N + 2, 3)."""
         pairs = np.append(self.z[FRAME_DOFS:], np.zeros(3)).reshape(-1, 6)
         return self.z[:3], self.z[3:6], pairs[:-1, 3:], pairs[:, :3]
 
 
-def jacobian(now: Instant) -> Array:
+def jacobian(now):
     """(n, 6 + n) velocities in space per velocity of frame and rod."""
     n = now.z.size - FRAME_DOFS
     J, A = np.zeros((n, FRAME_DOFS + n)), rotation.matrix(now.P)
@@ -91,7 +89,7 @@ def jacobian(now: Instant) -> Array:
     return J
 
 
-def convective(rod: Rod, now: Instant) -> Array:
+def convective(rod, now):
     """(n,) forces of inertia at dz = 0: mass times accelerations, and gyroscopic moments."""
     A = rotation.matrix(now.P)
     _, omega, rates, turning = now.parts
@@ -104,14 +102,14 @@ def convective(rod: Rod, now: Instant) -> Array:
     return h.ravel()[:-3]
 
 
-def at_start(rod: Rod, now: Instant) -> tuple[Array, Array]:
+def at_start(rod, now):
     """Reference condition: the frame is fixed to the plate at the start of the rod."""
     C = np.zeros((6, now.z.size))
     C[:, FRAME_DOFS : FRAME_DOFS + 6] = np.eye(6)
     return C, np.zeros(6)
 
 
-def chord(rod: Rod, now: Instant) -> tuple[Array, Array]:
+def chord(rod, now):
     """Reference condition: the first and last vertex stay on one line of the frame.
 
     The first one stays at its place, and the plate at the start does not turn about that line.
@@ -127,7 +125,7 @@ def chord(rod: Rod, now: Instant) -> tuple[Array, Array]:
     return C, np.zeros(6)
 
 
-def mean_axis(rod: Rod, now: Instant) -> tuple[Array, Array]:
+def mean_axis(rod, now):
     """Tisserand's condition: the relative motion has no momentum."""
     C = np.zeros((6, now.z.size))
     for i, (m, xi) in enumerate(zip(rod.mass, now.xi, strict=True)):
@@ -145,9 +143,7 @@ def mean_axis(rod: Rod, now: Instant) -> tuple[Array, Array]:
 REFERENCES = {"start": at_start, "chord": chord, "mean-axis": mean_axis}
 
 
-def accelerations(
-    rod: Rod, now: Instant, load: tuple[Array, Array], conditions: Any
-) -> tuple[Array, Array]:
+def accelerations(rod, now, load, conditions):
     """(6 + n,) rates of the velocities z, and (6,) reactions of the reference conditions.
 
     The reactions vanish: conditions choose a frame, they do not hold the rod.
@@ -166,7 +162,7 @@ def accelerations(
     return solution[:-6], solution[-6:]
 
 
-def rates(rod: Rod, now: Instant, load: tuple[Array, Array], conditions: Any) -> Array:
+def rates(rod, now, load, conditions):
     """Rates of all numbers of `Instant.packed`."""
     v, omega, speeds, turning = now.parts
     theta = [_rate(q, w) for q, w in zip(now.theta, turning, strict=True)]
@@ -174,21 +170,12 @@ def rates(rod: Rod, now: Instant, load: tuple[Array, Array], conditions: Any) ->
     return np.concatenate([v, _rate(now.P, omega), speeds.ravel(), np.ravel(theta), dz])
 
 
-def _rate(q: Array, w: Array) -> Array:
+def _rate(q, w):
     """Rate of a quaternion whose axes turn with w in their own frame."""
     return rotation.multiply(q, np.append(0.0, 0.5 * w))
 
 
-def simulate(
-    rod: Rod,
-    t: npt.ArrayLike,
-    *,
-    reference_condition: str = "mean-axis",
-    load: tuple[Array, Array] | None = None,
-    velocity: npt.ArrayLike = (0.0, 0.0, 0.0),
-    omega: npt.ArrayLike = (0.0, 0.0, 0.0),
-    rtol: float = 1e-11,
-) -> list[Instant]:
+def simulate(rod, t, *, reference_condition, load, velocity, omega):
     """Motion of a free rod from its shape without stress, by DOP853 in a floating frame.
 
     Args:
@@ -198,34 +185,30 @@ def simulate(
         load: dead forces and moments as of `statics.loads`.
         velocity: (3,) of the origin at the start [m/s].
         omega: (3,) angular velocity of the rod as a whole at the start [rad/s].
-        rtol: relative tolerance of the steps.
     """
-    conditions, shape = REFERENCES[reference_condition], reference(rod)
-    load = (np.zeros_like(rod.x), np.zeros((len(rod.p), 3))) if load is None else load
-    z = np.zeros(FRAME_DOFS + 6 * rod.h.size + 9)
-    z[:3], z[3:6] = velocity, omega
+    conditions, shape, n = REFERENCES[reference_condition], reference(rod), rod.h.size
+    z = np.concatenate([velocity, omega, np.zeros(6 * n + 9)])
     begun = Instant(np.zeros(3), np.array([1.0, 0, 0, 0]), shape.x, shape.p, z)
-    n, times = rod.h.size, np.atleast_1d(np.asarray(t, dtype=float))
     found = solve_ivp(
         lambda _, y: rates(rod, Instant.unpacked(y, n), load, conditions),
-        (0.0, times[-1]), begun.packed(), "DOP853", times, rtol=rtol, atol=rtol,
+        (0.0, t[-1]), begun.packed(), "DOP853", t, rtol=1e-11, atol=1e-11,
     )  # fmt: skip
     assert found.success, found.message
     return [Instant.unpacked(y, n) for y in found.y.T]
 
 
-def swing(rod: Rod, t: float, load: tuple[Array, Array], free: Array) -> Shape:
+def swing(rod, t, load, free):
     """Shape of a rod with mass, held to the ground, after a load has acted on it.
 
     Each dof by itself, since masses are lumped: no mechanism, no frame, no elimination.
     """
     W, M, n = work(rod), lumped_mass(rod), rod.x.size
 
-    def parts(y: Array) -> tuple[Array, Array, Array]:
+    def parts(y):
         p = y[n : -M.size].reshape(-1, 4)
         return y[:n].reshape(-1, 3), p / np.linalg.norm(p, axis=1)[:, None], y[-M.size :]
 
-    def rates(_: float, y: Array) -> Array:
+    def rates(_, y):
         x, p, v = parts(y)
         rows = np.append(v, np.zeros(3)).reshape(-1, 6)
         internal(rod, x, p, v, W)

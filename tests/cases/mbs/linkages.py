@@ -1,8 +1,5 @@
 """Linkages of two drives as bodies and joints of the multibody core."""
 
-from collections.abc import Sequence
-from typing import Any
-
 import numpy as np
 
 import rom
@@ -11,14 +8,12 @@ from rom import rotation
 Z = (0.0, 0.0, 1.0)
 
 
-def still(t: float) -> float:
+def still(t):
     """No displacement of a drive."""
     return 0.0
 
 
-def link_of_the_core(
-    mech: rom.Mechanism, name: str, body: Any, at: Sequence[float], angle: float
-) -> Any:
+def link_of_the_core(mech, name, body, at, angle):
     """Add a link at a place (2,): a rod (mass, length), or a flexible body with pins root, tip."""
     A = rotation.matrix(np.array([np.cos(angle / 2), 0, 0, np.sin(angle / 2)]))
     place = np.array([*at, 0.0])
@@ -32,26 +27,24 @@ def link_of_the_core(
     return mech.add_flexible(name, body, at=place - A @ body.marker("root").point, orientation=A)
 
 
-def pinned(mech: rom.Mechanism, name: str, body: Any, at: Any, angle: float, first: Any) -> Any:
+def pinned(mech, name, body, at, angle, first):
     """Add a link as `link_of_the_core` on a pin at a marker."""
     part = link_of_the_core(mech, name, body, at, angle)
     mech.revolute(f"{name} pin", first, part.marker("root"), axis=Z)
     return part
 
 
-def ball(
-    mech: rom.Mechanism, name: str, mass: float, at: Sequence[float], inertia: float = 1e-9
-) -> Any:
+def ball(mech, name, mass, at, inertia=1e-9):
     """Add a body that is nearly a point."""
     return mech.add_rigid(name, mass=mass, inertia=(inertia,) * 3, at=(*at, 0.0))
 
 
-def direction(arm: Any) -> float:
+def direction(arm):
     """Angle of a vector (2,) [rad]."""
     return float(np.arctan2(arm[1], arm[0]))
 
 
-def five_bar_of_the_core(q: Any, cranks: Any, couplers: Any, posture: Any) -> rom.Mechanism:
+def five_bar_of_the_core(q, cranks, couplers, posture):
     """The five-bar with a tool of 0.5 kg, drives "left" and "right" on its base joints."""
     mech = rom.Mechanism(gravity=(0, 0, 0))
     tips = []
@@ -69,7 +62,7 @@ def five_bar_of_the_core(q: Any, cranks: Any, couplers: Any, posture: Any) -> ro
     return mech
 
 
-def cross_slides_of_the_core(masses: tuple[float, float], angle: float) -> rom.Mechanism:
+def cross_slides_of_the_core(masses, angle):
     """PP: drives "x" along x and "y" at an angle to it."""
     mech = rom.Mechanism(gravity=(0, 0, 0))
     first, second = (ball(mech, n, m, (0, 0), 0.01 * m) for n, m in zip("ab", masses, strict=True))
@@ -82,7 +75,7 @@ def cross_slides_of_the_core(masses: tuple[float, float], angle: float) -> rom.M
     return mech
 
 
-def slide_arm_of_the_core(slide: float, arm: tuple[float, float], angle: float) -> rom.Mechanism:
+def slide_arm_of_the_core(slide, arm, angle):
     """PR: a slide on a rail along x, drive "x", and a rod on it at an angle, drive "turn"."""
     mech = rom.Mechanism(gravity=(0, 0, 0))
     base, o = ball(mech, "slide", slide, (0, 0)), (0, 0, 0)
@@ -93,7 +86,7 @@ def slide_arm_of_the_core(slide: float, arm: tuple[float, float], angle: float) 
     return mech
 
 
-def two_link_of_the_core(first: Any, second: Any, q: Any) -> rom.Mechanism:
+def two_link_of_the_core(first, second, q):
     """2R: two rods, drives "shoulder" on the ground and "elbow" between them."""
     mech = rom.Mechanism(gravity=(0, 0, 0))
     upper = pinned(mech, "upper", first, (0, 0), q[0], mech.ground.marker((0, 0, 0)))
@@ -104,9 +97,7 @@ def two_link_of_the_core(first: Any, second: Any, q: Any) -> rom.Mechanism:
     return mech
 
 
-def rail_of_the_core(
-    slide: float, coupler: tuple[float, float], payload: float, spread: float
-) -> rom.Mechanism:
+def rail_of_the_core(slide, coupler, payload, spread):
     """PRRRP on one rail along x: slides at 0 and at the spread, drives "left" and "right"."""
     mech, o, tips = rom.Mechanism(gravity=(0, 0, 0)), (0, 0, 0), []
     tip = np.array([spread / 2, np.sqrt(coupler[1] ** 2 - spread**2 / 4)])

@@ -83,26 +83,17 @@ class Full:
         self.motion[:6, root.dofs], self.motion[6:, tip.dofs] = mean_motion(root), mean_motion(tip)
         self.C = self.motion[[*range(6), *(6 + k for k in held)]]
 
-    def bordered(self, u):
-        K = self.solid.tangent(u)
-        self.scale = np.abs(K.diagonal()).mean() / np.abs(self.C).max()
-        C = self.scale * self.C
-        return splu(csc_matrix(bmat([[K, C.T], [C, None]])))
-
     def state(self, u, load, moved):
         """Displacement and forces of what is held, near u, under a load on the tip (6,)."""
         for _ in range(40):
-            gap = load @ self.motion[6:] - self.solid.force(u)
-            target = self.scale_of(u) * (moved - self.C @ u)
-            found = self.factor.solve(np.r_[gap, target])
+            K, gap = self.solid.tangent(u), load @ self.motion[6:] - self.solid.force(u)
+            scale = np.abs(K.diagonal()).mean() / np.abs(self.C).max()
+            C, target = scale * self.C, scale * (moved - self.C @ u)
+            found = splu(csc_matrix(bmat([[K, C.T], [C, None]]))).solve(np.r_[gap, target])
             step, u = found[: u.size], u + found[: u.size]
             if np.linalg.norm(step) < 1e-9 * np.linalg.norm(u):
-                return u, -self.scale * found[u.size :]
+                return u, -scale * found[u.size :]
         raise AssertionError("the full model does not converge")
-
-    def scale_of(self, u):
-        self.factor = self.bordered(u)
-        return self.scale
 
     def under(self, load, shares=(0.25, 0.5, 0.75, 1.0)):
         """(12,) mean motion of root and tip under a dead load on the tip, reached in steps."""

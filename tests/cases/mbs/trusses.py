@@ -9,7 +9,6 @@ from rom.body.nonlinear.quartic import Quartic
 
 # masses at +-REST on a spring [kg, m, N/m], and the hub that gives the body its other inertias
 MASS, REST, SPRING, HUB, RADIUS = 0.5, 0.4, 1200.0, 0.3, 0.1
-
 HUB_INERTIA = 2 * HUB * RADIUS**2  # about z
 
 

@@ -1,10 +1,9 @@
 """A tube of eight-node bricks about Z in NumPy: its rim bears teeth, its bore a film."""
 
 import numpy as np
-from scipy.sparse import coo_matrix
 
-from cases.solid import CORNERS, GAUSS, STEEL, shape_functions
-from rom.model import FEModel, Interface, SurfaceMesh
+from cases.solid import CORNERS, GAUSS, STEEL, assembled, quads_of, shape_functions, surface_of
+from rom.model import FEModel, Interface
 
 STEPS = ((CORNERS + 1) / 2).astype(int)  # of a corner in radius, angle, height
 QUAD = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
@@ -42,41 +41,21 @@ def tube(inner=0.02, outer=0.035, length=0.08, cells=(24, 2, 6), material=STEEL,
                       for i, j, k in np.ndindex(n, n_r, n_z)])  # fmt: skip
     dofs = (3 * nodes[:, :, None] + np.arange(3)).reshape(len(nodes), -1)
     blocks = np.array([brick(points[corners], material) for corners in nodes])
-    K, M = (_assembled(dofs, blocks[:, kind], points.size) for kind in (0, 1))
+    K, M = (assembled(dofs, blocks[:, kind], points.size) for kind in (0, 1))
     turned = np.concatenate([number, number[:1]])
     between = slice(ends, n_z + 1 - ends)
     faces = {"rim": turned[:, -1, between], "bore": turned[:, 0, between], "low": turned[:, :, 0],
              "high": turned[:, :, -1]}  # fmt: skip
     outside = turned[:, -1], turned[:, ::-1, 0], turned[:, :, -1], turned[::-1, 0]
     interfaces = {name: _interface(name, x, points) for name, x in faces.items()}
-    return FEModel(K, M, points, interfaces, surface=_surface(outside))
-
-
-def _assembled(dofs, blocks, n):
-    k = dofs.shape[1]
-    rows, columns = np.repeat(dofs, k, axis=1).ravel(), np.tile(dofs, (1, k)).ravel()
-    A = coo_matrix((blocks.ravel(), (rows, columns)), shape=(n, n)).tocsr()
-    return 0.5 * (A + A.T)
-
-
-def _quads(face):
-    corners = face[:-1, :-1], face[1:, :-1], face[1:, 1:], face[:-1, 1:]
-    return np.stack([x.ravel() for x in corners], axis=1)
-
-
-def _surface(faces):
-    quads = np.vstack([_quads(face) for face in faces])
-    nodes = np.unique(quads)
-    local = np.searchsorted(nodes, quads)
-    return SurfaceMesh(nodes, np.vstack([local[:, [0, 1, 2]], local[:, [0, 2, 3]]]))
+    K, M = (0.5 * (A + A.T) for A in (K, M))
+    return FEModel(K, M, points, interfaces, surface=surface_of(outside))
 
 
 def _interface(name, face, points):
     """The surface through a grid of nodes, with the integrals of products of its functions."""
-    quads = np.stack([face[:-1, :-1], face[1:, :-1], face[1:, 1:], face[:-1, 1:]], -1).reshape(
-        -1, 4
-    )
-    nodes, quads = np.unique(quads), np.searchsorted(np.unique(quads), quads)
+    nodes, quads = np.unique(quads_of(face), return_inverse=True)
+    quads = quads.reshape(-1, 4)
     S = np.zeros((len(quads), 4, 4))
     for xi in np.array(np.meshgrid(GAUSS, GAUSS)).reshape(2, -1).T:
         N = (1 + QUAD * xi).prod(axis=1) / 4
@@ -84,5 +63,6 @@ def _interface(name, face, points):
         one, two = np.einsum("na,qnx->aqx", dN, points[nodes][quads])
         area = np.linalg.norm(np.cross(one, two), axis=1)
         S += area[:, None, None] * np.outer(N, N)
-    return Interface(name, nodes, points[nodes], _assembled(quads, S, nodes.size), np.zeros(3)
-                     if name in ("rim", "bore") else points[nodes].mean(axis=0))  # fmt: skip
+    S, x = assembled(quads, S, nodes.size), points[nodes]
+    centre = np.zeros(3) if name in ("rim", "bore") else x.mean(axis=0)
+    return Interface(name, nodes, x, 0.5 * (S + S.T), centre)

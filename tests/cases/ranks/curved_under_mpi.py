@@ -6,11 +6,9 @@ import sys
 from mpi4py import MPI
 
 import rom
-
-STEEL = rom.Material(E=210e9, nu=0.3, rho=7850.0)
+from cases.solid import STEEL
 
 SIZE = {"lc": 0.0104}  # 12 edges round the bore
-
 model = rom.fe.model(sys.argv[1], material=STEEL, parameters=SIZE)
 body = rom.reduce(model, method=rom.CraigBampton(8), interfaces={"bore": "rbe3", "end": "rbe2"},
                   stress=True, stiffening=True, certify=False)  # fmt: skip

@@ -5,10 +5,10 @@ import sys
 from mpi4py import MPI
 
 import rom
-from cases import layers, panels
+from cases import panels
 
 if sys.argv[1] == "thickness":
-    family = layers.families(layers.panel())
+    family = panels.family_of_layers(panels.layered_panel())
 else:
     family = rom.reduce_parametric(
         panels.panel(),

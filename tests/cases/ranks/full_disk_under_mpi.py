@@ -4,10 +4,10 @@ import sys
 from shutil import disk_usage
 
 import rom
+from cases.solid import STEEL
 from rom.fe.operators import factor
 from rom.fe.operators.disk import scratch_folder
 
-STEEL = rom.Material(E=210e9, nu=0.3, rho=7850.0)
 BLOCK = {"L": 1.0, "b": 0.5, "h": 0.3, "lc": float(sys.argv[1])}
 LEFT_BYTES = int(sys.argv[2])  # of a disk that others have filled
 model = rom.fe.model("meshes/beam.geo", material=STEEL, parameters=BLOCK, solver="out-of-core")

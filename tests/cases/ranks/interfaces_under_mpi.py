@@ -9,12 +9,11 @@ from dolfinx.mesh import locate_entities_boundary, meshtags
 
 import rom
 from cases.boxes import box
+from cases.solid import STEEL
 from rom.fe.elasticity import assemble
 
 COMM = MPI.COMM_WORLD
-STEEL = rom.Material(E=210e9, nu=0.3, rho=7850.0)
 KINDS = ("rbe2", "rbe3", "full", rom.Polynomial(2))
-
 mesh, tags = box((1.0, 0.2, 0.13), (9, 2, 2), "tetrahedron")
 side = np.sort(locate_entities_boundary(mesh, 2, lambda x: np.isclose(x[1], 0.0))).astype(np.int32)
 tags = {"end": tags["x0"], "side": meshtags(mesh, 2, side, np.ones(side.size, dtype=np.int32))}

@@ -6,12 +6,13 @@ import numpy as np
 
 import rom
 from cases.boxes import box
+from cases.solid import STEEL
 from rom.body.nonlinear.statics import follow
 from rom.fe.elasticity import assemble
 
 mesh, faces = box((1.0, 0.1, 0.1), (8, 1, 1))
 interfaces = {"root": faces["x0"], "tip": faces["x1"]}
-model = assemble(mesh, facet_tags=interfaces, material=rom.Material(E=210e9, nu=0.3, rho=7850.0))
+model = assemble(mesh, facet_tags=interfaces, material=STEEL)
 ops, energy = model.operators, model.stresses.large_strain()
 x, y, z = model.points[ops.first // 3 : (ops.first + ops.n_local) // 3].T
 fields = [(y * x, x * z, x**2), (np.sin(x), y**2, x * y), (z, x * y * z, np.cos(2 * x))]

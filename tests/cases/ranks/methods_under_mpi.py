@@ -8,8 +8,8 @@ from mpi4py import MPI
 import numpy as np
 
 import rom
+from cases.solid import STEEL
 
-STEEL = rom.Material(E=210e9, nu=0.3, rho=7850.0)
 BEAM = {"L": 0.4, "b": 0.05, "h": 0.03, "lc": 0.03}
 STIFF = {"root": "rbe2", "tip": "rbe2"}
 METHODS = {

@@ -12,12 +12,12 @@ from dolfinx.mesh import meshtags
 
 import rom
 from cases.boxes import box
+from cases.solid import STEEL
 from rom.errors import MaterialError, ParallelError
 from rom.fe.elasticity import assemble
 from rom.fe.parallel import collective, install_abort_hook, on_root
 
 COMM = MPI.COMM_WORLD
-STEEL = rom.Material(E=210e9, nu=0.3, rho=7850.0)
 
 
 def model(path, cells, degree):

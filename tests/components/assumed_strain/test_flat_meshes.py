@@ -23,7 +23,6 @@ from rom.fe.mesh import read_triangles
 
 pytest.importorskip("gmsh", reason="needs gmsh")
 pytestmark = pytest.mark.fenicsx
-
 BILLET = ROOT / "meshes" / "billet.geo"
 RING = """SetFactory("OpenCASCADE");
 Disk(1) = {0, 0, 0, 2.0};

@@ -18,8 +18,6 @@ from rom.errors import InterfaceError
 SQUARE = [(0, 0), (1, 0), (1, 1), (0, 1)]
 STEEL = Metal(210e9, 0.3, 7850.0)
 STIFFNESS = 210e9 * 0.01**3 / 12 / (1 - 0.3**2)
-
-
 UNIT = np.sqrt(210e9 * 0.002**2 / 12 / 7850) / 0.4**2 / (2 * np.pi)  # of strips of 0.4 m [Hz]
 
 

@@ -8,7 +8,7 @@ from numpy.polynomial import Polynomial
 from numpy.testing import assert_allclose
 from scipy.linalg import eigh
 
-from cases.components.rods import ALONG_X
+from cases.components.rods import ALONG_X, moved
 from cases.refusals import refuses
 from rom import rotation
 from rom.components import cosserat
@@ -201,10 +201,7 @@ def test_forces_of_steady_rotation_have_their_tangent():
     n = len(K)
 
     def forces(d):
-        rows = np.append(d, np.zeros(3)).reshape(-1, 6)
-        p = [rotation.multiply(q, rotation.exp(e)) for q, e in zip(shape.p, rows[:, :3],
-                                                                  strict=True)]  # fmt: skip
-        there = type(shape)(shape.x + rows[:-1, 3:], np.array(p))
+        there = moved(shape, d)
         return cosserat.linearised(one, there, spin=spin)[0] - cosserat.linearised(one, there)[0]
 
     d = rng.normal(size=n)
@@ -259,7 +256,6 @@ def test_bad_runs_are_refused_and_lost_ones_kept():
     one = straight(1.0, 4, stretch=1e3, bend=1.0, mass=1.0, inertia=1e-3)
     load, words = (np.zeros((4, 3)), np.zeros((6, 3))), r"shapes \(\(4, 3\), \(6, 3\)\) and 33 dofs"
     refuses(ConfigError, words, simulate, one, 1.0, 0.1, load=load)
-    refuses(ConfigError, r"rho_inf = 1\.5 must be", simulate, one, 1.0, 0.1, rho_inf=1.5)
     with pytest.raises(SolverError, match="did not converge") as error:
         simulate(one, 100.0, 10.0, load=loads(one, tip=(1e4, 0, 0)))
     t = error.value.solution.t

@@ -12,7 +12,7 @@ import rom
 from benchmarks.models import bar
 from cases.components.rods import ALONG_X
 from cases.mbs.floating_rod import swing
-from cases.mbs.mechanisms import residual_at, tangents_at
+from cases.mbs.tangents import by_position, by_velocity
 from cases.refusals import refuses
 from rom import rotation, view
 from rom.components import cosserat
@@ -104,28 +104,13 @@ def test_tangents_of_a_bent_and_moving_rod():
         packed, W = bent_rod(rng, viscosity)
         n, lam = packed.v.size, rng.normal(size=packed.system.rows.kind.size)
         v = rng.normal(size=n) if viscosity else np.zeros(n)
-        a = rng.normal(size=n)
-
-        def by(direction, what, v=v, a=a, lam=lam, packed=packed, W=W):
-            out = []
-            for sign in (1, -1):
-                q, w = packed.q.copy(), v
-                if what == "q":
-                    retract(packed.system, packed.q, sign * 1e-6 * direction, q)
-                else:
-                    w = v + sign * 1e-6 * direction
-                residual_at(packed.system, W, q, w, a, lam)
-                out.append(W.residual.copy())
-            return (out[0] - out[1]) / 2e-6
-
-        tangents_at(packed.system, W, packed.q, v, a, lam, (0.0, 1.0, 1.0))
-        S, K = W.S.copy(), W.Kt.copy()
-        for _ in range(3):
-            d = rng.normal(size=n)
-            size = np.abs(S @ d).max() + np.abs(K @ d).max()
-            assert_allclose(S @ d, by(d, "v"), atol=1e-7 * size)
-            if not viscosity:
-                assert_allclose(K @ d, by(d, "q"), atol=1e-7 * size)
+        now = packed.q, v, rng.normal(size=n), lam
+        S, by_v = by_velocity(packed, W, *now)
+        K, by_q = by_position(packed, W, *now, step=1e-6)
+        size = np.abs(S).max() + np.abs(K).max()
+        assert_allclose(S, by_v, atol=1e-7 * size)
+        if not viscosity:
+            assert_allclose(K, by_q, atol=1e-7 * size)
 
 
 def bent_rod(rng, viscosity):

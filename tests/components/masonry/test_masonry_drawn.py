@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose
 from scipy.optimize import brentq
 
 import rom
+from cases.components.masonry import box
 from cases.paths import ROOT
 from cases.refusals import refuses
 from rom.components.masonry import PointLoad, Rock, drawn, ramp, reduced_stone, simulate, stands
@@ -69,10 +70,6 @@ def test_a_buttress_tips_at_the_width_that_statics_says():
         assert bool(np.abs(motion.v[-1]).max() < 1e-4) is stays
 
 
-def square(side=1.0, at=(0.0, 0.0)):
-    return np.array([[0, 0], [side, 0], [side, side], [0, side]]) + np.asarray(at)
-
-
 def stones_of(*outlines):
     """Squares of two triangles each."""
     first = 4 * np.arange(len(outlines))[:, None]
@@ -86,25 +83,25 @@ RING = [(0, 1, 5), (0, 5, 4), (1, 2, 6), (1, 6, 5), (2, 3, 7), (2, 7, 6), (3, 0,
 @pytest.mark.parametrize(
     ("drawing", "held", "words"),
     [
-        (stones_of(square(), square(at=(0, 1.0))), ("floor",), r"held is 'floor', .* \['stone 0'"),
-        (stones_of(square(), square(at=(0, 0.4))), ("stone 0",), "'stone 0' and 'stone 1' overlap"),
-        (stones_of(square(), square(at=(0, 0.99))), ("stone 0",), "overlap by 0.01 m"),
-        (stones_of(square(), square(at=(0, 1.01))), ("stone 0",),
+        (stones_of(box(), box(at=(0, 1.0))), ("floor",), r"held is 'floor', .* \['stone 0'"),
+        (stones_of(box(), box(at=(0, 0.4))), ("stone 0",), "'stone 0' and 'stone 1' overlap"),
+        (stones_of(box(), box(at=(0, 0.99))), ("stone 0",), "overlap by 0.01 m"),
+        (stones_of(box(), box(at=(0, 1.01))), ("stone 0",),
          "'stone 1' touches no other; the nearest is 0.01 m away"),
-        (stones_of(square(), square(at=(0, 3.0))), ("stone 0",), "none is near"),
-        ((np.vstack([square(3.0), square(1.0, (1, 1))]), RING, {"ring": range(8)}), (),
+        (stones_of(box(), box(at=(0, 3.0))), ("stone 0",), "none is near"),
+        ((np.vstack([box(3.0, 3.0), box(at=(1, 1))]), RING, {"ring": range(8)}), (),
          "'ring' of 8 triangles is not one piece without holes: .* 4 of 8 sides"),
-        ((*stones_of(square(), square(at=(5, 0)))[:2], {"both": range(4)}), (),
+        ((*stones_of(box(), box(at=(5, 0)))[:2], {"both": range(4)}), (),
          "'both' of 4 triangles is not one piece"),
-        ((*stones_of(square())[:2], {"none": []}), (), "'none' of 0 triangles"),
-        ((*stones_of(square())[:2], {"far": [2]}), (), "stone 'far': 2 must be .* 0 to 1"),
-        ((square(), [(0, 1, 4)], {"far": [0]}), (), "triangles: 4 must be .* 0 to 3"),
-        (stones_of(square()), ("stone 0",), "all stones are held: stone 0. Leave one free"),
-        (stones_of(square(), square(at=(0, 1.0))), ("stone",), "held: stone 0, stone 1"),
-        ((*stones_of(square())[:2], {}), (), "all stones are held: there is none"),
+        ((*stones_of(box())[:2], {"none": []}), (), "'none' of 0 triangles"),
+        ((*stones_of(box())[:2], {"far": [2]}), (), "stone 'far': 2 must be .* 0 to 1"),
+        ((box(), [(0, 1, 4)], {"far": [0]}), (), "triangles: 4 must be .* 0 to 3"),
+        (stones_of(box()), ("stone 0",), "all stones are held: stone 0. Leave one free"),
+        (stones_of(box(), box(at=(0, 1.0))), ("stone",), "held: stone 0, stone 1"),
+        ((*stones_of(box())[:2], {}), (), "all stones are held: there is none"),
         ((np.ones((4, 3)), [(0, 1, 2)], {"one": [0]}), (), r"points has shape \(4, 3\)"),
-        ((square(), [(0, 1, 2, 3)], {"one": [0]}), (), r"triangles has shape \(1, 4\)"),
-        ((square(), [(0, 1, 2)], {"one": [0.5]}), (), "'one': 0.5 must be a whole number"),
+        ((box(), [(0, 1, 2, 3)], {"one": [0]}), (), r"triangles has shape \(1, 4\)"),
+        ((box(), [(0, 1, 2)], {"one": [0.5]}), (), "'one': 0.5 must be a whole number"),
     ],
 )  # fmt: skip
 def test_drawings_that_are_no_masonry_are_named(drawing, held, words):
@@ -142,7 +139,7 @@ def test_a_voussoir_in_space_takes_the_place_of_a_drawn_one(k):
 @pytest.mark.parametrize(("aside", "corners"), [(0.0, 4), (2e-7, 4), (-2e-7, 4), (2e-5, 5)])
 def test_a_node_aside_of_a_side_by_round_off_is_no_corner(aside, corners):
     """A node in the middle of the lower side of 1 m: its turn is four times how far it lies off."""
-    points = np.vstack([square(), [[0.5, -aside]], square(at=(0.0, 1.0))])
+    points = np.vstack([box(), [[0.5, -aside]], box(at=(0.0, 1.0))])
     triangles = [(0, 4, 3), (4, 2, 3), (4, 1, 2), (5, 6, 7), (5, 7, 8)]
     stones = {"stone": [0, 1, 2], "ceiling": [3, 4]}
     model = drawn(points, triangles, stones, held=("ceiling",))
