@@ -23,18 +23,20 @@ copyright = author
 version = release = rom.__version__
 
 extensions = [
-    "sphinx.ext.autodoc", "sphinx.ext.napoleon", "myst_nb", "site_flow", "site_pages",
-    "site_text",
+    "sphinx.ext.autodoc", "sphinx.ext.autosummary", "sphinx.ext.napoleon", "myst_nb",
+    "sphinx_copybutton", "sphinx_design", "site_pages", "site_text",
 ]  # fmt: skip
 exclude_patterns = ["build"]
 nitpicky = True  # a name that is linked must exist
+nitpick_ignore_regex = [("py:class", ".*")]  # but for types in signatures
 suppress_warnings = ["config.cache"]
 
-autodoc_typehints = "none"  # docstrings give shapes and units, which types cannot
+autodoc_typehints_format = "short"
 autodoc_member_order = "bysource"
 autodoc_default_options = {"members": True, "inherited-members": "RomError, Exception, tuple"}
 add_module_names = False
 python_maximum_signature_line_length = 88
+toc_object_entries_show_parents = "hide"
 napoleon_use_param = False  # several names may share a line
 napoleon_attr_annotations = False
 napoleon_custom_sections = [
@@ -52,17 +54,20 @@ for name in ("OMPI_ALLOW_RUN_AS_ROOT", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM"):  # one
 myst_enable_extensions = ["dollarmath", "amsmath", "colon_fence"]
 myst_heading_anchors = 3
 
-html_theme = "alabaster"
+html_theme = "pydata_sphinx_theme"
 html_title = f"rom {release}"
 html_theme_options = {
-    "description": "From a gmsh geometry to a flexible body that moves",
-    "fixed_sidebar": True,
-    "page_width": "1080px",
-    "font_family": "sans-serif",
-    "show_powered_by": False,
+    "logo": {"text": "rom"},
+    "collapse_navigation": True,  # a page lists its neighbours, not all there are
+    "show_toc_level": 2,  # methods beside their class
+    "navbar_align": "left",
+    "primary_sidebar_end": [],
+    "footer_start": [],
+    "footer_end": [],
 }
+html_sidebars = {"**": ["sidebar-nav-bs"], "index": [], "generated/demos": []}
 html_static_path = ["static"]
-html_css_files = ["gallery.css"]
+html_css_files = ["site.css"]
 html_math_renderer = "mathml"
 html_show_sourcelink = False
 html_copy_source = False

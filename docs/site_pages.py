@@ -4,18 +4,15 @@ They are written below ``generated/`` beside this file whenever the site is buil
 them can be out of date.
 """
 
-import ast
 import importlib
 import inspect
 import re
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
-from site_tasks import TASKS
-from site_text import plain
+from site_tasks import SUBJECTS, TASKS
 from sphinx.application import Sphinx
 
 import rom
@@ -29,20 +26,6 @@ DEMOS = ROOT / "demos"
 PICTURES = (ROOT / "out", DEMOS)  # what `make pictures` leaves, then those of the README
 THUMBNAILS = Path(__file__).with_name("thumbnails")  # of the demos, by the name of the script
 PICTURE = re.compile(r"\b(\w+\.(?:png|gif))\b")
-ALSO = {  # what public functions give back or raise
-    "errors": ("errors",),
-    "mbs": (
-        "mbs.results.solution",
-        "mbs.analysis.linearize",
-        "mbs.analysis.response",
-        "mbs.analysis.campbell",
-        "mbs.results.state",
-        "mbs.parts.signals",
-    ),
-}
-# packages without a name that `rom` has itself, or whose names stand in components
-FURTHER_PARTS = ("eigen", "cyclic", "prestress", "parametric", "updating")
-WHOLE_MODULES = ("rom.rotation", "rom.units")
 CURES = {  # what to do about it, where no single message can tell
     "ConfigError": "Compare with `rom VERB --help` or the arguments of the function.",
     "UnknownNameError": "Take one of the names that the message lists.",
@@ -105,25 +88,25 @@ def _spoken(name: str) -> str:
     return Path(name).stem.replace("_", " ").capitalize()
 
 
-def gallery_page(scripts: list[Path], thumbnails: Path = THUMBNAILS) -> str:
-    """All demos: a small picture where there is one, the title, the first paragraph.
+def gallery_page(thumbnails: Path = THUMBNAILS) -> str:
+    """All demos by subject: a small picture where there is one, the title, the first paragraph.
 
     Args:
-        scripts: the demos.
         thumbnails: folder of small pictures named as the demos.
     """
-    parts = ["# Demos", "Each demo is one script; it ends in numbers that a test checks.\n"]
-    parts.append("::::{container} gallery")
-    for script in scripts:
-        text = "\n".join(_blocks(script.read_text())[0])
-        heading, about = (re.sub("^# ?", "", t, flags=re.M) for t in re.split(r"\n#\n", text)[:2])
-        title, page = heading.lstrip("# "), f"{script.stem}.md"
-        small = thumbnails / f"{script.stem}.png"
-        drawn = f"[![{title}](../{thumbnails.name}/{small.name})]({page})\n\n"
-        entry = f"{drawn if small.exists() else ''}**[{title}]({page})**\n\n{about}"
-        parts.append(f":::{{container}} demo\n{entry}\n:::")
-    listed = "\n".join(script.stem for script in scripts)
-    return "\n\n".join(parts) + f"\n\n::::\n\n```{{toctree}}\n:hidden:\n\n{listed}\n```\n"
+    parts = ["# Demos", "Each demo is one script; it ends in numbers that a test checks."]
+    for subject, names in SUBJECTS.items():
+        parts += [f"## {subject}", "::::{grid} 1 2 2 3\n:gutter: 3"]
+        for stem in (f"demo_{name}" for name in names.split()):
+            text = "\n".join(_blocks((DEMOS / f"{stem}.py").read_text())[0])
+            heading, about = (re.sub("^# ?", "", t, flags=re.M) for t in text.split("\n#\n")[:2])
+            card = f":::{{grid-item-card}} {heading.lstrip('# ')}\n:link: {stem}\n:link-type: doc\n"
+            if (thumbnails / f"{stem}.png").exists():
+                card += f":img-top: ../{thumbnails.name}/{stem}.png\n"
+            parts.append(f"{card}\n{about}\n:::")
+        parts.append("::::")
+    listed = "\n".join(f"demo_{name}" for names in SUBJECTS.values() for name in names.split())
+    return "\n\n".join([*parts, f"```{{toctree}}\n:hidden:\n\n{listed}\n```\n"])
 
 
 def error_page() -> str:
@@ -208,66 +191,53 @@ def _parts(schema: dict[str, Any], path: str) -> Iterator[tuple[str, dict[str, A
 
 
 def interface_pages() -> dict[str, str]:
-    """One page per part of the package, with its public names; and all names by task."""
-    parts: dict[str, list[str]] = {part: [] for part in FURTHER_PARTS}
-    for name in rom.__all__:
-        parts.setdefault(rom.MODULES[name].split(".")[1], []).append(name)
-    pages = {f"rom_{part}.rst": _names(part, names) for part, names in sorted(parts.items())}
-    functions = (f".. autofunction:: rom.fe.{name}\n" for name in rom.fe.__all__)
-    pages["rom_fe.rst"] = "\n".join([_head("rom.fe"), *functions])
-    for name in WHOLE_MODULES:
-        pages[f"{name.replace('.', '_')}.rst"] = _modules(name, [name])
-    for name, modules in _components().items():
+    """The reference: a page for each task, whose table leads to one page for each name."""
+    pages = {
+        f"task_{task.lower().replace(' ', '_')}.rst": "\n".join([
+            task, "=" * len(task), "", sentence, "", _table(names.split(), "   :toctree: api\n")
+        ])
+        for task, (sentence, names) in TASKS.items()
+        if task != "Components"
+    }  # fmt: skip
+    tasks = [name.removesuffix(".rst") for name in pages]
+    components = _components()
+    for name, modules in components.items():
         pages[f"{name.replace('.', '_')}.rst"] = _modules(name, modules)
-    listed = "\n".join(f"   {name.removesuffix('.rst')}" for name in pages)
-    sections = [_task(*item) for item in TASKS.items()]
+    for package, names in _packages().items():
+        pages[f"rom_{package}.rst"] = _head(f"rom.{package}") + "\n" + _table(names)
+    rest = ("commands", "files", "answers", "errors", "/conventions", "/glossary")
+    by_package = sorted(name.removesuffix(".rst") for name in pages if name.startswith("rom_"))
     return pages | {
         "interface.rst": "\n".join([
-            "Interface\n=========\n",
-            "Every public name by what it is for; behind the name stands its docstring.\n",
-            *sections,
-            f"By package\n----------\n\n.. toctree::\n   :maxdepth: 1\n\n{listed}\n",
+            "Reference\n=========\n",
+            "Every public name of ``rom`` by what it is for; each has a page with its arguments,"
+            " their types and units, what it returns and what it raises.\n",
+            _listed("By task", tasks),
+            _listed("Command line, files and words", rest),
+            _listed("By package", by_package),
         ])
     }  # fmt: skip
 
 
-def _task(heading: str, about: tuple[str, str]) -> str:
-    """A section with the names of a task and the first lines of their docstrings."""
-    sentence, names = about
-    rows = [f"- {_link(f'rom.{name}')}: {plain(_first_line(f'rom.{name}'))}"
-            for name in names.split()]  # fmt: skip
-    return "\n".join([heading, "-" * len(heading), "", sentence, "", *rows, ""])
+def _listed(heading: str, pages: Iterable[str]) -> str:
+    lines = "\n".join(f"   {page}" for page in pages)
+    return f".. toctree::\n   :caption: {heading}\n   :maxdepth: 1\n\n{lines}\n"
 
 
-def _link(name: str) -> str:
-    if name.startswith("rom.components."):
-        return f":doc:`{name} <{name.replace('.', '_')}>`"
-    return f":py:obj:`{name} <{_target(name)}>`"
+def _table(names: Iterable[str], option: str = "") -> str:
+    """Names below rom with the first sentences of their docstrings."""
+    lines = "\n".join(f"   rom.{name}" for name in names)
+    return f".. autosummary::\n   :nosignatures:\n   :template: base.rst\n{option}\n{lines}\n"
 
 
-def _target(name: str) -> str:
-    """Under which name the site describes it."""
-    package, _, short = name.rpartition(".")
-    front: dict[str, str] = getattr(importlib.import_module(package), "MODULES", {})
-    part = package.rpartition(".")[2]
-    if name.startswith("rom.fe."):
-        return f"rom.fe.{short}"
-    if package == "rom":
-        return name if short not in vars(errors) else f"rom.errors.{short}"
-    shown = front.get(short, package).removeprefix("rom.")
-    return f"rom.{shown}.{short}" if shown in ALSO.get(part, ()) else name
-
-
-def _first_line(name: str) -> str:
-    """Of rom.fe as it is written, for finite elements may be missing where pages are made."""
-    package, _, short = name.rpartition(".")
-    if package == "rom.fe":
-        tree = ast.parse((ROOT / "rom" / "fe" / "elasticity.py").read_text())
-        (node,) = (n for n in tree.body if isinstance(n, ast.FunctionDef) and n.name == short)
-        text = ast.get_docstring(node)
-    else:
-        text = inspect.getdoc(getattr(importlib.import_module(package), short))
-    return " ".join((text or "").partition("\n\n")[0].split())
+def _packages() -> dict[str, list[str]]:
+    """Public names by the package in which they lie."""
+    found: dict[str, list[str]] = {}
+    for name in (name for _, names in TASKS.values() for name in names.split()):
+        package, _, short = name.rpartition(".")
+        if package != "components":
+            found.setdefault(package or rom.MODULES[short].split(".")[1], []).append(name)
+    return found
 
 
 def _components() -> dict[str, list[str]]:
@@ -288,34 +258,6 @@ def _head(name: str) -> str:
     return f"{name}\n{'=' * len(name)}\n\n{about}\n"
 
 
-def _names(part: str, names: list[str]) -> str:
-    lines = [_head(f"rom.{part}"), *(_one(rom, name) for name in names)]
-    if part in rom.PACKAGES:
-        lines += [_one(getattr(rom, part), name) for name in _further(part)]
-    for module in ALSO.get(part, ()):
-        listed = [name for name in names if rom.MODULES[name] == f"rom.{module}"]
-        skip = f"   :exclude-members: {', '.join(listed)}\n" if listed else ""
-        lines.append(f".. automodule:: rom.{module}\n{skip}")
-    return "\n".join(lines)
-
-
-def _further(part: str) -> list[str]:
-    """Functions and classes of a package that `rom` does not have, and no module in `ALSO`."""
-    front = getattr(rom, part)
-    own: dict[str, str] = getattr(front, "MODULES", {})
-    shown = ALSO.get(part, ())
-    further = [
-        name for name, place in own.items()
-        if place != rom.MODULES.get(name) and place.removeprefix("rom.") not in shown
-    ]  # fmt: skip
-    return sorted(name for name in further if callable(getattr(front, name)))
-
-
-def _one(package: ModuleType, name: str) -> str:
-    kind = "class" if inspect.isclass(getattr(package, name)) else "function"
-    return f".. auto{kind}:: {package.__name__}.{name}\n"
-
-
 def _modules(title: str, modules: list[str]) -> str:
     lines = [_head(title)]
     for name in modules:
@@ -326,30 +268,34 @@ def _modules(title: str, modules: list[str]) -> str:
 
 
 def write_all(out: Path) -> None:
-    """Write every page, and beside them the pictures they show.
+    """Write every page that has changed, and beside them the pictures they show.
 
     Args:
-        out: folder, emptied first.
+        out: folder; what no page or picture of today is called goes.
     """
-    shutil.rmtree(out, ignore_errors=True)
-    out.mkdir(parents=True)
+    out.mkdir(parents=True, exist_ok=True)
     scripts = sorted(DEMOS.glob("demo_*.py"))
     pictures = {p.name: p for folder in reversed(PICTURES) for p in sorted(folder.glob("*.*"))}
     pictures = {name: path for name, path in pictures.items() if PICTURE.fullmatch(name)}
     pages = {f"{s.stem}.md": demo_page(s, pictures) for s in scripts}
     pages |= interface_pages()
-    pages["demos.md"] = gallery_page(scripts)
+    pages["demos.md"] = gallery_page()
     pages["errors.md"], pages["commands.md"] = error_page(), command_page()
     pages["files.md"], pages["answers.md"] = files_page(), answers_page()
     pages["changelog.md"] = (ROOT / "CHANGELOG.md").read_text()
+    shown = {name for name in pictures if any(f"({name})" in text for text in pages.values())}
+    for name in shown:
+        shutil.copy2(pictures[name], out / name)
     for name, text in pages.items():
-        (out / name).write_text(text)
-    for name, path in pictures.items():
-        if any(f"({name})" in text for text in pages.values()):
-            shutil.copy(path, out / name)
+        if not (out / name).exists() or (out / name).read_text() != text:
+            (out / name).write_text(text)
+    names = {f"rom.{name}.rst" for _, names in TASKS.values() for name in names.split()}
+    for path in out.rglob("*.*"):  # autosummary writes the pages of single names
+        if path.name not in shown | set(pages) | names:
+            path.unlink()
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
     """Register with Sphinx."""
-    app.connect("builder-inited", lambda app: write_all(Path(app.srcdir) / "generated"))
+    app.connect("config-inited", lambda app, _: write_all(Path(app.srcdir) / "generated"))
     return {"parallel_read_safe": True, "parallel_write_safe": True}

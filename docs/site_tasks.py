@@ -1,9 +1,17 @@
-"""The public names by what they are for: the one table behind the page of the interface."""
+"""Public names by what they are for, and demos by subject: what reference and gallery list."""
 
 # heading: a sentence about it, and the names, in the order in which they are met
 TASKS: dict[str, tuple[str, str]] = {
+    "Move": (
+        "Bodies, joints, forces and controllers become a mechanism, which moves.",
+        """Mechanism read_mechanism mbs.Part mbs.Marker mbs.Impact mbs.Pulley mbs.BallBearing
+        mbs.JournalBearing mbs.Groove mbs.multilobe mbs.Oil mbs.iso_vg
+        mbs.RollerBearing mbs.hertz_stiffness
+        surface_load mass_load SpreadLoad simulate release Keeping save_state load_state mbs.State
+        mbs.Instant mbs.Family mbs.Signal mbs.Elements mbs.Frames""",
+    ),
     "From geometry to matrices": (
-        "A mesh and its materials become stiffness and mass.",
+        "A STEP file, a geometry or a mesh becomes stiffness and mass.",
         """Material Orthotropic Layered fe.model fe.pieces fe.assemble read_component Region
         Interface Attachment SurfaceMesh FEModel mass_properties modes Modes
         eigen.substructured_modes""",
@@ -16,7 +24,7 @@ TASKS: dict[str, tuple[str, str]] = {
         second_order_balanced_truncation body.Marker body.Surface body.InertiaIntegrals""",
     ),
     "Parameters": (
-        "One reduction for a range of moduli, densities and thicknesses.",
+        "One reduction for all variants of a body, to compare or to optimise.",
         """reduce_parametric parametric.Parameter YoungsModulus Density Thickness BodyFamily
         parametric.FamilyAssembly""",
     ),
@@ -30,7 +38,7 @@ TASKS: dict[str, tuple[str, str]] = {
         updating.Comparison updating.JointSpring""",
     ),
     "Check": (
-        "What tells how far to trust a model, a body, a motion or a law.",
+        "How far a model, a body, a motion or a law can be trusted.",
         """check Report audit check_law eigen.mac eigen.residual_errors io.check_sid""",
     ),
     "Assemble": (
@@ -53,16 +61,8 @@ TASKS: dict[str, tuple[str, str]] = {
         """held_solid spin_up SpinUp ReducedSpinUp prestress.SteadyRotation Heat heated
         heated_sector thermal_buckling body.rotating_frequencies""",
     ),
-    "Move": (
-        "Bodies, joints and forces become a mechanism, and the mechanism moves.",
-        """read_mechanism Mechanism mbs.Part mbs.Marker mbs.Impact mbs.Pulley mbs.BallBearing
-        mbs.JournalBearing mbs.Groove mbs.multilobe mbs.Oil mbs.iso_vg
-        mbs.RollerBearing mbs.hertz_stiffness
-        surface_load mass_load SpreadLoad simulate release Keeping save_state load_state mbs.State
-        mbs.Instant mbs.Family mbs.Signal mbs.Elements mbs.Frames""",
-    ),
     "Results": (
-        "What a mechanism answers without moving, and what a motion holds.",
+        "What is known without a simulation, what a motion holds, and sensitivities.",
         """mbs.Solution mbs.Energy mbs.Occurrences mbs.ToothLoads mbs.tooth_loads
         mbs.film_pressures snapshot equilibrium continuation mbs.EquilibriumPath inverse_dynamics
         linearize mbs.Linearization campbell mbs.Campbell
@@ -98,7 +98,7 @@ TASKS: dict[str, tuple[str, str]] = {
         io.write_user_element io.read_nodes io.read_node_sets io.read_grids""",
     ),
     "Components": (
-        "What stands on top, each a package of its own.",
+        "Fields of engineering, each a package of its own.",
         """components.cosserat components.assumed_strain components.masonry components.rockfall
         components.hand components.linkages components.wind components.gear_mesh
         components.journal_bearing components.transmission components.updating
@@ -117,10 +117,25 @@ TASKS: dict[str, tuple[str, str]] = {
         eigen.given_rigid_motions eigen.mean_motion eigen.dofs_of eigen.orthonormal
         eigen.orthonormal_in eigen.canonical_signs eigen.count_shift eigen.whole_clusters""",
     ),
-    "Errors": (
+    "Exceptions": (
         "What is raised on purpose.",
         """RomError ConfigError UnknownNameError FileFormatError UnsafeFileError MeshError TagError
         MaterialError InterfaceError ParameterError ModelError SolverError ModesMissedError
         QualityGateError ResourceError ParallelError InterruptedRun RomWarning""",
     ),
+}
+
+SUBJECTS = {
+    "Reduce a body": """beam assembly compressor_blade reference_conditions parameters large_mesh
+    exchange""",
+    "Mechanisms": """slider_crank robot_arm satellite pendulum_chain hand rolling_wheel periodic
+    isotropy best_matching""",
+    "Large deflection and metal forming": """large_deflection flexure snap_through spin_up sheet
+    forming""",
+    "Rotating blades, wheels and rotors": """rotating_blade bladed_disk mistuning lost_tip
+    bent_blade rotor""",
+    "Gears and bearings": "planetary transmission two_stage oil_inlet",
+    "Wind turbines": "wind_turbine whole_turbine wind_power",
+    "Models and measurements": "updating bolted_frame virtual_sensing",
+    "Stones and rocks": "masonry rockfall",
 }

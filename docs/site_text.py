@@ -1,15 +1,29 @@
-"""How text becomes HTML: formulas as MathML, docstrings as the plain text they are."""
+"""How text becomes HTML: formulas as MathML, docstrings as plain text, types by public names."""
 
 import re
+from functools import cache
+from operator import attrgetter
 from typing import Any
 
+import numpy.typing as npt
 from docutils import nodes
 from latex2mathml.converter import convert
+from site_tasks import TASKS
 from sphinx.application import Sphinx
+from sphinx.util.typing import stringify_annotation
+
+import rom
 
 CODE = re.compile(r"(``.+?``|`[^`]+`)", re.S)
 EXAMPLE = re.compile(r"^ *>>> (?:.+\n?)+", re.M)  # up to the next blank line
 MARKUP = re.compile(r"([*|])|(?<=\w)(_)(?!\w)")
+# types as they are to be read: limits, whose units stand in the text, and aliases taken back
+SHORTER = {
+    re.escape(stringify_annotation(npt.ArrayLike, "smart")): "~numpy.typing.ArrayLike",
+    r"~numpy\.ndarray\[.*?\]\]": "~numpy.ndarray",
+    r"~typing\.Annotated\[((?:[^][]|\[[^][]*\])*?), ~rom\.arguments\.\w+\.\w+"
+    r"(?:\(.*?error=~rom\.errors\.\w+\))?\]": r"\1",
+}
 
 
 def plain(text: str) -> str:
@@ -34,6 +48,29 @@ def _docstring(app: Sphinx, what: str, name: str, thing: Any, options: Any, line
     # napoleon looks for a type in the first line; an escaped line end is nothing
     first = ["\\"] if what in ("attribute", "property") else []
     lines[:] = first + plain("\n".join(lines)).split("\n")
+
+
+@cache
+def _public_names() -> dict[str, str]:
+    """{module and name of a class: the name under which users import it}."""
+    names = [name for _, listed in TASKS.values() for name in listed.split()]
+    things = {f"rom.{name}": attrgetter(name)(rom) for name in names}
+    return {
+        f"{thing.__module__}.{thing.__qualname__}": name
+        for name, thing in things.items()
+        if isinstance(thing, type)
+    }
+
+
+def _types(app: Sphinx, what: str, name: str, thing: Any, options: Any, *said: str) -> Any:
+    """Arguments and result with short types, those of rom by their public names."""
+    for long, short in SHORTER.items():
+        said = tuple(text and re.sub(long, short, text) for text in said)
+    public = _public_names()
+    return tuple(
+        text and re.sub(r"rom(?:\.\w+)+", lambda found: public.get(found[0], found[0]), text)
+        for text in said
+    )
 
 
 def _skip(app: Sphinx, what: str, name: str, thing: Any, skip: bool, options: Any) -> bool | None:
@@ -72,5 +109,6 @@ def setup(app: Sphinx) -> dict[str, bool]:
     """Register with Sphinx; docstrings are taken before napoleon reads their sections."""
     app.add_html_math_renderer("mathml", (_inline, None), (_block, None))
     app.connect("autodoc-process-docstring", _docstring, priority=100)
+    app.connect("autodoc-process-signature", _types)
     app.connect("autodoc-skip-member", _skip)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -67,20 +67,19 @@ def test_a_demo_becomes_text_and_code(pages, tmp_path):
 
 
 def test_the_page_of_demos_has_each_with_its_small_picture(pages, tmp_path):
+    named = [f"demo_{name}" for names in pages.SUBJECTS.values() for name in names.split()]
     scripts = sorted(pages.DEMOS.glob("demo_*.py"))
-    page = pages.gallery_page(scripts)
-    entries = page.split("\n:::{container} demo\n")[1:]
-    assert len(entries) == len(scripts) > 20
-    for script, entry in zip(scripts, entries, strict=True):
+    assert sorted(named) == [script.stem for script in scripts]
+    page = pages.gallery_page()
+    entries = dict(zip(named, page.split("\n:::{grid-item-card} ")[1:], strict=True))
+    for script in scripts:
         title = script.read_text().split("\n")[0].removeprefix("# # ")
+        assert entries[script.stem].startswith(f"{title}\n:link: {script.stem}\n:link-type: doc\n")
         kept = pages.THUMBNAILS / f"{script.stem}.png"
-        assert f"\n**[{title}]({script.stem}.md)**\n\n" in f"\n{entry}"
-        drawn = f"[![{title}](../thumbnails/{script.stem}.png)]({script.stem}.md)"
-        assert (drawn in entry) == kept.exists()
+        assert (f"\n:img-top: ../thumbnails/{kept.name}\n" in entries[script.stem]) == kept.exists()
         draws = pages.PICTURE.search(script.read_text())
         assert kept.exists() or not draws, f"{script.name}: run it, then make thumbnails"
-    without = pages.gallery_page(scripts, tmp_path)
-    assert "![" not in without and without.count(":::{container} demo") == len(scripts)
+    assert ":img-top:" not in pages.gallery_page(tmp_path)
 
 
 def test_the_error_page_has_every_error(pages):
@@ -116,13 +115,12 @@ def test_every_public_name_stands_exactly_once_among_the_tasks(pages):
     named = [name for _, names in pages.TASKS.values() for name in names.split()]
     assert set(named) == public_names() and len(named) == len(set(named))
     shown = pages.interface_pages()
-    assert all(f":: rom.{name}\n" in "\n".join(shown.values()) for name in rom.__all__)
-    page = shown["interface.rst"]
-    assert "- :py:obj:`rom.reduce <rom.reduce>`: A flexible body that stands" in page
-    assert ":py:obj:`rom.mbs.Solution <rom.mbs.results.solution.Solution>`: Motion of" in page
-    assert page.count(":py:obj:`") + page.count(":doc:`") == len(named)
-    for heading in pages.TASKS:
-        assert f"\n{heading}\n{'-' * len(heading)}\n" in page
+    tasks = "\n".join(text for page, text in shown.items() if page.startswith("task_"))
+    listed = re.findall(r"^   rom\.(\S+)$", tasks, re.M)
+    assert sorted(listed) == sorted(name for name in named if not name.startswith("components."))
+    assert listed[0] == "Mechanism" and "   rom.mbs.Solution\n" in shown["rom_mbs.rst"]
+    for page in set(shown) - {"interface.rst"}:
+        assert f"\n   {page.removesuffix('.rst')}\n" in shown["interface.rst"]
 
 
 def test_generated_pages_have_every_verb_key_and_sample(pages):
@@ -170,7 +168,8 @@ def test_the_site_builds_without_warnings(tmp_path):
     assert done.returncode == 0, done.stderr
     site = {p.relative_to(tmp_path / "site").as_posix(): p for p in tmp_path.rglob("*.html")}
     assert {"index.html", "generated/errors.html", "generated/demo_beam.html"} <= set(site)
-    assert "rom.FlexibleBody.marker" in site["generated/rom_body.html"].read_text()  # inherited
+    body = site["generated/api/rom.FlexibleBody.html"].read_text()
+    assert "rom.FlexibleBody.marker" in body and "rom.body.Marker" in body  # inherited; a type
     for path in site.values():  # nothing is fetched when the site is read
         assert 'src="http' not in path.read_text() and '<link href="http' not in path.read_text()
 

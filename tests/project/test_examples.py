@@ -149,9 +149,9 @@ def rod():
 
 def test_notebooks_lie_here_without_outputs_and_the_site_names_them():
     """Outputs would be out of date, and of one machine."""
-    index = (ROOT / "docs" / "index.md").read_text()
+    index, start = ((ROOT / "docs" / f"{name}.md").read_text() for name in ("index", "start"))
     for path in NOTEBOOKS:
-        assert f"(notebooks/{path.stem}.ipynb)" in index and f"\nnotebooks/{path.stem}\n" in index
+        assert f"(notebooks/{path.stem}.ipynb)" in index and f"\nnotebooks/{path.stem}\n" in start
         cells = [one for one in json.loads(path.read_text())["cells"] if one["cell_type"] == "code"]
         assert cells and not any(one["outputs"] or one["execution_count"] for one in cells)
 
