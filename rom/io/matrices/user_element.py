@@ -22,7 +22,7 @@ from scipy.sparse import csr_matrix, tril
 
 from rom.decks.lines import whole
 from rom.errors import ConfigError, FileFormatError, UnsafeFileError, in_file
-from rom.io.files import Line, check_last_line, damaged, need, write_lines
+from rom.io.files import lines_of, need, write_lines
 from rom.io.matrices.dmig import Dofs
 from rom.model import Array
 from rom.names import ORIGIN_MARK
@@ -51,10 +51,9 @@ def read_user_element(path: str | Path) -> dict[str, tuple[csr_matrix, Dofs]]:
         UnsafeFileError: if it claims more nodes than a dense matrix can have.
     """
     path = Path(path)
-    check_last_line(path)
-    element, keyword, kind, at = _Element(), "", "", Line(path)
-    with path.open(encoding="latin1") as file, damaged("this is no user element", at):
-        for at.number, line in enumerate(file, 1):
+    element, keyword, kind = _Element(), "", ""
+    with lines_of(path, "this is no user element") as lines:
+        for line in lines:
             if line.startswith("**"):
                 keyword = _comment(element, keyword, line)
             elif line.startswith("*"):

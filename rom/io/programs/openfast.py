@@ -20,7 +20,7 @@ import numpy.typing as npt
 from rom.arguments import symmetric
 from rom.body.flexible import FlexibleBody
 from rom.errors import ConfigError, FileFormatError, QualityGateError, UnsafeFileError
-from rom.io.files import check_readable, write_lines
+from rom.io.files import check_readable, row, write_lines
 from rom.io.programs.interface_form import InterfaceForm, interface_form
 from rom.model import Array
 from rom.names import ORIGIN_MARK, check_known
@@ -90,7 +90,7 @@ def write_openfast(
     """
     check_known(version, VERSIONS, f"version {version!r} of OpenFAST is unknown; known:")
     found = superelement(body, held=held, gravity=gravity)
-    lines = _current(found) if version == 5 else _old(found)
+    lines = _document(found, old=version < 5)
     return write_lines(path, [f"! {body.name}, {ORIGIN_MARK}", *lines])
 
 
@@ -131,34 +131,28 @@ def _rows(body: FlexibleBody, form: InterfaceForm, held: Sequence[str]) -> npt.N
     return np.r_[first : first + 6, 6 * len(form.names) : len(form.K)]
 
 
-def _current(found: Superelement) -> Iterator[str]:
-    yield f"!Dimension: {len(found.M)}"
-    for kind, A in zip(UNITS, (found.M, found.K, found.D), strict=True):
-        yield f"!{kind} Matrix (Units ({UNITS[kind]}))"
-        yield from map(_row, A)
-    yield "!Weight constant (Units (N, m))"
-    yield _row(found.weight)
-    yield "!Weight stiffness (Units (N, m))"
-    yield from map(_row, found.K_W)
-
-
-def _old(found: Superelement) -> Iterator[str]:
+def _document(found: Superelement, *, old: bool) -> Iterator[str]:
     n = len(found.M)
-    yield "! Flex 5 Format"
-    yield f"!Dimension: {n}"
-    yield f"!Time increment in simulation: {LOAD_DURATION:g}"
-    yield f"!Total simulation time in file: {LOAD_DURATION:g}"
+    size = f"!Dimension: {n}"
+    if old:
+        yield "! Flex 5 Format"
+    yield size
+    if old:
+        yield f"!Time increment in simulation: {LOAD_DURATION:g}"
+        yield f"!Total simulation time in file: {LOAD_DURATION:g}"
     for kind, A in zip(UNITS, (found.M, found.K, found.D), strict=True):
         yield f"!{kind} Matrix (Units ({UNITS[kind]}))"
-        yield f"!Dimension: {n}"
-        yield from map(_row, A)
-    yield f"!{LOADING_LINE[1:].title()} (Units (N, m))"
-    yield f"!Dimension: 1 time column - {n} force columns - 1 wave elevation column"
-    yield from (_row(np.r_[t, found.weight, 0.0]) for t in (0.0, LOAD_DURATION))
-
-
-def _row(values: Array) -> str:
-    return " ".join(f"{v:.16e}" for v in values)
+        yield from [size] * old
+        yield from map(row, A)
+    if old:
+        yield f"!{LOADING_LINE[1:].title()} (Units (N, m))"
+        yield f"!Dimension: 1 time column - {n} force columns - 1 wave elevation column"
+        yield from (row(np.r_[t, found.weight, 0.0]) for t in (0.0, LOAD_DURATION))
+        return
+    yield "!Weight constant (Units (N, m))"
+    yield row(found.weight)
+    yield "!Weight stiffness (Units (N, m))"
+    yield from map(row, found.K_W)
 
 
 def read_openfast(path: str | Path) -> Superelement:
