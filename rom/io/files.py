@@ -72,13 +72,22 @@ class Line:
         return f"{self.path}, line {self.number}"
 
 
+WRONG_TEXT = (ValueError, IndexError, KeyError, OverflowError, struct.error)  # what it causes
+WRONG_JSON = (*WRONG_TEXT, TypeError, AttributeError, RecursionError)
+
+
 @contextmanager
-def damaged(what: str, where: object = "", hint: str = "") -> Iterator[None]:
+def damaged(
+    what: str,
+    where: object = "",
+    hint: str = "",
+    causes: tuple[type[Exception], ...] = WRONG_TEXT,
+) -> Iterator[None]:
     """Turn what wrong text causes, a ValueError, say, into an error that names its place."""
     try:
         yield
-    except (ValueError, IndexError, KeyError, OverflowError, struct.error) as error:
-        raise FileFormatError(f"{what}: {error}.", where=str(where), hint=hint) from error
+    except causes as error:
+        raise FileFormatError(f"{what}: {error!s:.200}.", where=str(where), hint=hint) from error
 
 
 @contextmanager

@@ -70,6 +70,7 @@ class Drawing:
 
 
 @typed
+@page.picture
 def plane(
     drawings: Sequence[Drawing | Scene],
     path: str | Path | None = None,
@@ -99,26 +100,21 @@ def plane(
     Raises:
         ConfigError: without a drawing, or if pictures cannot be made here.
     """
-    path = page.wanted(path)
     if not drawings:
         raise ConfigError("there is nothing to draw; give at least one drawing.")
-    if ax is not None:
-        figure, areas = page.taken(ax, len(drawings), "plane")
-        fill(figure, areas, drawings, _draw, legend=False)
-        return page.save(figure, path)
     rows = -(-len(drawings) // columns)
     gap = ROW_GAP if any(isinstance(x, Drawing) and legend_names(x) for x in drawings) else BARE_GAP
     width = (PAGE_WIDTH - 30) // columns - COLUMN_GAP
-    with page.styled():
-        figure = page.titled(PAGE_WIDTH, 100 + rows * (height + gap), title, caption)
-        areas = []
-        for k, drawing in enumerate(drawings):
-            row, column = divmod(k, columns)
-            left, top = 95 + column * (width + COLUMN_GAP), 110 + row * (height + gap)
-            narrow = BAR_WIDTH if isinstance(drawing, Drawing) and drawing.label else 0
-            areas.append(page.area(figure, left, top, width - narrow, height))
-        fill(figure, areas, drawings, _draw, legend=False)
-        return page.save(figure, path)
+    places = list[page.Place]()
+    for k, drawing in enumerate(drawings):
+        row, column = divmod(k, columns)
+        left, top = 95 + column * (width + COLUMN_GAP), 110 + row * (height + gap)
+        narrow = BAR_WIDTH if isinstance(drawing, Drawing) and drawing.label else 0
+        places.append((left, top, width - narrow, height))
+    size = PAGE_WIDTH, 100 + rows * (height + gap)
+    figure, areas = page.areas(ax, places, "plane", size, title, caption)
+    fill(figure, areas, drawings, _draw, legend=False)
+    return figure
 
 
 def _draw(axes: "Axes", drawing: Drawing, numbers: dict[str, int]) -> None:
