@@ -119,7 +119,15 @@ def need(holds: object, otherwise: str) -> None:
 def check_writable(path: str | Path) -> Path:
     """The path, if a file of that name can be written; to be asked before a long computation."""
     path = Path(path)
-    _check_possible(path)
+    try:
+        size = len(os.fsencode(path.name)) + TEMPORARY_BYTES
+    except UnicodeEncodeError:
+        size = MAX_FILE_NAME_BYTES + 1
+    if "\0" in str(path) or size > MAX_FILE_NAME_BYTES:
+        raise ConfigError(
+            f"no file can have the name {path.name[:60]!a}, of {len(path.name)} characters.",
+            hint=f"Up to {MAX_FILE_NAME_BYTES - TEMPORARY_BYTES} bytes of text can be written.",
+        )
     if path.is_dir():
         raise ConfigError(f"{path} is a folder; a file name is needed.")
     if not path.parent.is_dir():
@@ -130,19 +138,6 @@ def check_writable(path: str | Path) -> Path:
             hint="Choose another folder, or ask for the right to write there.",
         )
     return path
-
-
-def _check_possible(path: Path) -> None:
-    """Whether a file of that name, and the temporary one before it, can exist at all."""
-    try:
-        size = len(os.fsencode(path.name)) + TEMPORARY_BYTES
-    except UnicodeEncodeError:
-        size = MAX_FILE_NAME_BYTES + 1
-    if "\0" in str(path) or size > MAX_FILE_NAME_BYTES:
-        raise ConfigError(
-            f"no file can have the name {path.name[:60]!a}, of {len(path.name)} characters.",
-            hint=f"Up to {MAX_FILE_NAME_BYTES - TEMPORARY_BYTES} bytes of text can be written.",
-        )
 
 
 def check_last_line(path: Path) -> None:

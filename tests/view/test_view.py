@@ -165,15 +165,6 @@ def test_rods_are_grey_and_not_called_rigid(bar):
         mech.add_nonlinear(f"beside {grey}", cosserat.body(cosserat.straight(1.0, 1, **section)))
 
 
-def test_instants_are_drawn_side_by_side(bar, tmp_path):
-    mech, sol = swinging(bar)
-    shapes = {"ball": view.box((0.1, 0.1, 0.1))}
-    view.instants(mech, sol, tmp_path / "two.png", times=[0.05, 0.1], shapes=shapes)
-    image = colourful(pixels(tmp_path / "two.png"))
-    assert image[:, : image.shape[1] // 2].any()
-    assert image[:, image.shape[1] // 2 :].any()
-
-
 def test_wrong_requests_are_refused(bar, tmp_path):
     mech, sol = swinging(bar)
     wrong, film, picture = {"boll": view.box((1, 1, 1))}, tmp_path / "a.gif", tmp_path / "a.png"

@@ -19,8 +19,8 @@ import numpy.typing as npt
 
 from rom.arguments import symmetric
 from rom.body.flexible import FlexibleBody
-from rom.errors import ConfigError, FileFormatError, QualityGateError, UnsafeFileError
-from rom.io.files import check_readable, row, write_lines
+from rom.errors import ConfigError, QualityGateError, UnsafeFileError
+from rom.io.files import check_readable, damaged, need, row, write_lines
 from rom.io.programs.interface_form import InterfaceForm, interface_form
 from rom.model import Array
 from rom.names import ORIGIN_MARK, check_known
@@ -39,6 +39,9 @@ MATRICES = {"!mass": "M", "!stiffness": "K", "!damping": "D", "!weight stiffness
 WEIGHT_LINE, LOADING_LINE = "!weight constant", "!loading and wave elevation"
 MAX_COORDINATES = 10_000  # coordinates
 ASYMMETRY_RTOL, TIME_STEP_RTOL = 1e-6, 1e-3
+REWRITE_HINT = (
+    "Write the file again; it is cut, changed, or of another kind (GuyanASCII is not read)."
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,8 +169,11 @@ def read_openfast(path: str | Path) -> Superelement:
     """
     path = check_readable(path)
     reader = _Reader(str(path), path.read_text(encoding="latin1").splitlines())
-    reader.run()
-    return reader.superelement()
+    with damaged("this is no superelement", reader, REWRITE_HINT):
+        reader.run()
+        found = reader.superelement()
+    _check(found, str(path))
+    return found
 
 
 class _Reader:
@@ -201,16 +207,16 @@ class _Reader:
         n = self.head.get(DIMENSION_LINE, 0)
         if n > MAX_COORDINATES:
             raise UnsafeFileError(f"{n:.0f} coordinates are not read.", where=self.path)
-        if n < 6 or n != int(n):
-            raise self.error(f"{DIMENSION_LINE!r} 6 or more has to come before the blocks")
+        whole = n >= 6 and n == int(n)
+        need(whole, f"{DIMENSION_LINE!r} 6 or more has to come before the blocks")
         return int(n)
 
     @property
     def steps(self) -> int:
         """Lines of loads that OpenFAST reads."""
         dt, T = self.head.get(STEP_LINE, 0.0), self.head.get(DURATION_LINE, -1.0)
-        if not (dt > 0 and 0 <= T / dt < len(self.lines)):
-            raise self.error(f"a time step {dt:g} s and a duration {T:g} s do not fit the file")
+        fits = dt > 0 and 0 <= T / dt < len(self.lines)
+        need(fits, f"a time step {dt:g} s and a duration {T:g} s do not fit the file")
         return round(T / dt) + 1
 
     def rows(self, k: int, widths: tuple[int, ...]) -> Array:
@@ -220,8 +226,8 @@ class _Reader:
         for _ in range(k):
             words = self.lines[self.at].split() if self.at < len(self.lines) else []
             self.at += 1
-            if len(words) not in widths or (found and len(words) != len(found[0])):
-                raise self.error(f"row {len(found) + 1} of {k} has {len(words)} words")
+            fits = len(words) in widths and (not found or len(words) == len(found[0]))
+            need(fits, f"row {len(found) + 1} of {k} has {len(words)} words")
             found.append([self.number(word) for word in words])
         return np.array(found)
 
@@ -230,29 +236,21 @@ class _Reader:
             value = float(word.lower().replace("d", "e"))
         except ValueError:
             value = np.nan
-        if not np.isfinite(value):
-            raise self.error(f"{word.strip()!r} is not a finite number")
+        need(np.isfinite(value), f"{word.strip()!r} is not a finite number")
         return value
 
-    def error(self, what: str) -> FileFormatError:
-        return FileFormatError(
-            f"{what}.",
-            where=f"{self.path}, line {min(self.at, len(self.lines))}",
-            hint="Write the file again; it is cut, changed, or of another kind (GuyanASCII is not "
-            "read).",
-        )
+    def __str__(self) -> str:
+        return f"{self.path}, line {min(self.at, len(self.lines))}"
 
     def superelement(self) -> Superelement:
         needed = {"M", "K", "D"} | ({"loads"} if self.old else {"weight", "K_W"})
-        if missing := sorted(needed - set(self.blocks)):
-            raise self.error(f"the blocks {missing} are missing")
-        n, b = self.n, self.blocks
+        missing = sorted(needed - set(self.blocks))
+        need(not missing, f"the blocks {missing} are missing")
+        n, b, dt = self.n, self.blocks, self.head.get(STEP_LINE, 0.0)
         loads = b.get("loads", np.zeros((0, n + 2)))
-        if np.abs(np.diff(loads[:, 0]) - self.head.get(STEP_LINE, 0.0)).max(initial=0.0) > (
-            TIME_STEP_RTOL * self.head.get(STEP_LINE, 0.0)
-        ):
-            raise self.error(f"the times of the loads are not {self.head[STEP_LINE]:g} s apart")
-        found = Superelement(
+        uneven = np.abs(np.diff(loads[:, 0]) - dt).max(initial=0.0)
+        need(uneven <= TIME_STEP_RTOL * dt, f"the times of the loads are not {dt:g} s apart")
+        return Superelement(
             M=b["M"],
             K=b["K"],
             D=b["D"],
@@ -262,8 +260,6 @@ class _Reader:
             loads=loads[:, 1 : n + 1],
             elevation=loads[:, n + 1] if loads.shape[1] == n + 2 else np.zeros(len(loads)),
         )
-        _check(found, self.path)
-        return found
 
 
 def _check(found: Superelement, path: str) -> None:

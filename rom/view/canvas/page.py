@@ -159,6 +159,13 @@ def colour_bar(
     axes.set_title(label, size=SMALL_SIZE, pad=6)
 
 
+def scale_beside(axes: "Axes", coloured: Any, label: str, **where: Any) -> None:
+    """The colour bar of what is drawn in axes, which takes some of their room."""
+    bar = axes.figure.colorbar(coloured, ax=axes, **where)
+    bar.set_label(label, size=SMALL_SIZE)
+    bar.ax.tick_params(labelsize=SMALL_SIZE)
+
+
 def pixels(figure: "Figure") -> Image:
     """(height, width, 3) the finished sheet."""
     figure.canvas.draw()

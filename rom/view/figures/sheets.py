@@ -108,9 +108,7 @@ def deformed(  # noqa: PLR0913  keywords of one picture
         drawn = _shape(area, shape)
         if shape.values is not None:
             where = {"location": "bottom", "fraction": 0.03, "pad": 0.02, "aspect": 24}
-            bar = figure.colorbar(drawn, ax=area, ticks=MaxNLocator(5), **where)
-            bar.set_label(shape.label, size=page.SMALL_SIZE)
-            bar.ax.tick_params(labelsize=page.SMALL_SIZE)
+            page.scale_beside(area, drawn, shape.label, ticks=MaxNLocator(5), **where)
     for k, (name, (x, y)) in enumerate(curves.items()):
         look = {"color": LINES[k], "marker": MARKERS[k], "lw": 1.5}
         axes.semilogx(np.asarray(x), np.asarray(y), label=name, **look)
