@@ -61,11 +61,6 @@ def test_a_name_has_one_colour_in_all_panels():
     assert two["a"] == one["a"] and two["d"] == one["d"]
 
 
-def test_points_of_another_length_are_refused():
-    with pytest.raises(ConfigError, match="2 values of 'seen' for 3 times"):
-        view.history(X, [("y", {"seen": ([0.0, 0.5, 1.0], [1.0, 2.0])})])
-
-
 def test_a_speed_is_marked_in_a_campbell_diagram():
     speeds = np.linspace(0.0, 100.0, 3)
     diagram = Campbell(speeds, (60j + 0.1j * speeds)[:, None], np.ones((2, 1)))

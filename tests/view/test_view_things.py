@@ -202,8 +202,6 @@ def test_what_is_left_of_an_update_has_a_scale_of_its_own():
     assert np.ptp(errors.get_xlim()) < 0.3
     responses = figure.axes[0].lines
     assert [line.get_xdata().size for line in responses] == [X.size, fine.size]
-    with pytest.raises(ConfigError, match="2 values of 'test' for 20 frequencies"):
-        view.updating(X, {"test": [1.0, 2.0]}, changes, structure=structure, label="u")
 
 
 @pytest.mark.long

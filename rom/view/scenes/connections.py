@@ -143,8 +143,11 @@ def _grounded(scenery: Scenery, joint: "Joint", axis: Array | None) -> Iterator[
 
 def _foot(scenery: Scenery, marker: Marker, normal: Array) -> float:
     """How wide a body is where it leaves a wall, about a marker [m]; 0 without a surface."""
-    X, inward = scenery.around(marker), scenery.places.pose(marker.body)[1][0].T @ normal
-    face = X[X @ inward < FOOT_RATIO * max(np.ptp(X, axis=0))] if len(X) else X
+    X = scenery.around(marker)
+    if not len(X):
+        return 0.0
+    inward = scenery.places.pose(marker.body)[1][0].T @ normal
+    face = X[X @ inward < FOOT_RATIO * np.ptp(X, axis=0).max()]
     radial = face - np.outer(face @ inward, inward)
     return 2 * float(np.linalg.norm(radial, axis=1).max(initial=0.0))
 

@@ -37,7 +37,7 @@ class Scenery:
 
     def beyond(self, marker: Marker, direction: Array) -> float:
         """How far the surface of a body goes from a marker in a direction (3,) of its frame [m]."""
-        return max(0.0, float((self.around(marker) @ direction).max(initial=0.0)))
+        return float((self.around(marker) @ direction).max(initial=0.0))
 
     def seen_from(self, marker: Marker, others: Sequence[Marker]) -> Array:
         """(k, 3) places of other markers in all instants, from one in the frame of its body [m]."""
