@@ -267,8 +267,11 @@ def _misfits(body: FlexibleBody, r: int) -> Iterator[str]:
         yield from _marker_misfits(m, r)
     if body.stress is not None and not body.stress.fits(r):
         yield "the stress recovery does not fit the body"
-    if body.surface is not None and not _surface_fits(body.surface, r):
-        yield "the surface does not fit the body"
+    if (surface := body.surface) is not None:
+        n, corners = len(surface.points), surface.triangles
+        fits = (surface.shape.shape, corners.shape[1:]) == ((3 * n, r), (3,))
+        if not fits or corners.min(initial=0) < 0 or corners.max(initial=-1) >= n:
+            yield "the surface does not fit the body"
     if body.quartic is not None and not body.quartic.fits(r):
         yield f"the energy at large deflection does not fit {r} coordinates"
 
@@ -285,9 +288,3 @@ def _marker_misfits(m: Marker, r: int) -> Iterator[str]:
         dofs, shapes = 3 * len(m.patch.points), m.patch.shapes
         if (n_c != dofs) if shapes is None else (shapes.shape != (dofs, n_c)):
             yield f"the surface of marker {m.name!r} does not fit {n_c} coordinates"
-
-
-def _surface_fits(surface: Surface, r: int) -> bool:
-    n, corners = len(surface.points), surface.triangles
-    fits = (surface.shape.shape, corners.shape[1:]) == ((3 * n, r), (3,))
-    return fits and (corners.size == 0 or bool(corners.min() >= 0 and corners.max() < n))
