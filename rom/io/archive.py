@@ -89,7 +89,12 @@ def _checked(path: Path, kind: Kind, limit: int) -> tuple[dict[str, Any], dict[s
             _refuse_hostile(archive, limit)
             manifest = _read_manifest(archive, kind)
             names = sorted(_digests(manifest, kind))
-            _refuse_missing(archive, names)
+            there = set(archive.namelist())
+            if missing := [name for name in names if f"{name}.npy" not in there]:
+                raise FileFormatError(
+                    f"the file lacks the array {named(missing)} of its manifest.",
+                    hint="It may have been changed after writing; write or copy it again.",
+                )
             return manifest, {name: _read(archive, name) for name in names}
     except (zipfile.BadZipFile, OSError, EOFError, KeyError, RuntimeError) as e:
         cut = "It may have been cut in a transfer; write or copy it again."
@@ -126,15 +131,6 @@ def _refuse_hostile(archive: zipfile.ZipFile, limit: int) -> None:
     for name in archive.namelist():
         if name.startswith("/") or "\\" in name or ".." in name.split("/"):
             raise UnsafeFileError(f"the member {name[:60]!r} leads elsewhere.")
-
-
-def _refuse_missing(archive: zipfile.ZipFile, names: list[str]) -> None:
-    there = set(archive.namelist())
-    if missing := [name for name in names if f"{name}.npy" not in there]:
-        raise FileFormatError(
-            f"the file lacks the array {named(missing)} of its manifest.",
-            hint="It may have been changed after writing; write or copy it again.",
-        )
 
 
 def _read(archive: zipfile.ZipFile, name: str) -> Array:

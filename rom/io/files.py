@@ -1,9 +1,9 @@
 """Files are written whole or not at all, and looked at before they are read."""
 
 import os
+import secrets
 import shutil
 import struct
-import tempfile
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -28,15 +28,18 @@ def write_whole(path: str | Path, content: bytes | Callable[[IO[bytes]], object]
         ResourceError: if the disk is full.
     """
     path = check_writable(path)
+    part = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
     try:
-        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
-    except OSError as error:  # of which check_writable knows nothing
-        raise ResourceError(f"{path} cannot be written: {error.strerror}.") from error
-    try:
-        _fill(handle, content)
-        os.chmod(name, 0o666 & ~_umask())
-        os.replace(name, path)
-        _sync_folder(path.parent)
+        with part.open("xb") as file:
+            file.write(content) if isinstance(content, bytes) else content(file)
+            file.flush()
+            os.fsync(file.fileno())
+        part.replace(path)
+        folder = os.open(path.parent, os.O_RDONLY)
+        try:
+            os.fsync(folder)
+        finally:
+            os.close(folder)
     except OSError as error:
         free = shutil.disk_usage(path.parent).free / 2**20
         raise ResourceError(
@@ -44,13 +47,18 @@ def write_whole(path: str | Path, content: bytes | Callable[[IO[bytes]], object]
             hint="Nothing was left behind.",
         ) from error
     finally:
-        Path(name).unlink(missing_ok=True)
+        part.unlink(missing_ok=True)
     return path
 
 
 def write_lines(path: str | Path, lines: Iterable[str]) -> Path:
     """Write lines of text, see `write_whole`."""
     return write_whole(path, ("\n".join(lines) + "\n").encode())
+
+
+def row(values: Iterable[float]) -> str:
+    """Numbers of 17 digits as a line of text."""
+    return " ".join(f"{v:.16e}" for v in values)
 
 
 @dataclass(slots=True)
@@ -64,13 +72,42 @@ class Line:
         return f"{self.path}, line {self.number}"
 
 
+WRONG_TEXT = (ValueError, IndexError, KeyError, OverflowError, struct.error)  # what it causes
+WRONG_JSON = (*WRONG_TEXT, TypeError, AttributeError, RecursionError)
+
+
 @contextmanager
-def damaged(what: str, where: object = "") -> Iterator[None]:
+def damaged(
+    what: str,
+    where: object = "",
+    hint: str = "",
+    causes: tuple[type[Exception], ...] = WRONG_TEXT,
+) -> Iterator[None]:
     """Turn what wrong text causes, a ValueError, say, into an error that names its place."""
     try:
         yield
-    except (ValueError, IndexError, KeyError, OverflowError, struct.error) as error:
-        raise FileFormatError(f"{what}: {error}.", where=str(where)) from error
+    except causes as error:
+        raise FileFormatError(f"{what}: {error!s:.200}.", where=str(where), hint=hint) from error
+
+
+@contextmanager
+def lines_of(
+    path: Path, what: str, hint: str = "", encoding: str = "latin1"
+) -> Iterator[Iterator[str]]:
+    """The lines of a text file; what its reader raises as of wrong text names the last one read.
+
+    Raises:
+        FileFormatError: if the file is missing, its last line is cut, or it is damaged.
+    """
+    check_last_line(path)
+    at = Line(path)
+
+    def numbered(file: IO[str]) -> Iterator[str]:
+        for at.number, line in enumerate(file, 1):
+            yield line
+
+    with path.open(encoding=encoding, errors="replace") as file, damaged(what, at, hint):
+        yield numbered(file)
 
 
 def need(holds: object, otherwise: str) -> None:
@@ -82,7 +119,15 @@ def need(holds: object, otherwise: str) -> None:
 def check_writable(path: str | Path) -> Path:
     """The path, if a file of that name can be written; to be asked before a long computation."""
     path = Path(path)
-    _check_possible(path)
+    try:
+        size = len(os.fsencode(path.name)) + TEMPORARY_BYTES
+    except UnicodeEncodeError:
+        size = MAX_FILE_NAME_BYTES + 1
+    if "\0" in str(path) or size > MAX_FILE_NAME_BYTES:
+        raise ConfigError(
+            f"no file can have the name {path.name[:60]!a}, of {len(path.name)} characters.",
+            hint=f"Up to {MAX_FILE_NAME_BYTES - TEMPORARY_BYTES} bytes of text can be written.",
+        )
     if path.is_dir():
         raise ConfigError(f"{path} is a folder; a file name is needed.")
     if not path.parent.is_dir():
@@ -93,19 +138,6 @@ def check_writable(path: str | Path) -> Path:
             hint="Choose another folder, or ask for the right to write there.",
         )
     return path
-
-
-def _check_possible(path: Path) -> None:
-    """Whether a file of that name, and the temporary one before it, can exist at all."""
-    try:
-        size = len(os.fsencode(path.name)) + TEMPORARY_BYTES
-    except UnicodeEncodeError:
-        size = MAX_FILE_NAME_BYTES + 1
-    if "\0" in str(path) or size > MAX_FILE_NAME_BYTES:
-        raise ConfigError(
-            f"no file can have the name {path.name[:60]!a}, of {len(path.name)} characters.",
-            hint=f"Up to {MAX_FILE_NAME_BYTES - TEMPORARY_BYTES} bytes of text can be written.",
-        )
 
 
 def check_last_line(path: Path) -> None:
@@ -119,24 +151,3 @@ def check_last_line(path: Path) -> None:
                 where=str(path),
                 hint="Let the program that made it write it again, or end the line if it is whole.",
             )
-
-
-def _fill(handle: int, content: bytes | Callable[[IO[bytes]], object]) -> None:
-    with os.fdopen(handle, "wb") as file:
-        file.write(content) if isinstance(content, bytes) else content(file)
-        file.flush()
-        os.fsync(file.fileno())
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
-
-
-def _sync_folder(folder: Path) -> None:
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)

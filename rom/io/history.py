@@ -34,6 +34,11 @@ class Channel:
     columns: tuple[str, ...]  # their names
     values: Array  # (n_t, c)
 
+    @property
+    def names(self) -> list[str]:
+        """Of the columns as a table has them, without units."""
+        return [f"{' '.join(self.path[1:])} {x}".strip() for x in self.columns]
+
 
 @typed
 def write_history(solution: AnySolution, path: str | Path, *, every: int = 1) -> Path:
@@ -122,37 +127,30 @@ def channels(solution: Any) -> Iterator[Channel]:
     for name, part in solution.mechanism.parts.items():
         yield from _of_body(solution, name, part)
     for joint in sorted(set(solution.packed.row_owner)):
-        loads = solution.reaction(joint)
-        yield Channel(("joints", joint, "force"), "N", AXIS_LETTERS, loads[:, :3])
-        yield Channel(("joints", joint, "moment"), "N m", AXIS_LETTERS, loads[:, 3:])
-        yield from _of_joint(solution, joint)
+        place, loads = ("joints", joint), solution.reaction(joint)
+        yield Channel((*place, "force"), "N", AXIS_LETTERS, loads[:, :3])
+        yield Channel((*place, "moment"), "N m", AXIS_LETTERS, loads[:, 3:])
+        known = solution.mechanism.joints.get(joint)
+        if known is None or known.coordinate is None:
+            continue
+        motion = solution.joint(joint)
+        for what, row, unit in (
+            ("angle", known.turn, "rad"),
+            ("displacement", known.displacement, "m"),
+        ):
+            if row is not None:
+                yield Channel((*place, what), unit, ("",), getattr(motion, what))
+                rate = getattr(motion, f"{what}_rate")
+                yield Channel((*place, f"{what} rate"), f"{unit}/s", ("",), rate)
     for element in solution.elements:
-        yield from _of_element(element, solution.element(element))
+        place, found = ("elements", element), solution.element(element)
+        if found.on_joint:
+            yield Channel((*place, "along"), found.along_unit, ("",), found.along)
+            continue
+        yield Channel((*place, "force"), "N", AXIS_LETTERS, found.force[:, -1])
+        yield Channel((*place, "moment"), "N m", AXIS_LETTERS, found.moment[:, -1])
     for name in ENERGIES:
-        values = getattr(solution.energy, name)
-        yield Channel(("energy", name), "J", ("",), values)
-
-
-def _of_joint(solution: Any, name: str) -> Iterator[Channel]:
-    joint = solution.mechanism.joints.get(name)
-    if joint is None or joint.coordinate is None:
-        return
-    motion, place = solution.joint(name), ("joints", name)
-    if joint.turn is not None:
-        yield Channel((*place, "angle"), "rad", ("",), motion.angle)
-        yield Channel((*place, "angle rate"), "rad/s", ("",), motion.angle_rate)
-    if joint.displacement is not None:
-        yield Channel((*place, "displacement"), "m", ("",), motion.displacement)
-        yield Channel((*place, "displacement rate"), "m/s", ("",), motion.displacement_rate)
-
-
-def _of_element(name: str, found: Any) -> Iterator[Channel]:
-    """Along the coordinate of its joint, or on its last marker."""
-    if found.on_joint:
-        yield Channel(("elements", name, "along"), found.along_unit, ("",), found.along)
-        return
-    yield Channel(("elements", name, "force"), "N", AXIS_LETTERS, found.force[:, -1])
-    yield Channel(("elements", name, "moment"), "N m", AXIS_LETTERS, found.moment[:, -1])
+        yield Channel(("energy", name), "J", ("",), getattr(solution.energy, name))
 
 
 def _of_body(solution: Any, name: str, part: Any) -> Iterator[Channel]:
@@ -182,9 +180,7 @@ def _table(solution: Any, t: Array, found: tuple[Channel, ...]) -> bytes:
 
 def _head(found: tuple[Channel, ...]) -> list[str]:
     """Names of all columns, units in brackets."""
-    return [
-        f"{' '.join(c.path[1:])} {x}".strip() + f" [{c.unit}]" for c in found for x in c.columns
-    ]
+    return [f"{name} [{c.unit}]" for c in found for name in c.names]
 
 
 def table(head: list[str], values: Array, number: str) -> bytes:

@@ -4,6 +4,7 @@ The manifest is a JSON text stored as bytes: schema and version, units, names, p
 certificate, and the SHA-256 of every array. A reader needs NumPy and this page only.
 """
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -228,25 +229,13 @@ def _faults(manifest: dict[str, Any], arrays: dict[str, Array]) -> Iterator[str]
     for known in (names, loads):
         if len(set(known)) < len(known) or not all(isinstance(name, str) for name in known):
             yield f"names {known!r}"
-    if reference not in (*FRAMES, *names) and not any(
-        reference.startswith(word) and _are_names(reference.removeprefix(word), n, names)
-        for word, n in (("pins ", 2), ("3-2-1 ", 3))
-    ):
+    name = f"({'|'.join(map(re.escape, names))})"  # with blanks, perhaps
+    held = names and re.fullmatch(f"pins {name} {name}|3-2-1 {name} {name} {name}", reference)
+    if reference not in (*FRAMES, *names) and not held:
         yield f"reference = {reference!r}, which must be {named(FRAMES)}, or of {names}"
     for kind in (m["kind"] for m in markers):
         if kind.split(":")[0] not in KINDS:
             yield f"the kind of interface {kind!r}, none of {', '.join(KINDS)}"
-
-
-def _are_names(text: str, n: int, names: list[str]) -> bool:
-    """Whether a text is n of the names, which may have blanks themselves."""
-    if n == 1:
-        return text in names
-    return any(
-        _are_names(text.removeprefix(f"{name} "), n - 1, names)
-        for name in names
-        if text.startswith(f"{name} ")
-    )
 
 
 def _verify(body: FlexibleBody) -> None:
@@ -278,8 +267,11 @@ def _misfits(body: FlexibleBody, r: int) -> Iterator[str]:
         yield from _marker_misfits(m, r)
     if body.stress is not None and not body.stress.fits(r):
         yield "the stress recovery does not fit the body"
-    if body.surface is not None and not _surface_fits(body.surface, r):
-        yield "the surface does not fit the body"
+    if (surface := body.surface) is not None:
+        n, corners = len(surface.points), surface.triangles
+        fits = (surface.shape.shape, corners.shape[1:]) == ((3 * n, r), (3,))
+        if not fits or corners.min(initial=0) < 0 or corners.max(initial=-1) >= n:
+            yield "the surface does not fit the body"
     if body.quartic is not None and not body.quartic.fits(r):
         yield f"the energy at large deflection does not fit {r} coordinates"
 
@@ -296,9 +288,3 @@ def _marker_misfits(m: Marker, r: int) -> Iterator[str]:
         dofs, shapes = 3 * len(m.patch.points), m.patch.shapes
         if (n_c != dofs) if shapes is None else (shapes.shape != (dofs, n_c)):
             yield f"the surface of marker {m.name!r} does not fit {n_c} coordinates"
-
-
-def _surface_fits(surface: Surface, r: int) -> bool:
-    n, corners = len(surface.points), surface.triangles
-    fits = (surface.shape.shape, corners.shape[1:]) == ((3 * n, r), (3,))
-    return fits and (corners.size == 0 or bool(corners.min() >= 0 and corners.max() < n))

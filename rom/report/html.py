@@ -124,8 +124,7 @@ def write_report(sections: dict[str, Sequence[str]], path: str | Path, title: st
         f"<style>{PAGE_STYLE}</style></head><body><h1>{name}</h1>{_once_each(body)}"
         f"{''.join(f'<script>{script}</script>' for script in scripts)}</body></html>\n"
     )
-    write_whole(path, lambda file: file.write(text.encode("utf-8")))
-    return path
+    return write_whole(path, text.encode("utf-8"))
 
 
 def _policy(scripts: Sequence[str]) -> str:

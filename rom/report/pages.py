@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from rom.config.document import read_document
 from rom.errors import ConfigError, FileFormatError, RomError
+from rom.io.files import WRONG_JSON, damaged, need
 from rom.model import Report, Row
 from rom.process import stopwatch as watch
 from rom.process.child import scratch
@@ -333,21 +334,18 @@ def of_run(folder: Path) -> tuple[str, Sections]:
 
 def _record(folder: Path) -> Told:
     path = folder / RECORD_FILE
-    try:
-        record: Told = json.loads(path.read_text(encoding="utf-8"))
-        if record["schema"] != "rom-run" or record["version"][0] != 1:
-            raise FileFormatError(f"version {record['version']} is not known.", where=str(path))
-        wanted = ("name", "files", "bodies", "joints", "audit", "status", "steps", "t_end")
-        missing = [k for k in (*wanted, "command", "versions", "source") if k not in record]
-    except FileNotFoundError:
+    if not path.is_file():
         why = f"there is no {RECORD_FILE}: this is not the folder of a run."
         hint = "rom simulate FILE.toml -o FOLDER makes one."
-        raise FileFormatError(why, where=str(folder), hint=hint) from None
-    except (ValueError, KeyError, TypeError, IndexError) as error:
-        raise FileFormatError(f"is no record of a run: {error}.", where=str(path)) from None
-    if missing:
-        raise FileFormatError(f"the record says nothing of {', '.join(missing)}.", where=str(path))
-    return record
+        raise FileFormatError(why, where=str(folder), hint=hint)
+    with damaged("this is no record of a run", path, causes=WRONG_JSON):
+        record: Told = json.loads(path.read_text(encoding="utf-8"))
+        known = record["schema"] == "rom-run" and record["version"][0] == 1
+        need(known, f"version {record['version']} is not known")
+        wanted = ("name", "files", "bodies", "joints", "audit", "status", "steps", "t_end")
+        missing = [k for k in (*wanted, "command", "versions", "source") if k not in record]
+        need(not missing, f"it says nothing of {', '.join(missing)}")
+        return record
 
 
 def _energy(folder: Path, record: Told) -> list[str]:

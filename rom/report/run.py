@@ -36,7 +36,7 @@ class Record:
 
         files = [path.name for path in paths]
         text = json.dumps(self._data(files, solution, audit), indent=2)
-        write_whole(paths[-1], lambda file: file.write(text.encode()))
+        write_whole(paths[-1], text.encode())
 
     def _data(self, files: list[str], solution: "Solution", audit: "Report") -> dict[str, Any]:
         parts, joints = solution.mechanism.parts.items(), solution.mechanism.joints.items()
@@ -166,9 +166,9 @@ def columns(solution: "Solution") -> dict[str, tuple[str, Any]]:
     from rom.io.history import channels
 
     return {
-        f"{' '.join(c.path[1:])} {x}".strip(): (c.unit, c.values.reshape(len(solution.t), -1)[:, k])
+        name: (c.unit, c.values.reshape(len(solution.t), -1)[:, k])
         for c in channels(solution)
-        for k, x in enumerate(c.columns)
+        for k, name in enumerate(c.names)
     }
 
 

@@ -24,7 +24,7 @@ from rom.view.canvas.solids import Mesh
 from rom.view.figures.things import COLOURS
 from rom.view.scenes.film import METAL_COLOURS, shades_of
 from rom.view.scenes.mode_shapes import AMPLITUDE_RATIO, displacement
-from rom.view.scenes.places import placed
+from rom.view.scenes.places import evenly, placed
 from rom.view.scenes.rigid import bars, check_bodies, ends_of
 
 if TYPE_CHECKING:
@@ -206,7 +206,7 @@ def _steps(solution: "Solution") -> Index:
     """Numbers of the instants that are kept, evenly over the saved ones."""
     per_frame = 4 * sum(7 + part.r for part in solution.mechanism.parts.values())
     n = int(np.clip(MOTION_BYTES // max(per_frame, 1), 2, N_FRAMES))
-    return np.unique(np.linspace(0, len(solution.t) - 1, n).round().astype(np.int64))
+    return np.unique(evenly(len(solution.t), n))
 
 
 def _colours(mechanism: "Mechanism") -> list[str]:

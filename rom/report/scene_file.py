@@ -1,15 +1,13 @@
 """The scene of a run as a file beside its table, so that a report needs neither body nor solver."""
 
-import base64
-import binascii
 import json
+from base64 import b64decode
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
-from rom.errors import FileFormatError
-from rom.io.files import check_readable, write_whole
+from rom.io.files import WRONG_JSON, check_readable, damaged, need, write_whole
 from rom.model import Array
 from rom.report.coarse import TYPES
 from rom.report.scene import SCHEMA_NAME, SCHEMA_VERSION, Scene
@@ -22,48 +20,38 @@ VIEW_KEYS = {"toward": 3, "up": 3, "radius": 0, "tall": 0, "wide": 0}  # and how
 
 def write_scene(scene: Scene, path: Path) -> None:
     """Write the scene of a motion."""
-    text = json.dumps(scene, separators=(",", ":"))
-    write_whole(path, lambda file: file.write(text.encode()))
+    write_whole(path, json.dumps(scene, separators=(",", ":")).encode())
 
 
 def read_scene(path: Path) -> Scene:
     """The scene of a motion, looked at before a browser gets it."""
     text = check_readable(path, MAX_BYTES).read_bytes()
-    try:
+    with damaged("this is no scene of a run", path, "rom simulate writes it anew.", WRONG_JSON):
         scene: Scene = json.loads(text)
-        if scene["schema"] != SCHEMA_NAME or scene["version"][0] != SCHEMA_VERSION[0]:
-            raise FileFormatError(f"version {scene['version']} is not known.", where=str(path))
+        known = scene["schema"] == SCHEMA_NAME and scene["version"][0] == SCHEMA_VERSION[0]
+        need(known, f"version {scene['version']} is not known")
         _check(scene)
-    except (ValueError, KeyError, TypeError, IndexError, AttributeError, RecursionError) as error:
-        why, hint = f"is no scene of a run: {error!s:.200}.", "rom simulate writes it anew."
-        raise FileFormatError(why, where=str(path), hint=hint) from None
-    return scene
-
-
-def _require(holds: object, what: str) -> None:
-    """Refuse a scene of which something does not hold."""
-    if not holds:
-        raise ValueError(what)
+        return scene
 
 
 def _finite(values: npt.ArrayLike) -> None:
-    _require(np.isfinite(np.asarray(values, dtype=float)).all(), "a number is not finite")
+    need(np.isfinite(np.asarray(values, dtype=float)).all(), "a number is not finite")
 
 
 def _check(scene: Scene) -> None:
     for key, kind in KEYS.items():
         right = isinstance(scene[key], kind | int if kind is float else kind)
-        _require(right, f"{key} is {type(scene[key]).__name__}")
-    _require(scene["bodies"] and not scene["modes"], "there are no bodies that move")
+        need(right, f"{key} is {type(scene[key]).__name__}")
+    need(scene["bodies"] and not scene["modes"], "there are no bodies that move")
     numbers = [scene[key] for key in ("size", "magnify", "start")]
     numbers += [scene["limits"][key] for key in ("displacement", "stress")]
     for key, n in VIEW_KEYS.items():
         values = scene["view"][key] if n else [scene["view"][key]]
-        _require(len(values) == (n or 1), f"{key} has {len(values)} numbers")
+        need(len(values) == (n or 1), f"{key} has {len(values)} numbers")
         numbers += values
     _finite(numbers)
     f = len(_numbers(scene["times"]))
-    _require(f >= 2, "the motion has fewer than two instants")
+    need(f >= 2, "the motion has fewer than two instants")
     for body in scene["bodies"]:
         _check_body(body, f)
 
@@ -72,27 +60,23 @@ def _check_body(body: Scene, f: int) -> None:
     """Whether the arrays of a body fit each other, and the number of instants."""
     name, points = body["name"], body["points"]
     named = isinstance(name, str) and isinstance(body["colour"], str)
-    _require(named, "a body has no name or colour")
+    need(named, "a body has no name or colour")
     s, r = len(_numbers(points["values"])) // 3, len(body["shapes"])
     wanted = {"position": 3 * f, "orientation": 4 * f, "q": r * f}
     columns = [(3 * s, one) for one in body["shapes"]] + [(6 * s, one) for one in body["stresses"]]
     fit = all(len(_numbers(one["values"])) == n for n, one in columns)
     fit = fit and all(len(_numbers(body[key])) == n for key, n in wanted.items())
     fit = fit and len(body["stresses"]) in (0, r) and len(points["centre"]) == 3
-    _require(fit, f"arrays of {name!r} do not fit each other")
+    need(fit, f"arrays of {name!r} do not fit each other")
     _finite([*points["centre"], points["step"], *(one["scale"] for _, one in columns)])
     for key, n in {"triangles": 3, "edges": 2}.items():
         cells = _numbers(body[key])
         there = cells.size % n == 0 and cells.max(initial=0) < max(s, 1)
-        _require(there, f"{key} of {name!r} name points that are not there")
+        need(there, f"{key} of {name!r} name points that are not there")
 
 
 def _numbers(array: dict[str, str]) -> Array:
     """An array of a scene, finite."""
-    try:
-        data = base64.b64decode(array["data"], validate=True)
-    except binascii.Error as error:
-        raise ValueError(f"an array is cut: {error}") from None
-    values = np.frombuffer(data, dtype=TYPES[array["type"]])
+    values = np.frombuffer(b64decode(array["data"], validate=True), TYPES[array["type"]])
     _finite(values)
     return values

@@ -3,6 +3,8 @@
 import json
 import re
 from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import rom
 from cases import solid
 from cases.command import rom as command
+from cases.files.damage import changed
 from cases.mbs.mechanisms import nodal_body, random_body, random_nodes
 from cases.mbs.particles import motion, particles
 from rom.errors import ConfigError, FileFormatError, RomWarning, UnsafeFileError
@@ -252,7 +255,7 @@ def test_a_unit_block_may_have_its_entries(tmp_path):
     for node in read_sid(tmp_path / "b.SID_FEM").nodes.values():
         assert_array_equal(node["AP"].M0, np.eye(3))
     (tmp_path / "b.SID_FEM").write_text(unit.replace("m0(3,3) = 1D0", "m0(3,3) = 2D0", 1))
-    with pytest.raises(FileFormatError, match=r"line \d+: AP has entries, but the structure 4"):
+    with pytest.raises(FileFormatError, match=r"line \d+: .*AP has entries, but the structure 4"):
         read_sid(tmp_path / "b.SID_FEM")
 
 
@@ -285,30 +288,27 @@ def test_habits_of_other_writers_are_read(tmp_path):
         assert_record_equal(read_sid(tmp_path / "c.SID_FEM"), expected)
 
 
-BROKEN = {
-    "no part": (" part\n", "", "'part' was expected"),
-    "a number": ("D+00", "Q+00", "is no finite number"),
-    "not finite": ("0D+00", "0D+999", "is no finite number"),
-    "an index": ("m0( 1, 1)", "m0( 1,99)", r"m0\( 1,99\) is outside"),
-    "an index zero": ("m0( 1, 1)", "m0( 0, 1)", r"is outside"),
-    "a word": ("m0( 1, 1)", "mm( 1, 1)", "is no entry of a block"),
-    "a block": ("mdCM", "mdCN", "'mdCN' is unknown"),
-    "a shape": ("nrow", "nrom", "no entry of a block|before the sizes"),
-    "structure": ("structure" + 23 * " " + "= 3", "structure = 9", "the structure 9"),
-    "no mass": ("nelastq", "nelastr", "are no body"),
-}
+def of_two_modes():
+    with TemporaryDirectory() as folder:
+        path = write_sid(standard_input(random_body(RNG, r=2)), Path(folder) / "x.SID_FEM")
+        return path.read_text()
 
 
-@pytest.mark.parametrize("case", BROKEN)
-def test_broken_files_are_named_with_the_line(case, tmp_path):
-    old, new, message = BROKEN[case]
-    path = write_sid(standard_input(random_body(RNG, r=2)), tmp_path / "x.SID_FEM")
-    text = path.read_text()
-    assert old in text
-    path.write_text(text.replace(old, new))
-    with pytest.raises(FileFormatError, match=message) as caught:
-        read_sid(path)
-    assert "x.SID_FEM, line " in str(caught.value)
+test_broken_files_are_named_with_the_line = changed(
+    of_two_modes,
+    "x.SID_FEM",
+    read_sid,
+    (" part\n", "", r"line \d+: .*'part' was expected"),
+    ("D+00", "Q+00", r"line \d+: .*is no finite number"),
+    ("0D+00", "0D+999", r"line \d+: .*is no finite number"),
+    ("m0( 1, 1)", "m0( 1,99)", r"line \d+: .*m0\( 1,99\) is outside"),
+    ("m0( 1, 1)", "m0( 0, 1)", r"line \d+: .*is outside"),
+    ("m0( 1, 1)", "mm( 1, 1)", r"line \d+: .*is no entry of a block"),
+    ("mdCM", "mdCN", r"line \d+: .*'mdCN' is unknown"),
+    ("nrow", "nrom", r"line \d+: .*(no entry of a block|before the sizes)"),
+    ("structure" + 23 * " " + "= 3", "structure = 9", r"line \d+: .*the structure 9"),
+    ("nelastq", "nelastr", r"line \d+: .*are no body"),
+)
 
 
 def test_hostile_sizes_take_no_memory(tmp_path):

@@ -244,7 +244,7 @@ DAMAGE = {  # what is wrong: (how it is made wrong, words of the message)
     "not a number": (first(q=coarse.array(np.full(402, np.nan), "float32")), "not finite"),
     "a view of infinity": (lambda s: s["view"].update(radius=1e999), "not finite"),
     "a corner too many": (first(triangles=coarse.array([0, 1, 60000], "uint16")), "not there"),
-    "a cut array": (lambda s: s["bodies"][1]["position"].update(data="AAA"), "an array is cut"),
+    "a cut array": (lambda s: s["bodies"][1]["position"].update(data="AAA"), "padding"),
     "another type": (lambda s: s["bodies"][1]["position"].update(type="object"), "'object'"),
     "a name that is none": (first(name=3), "no name"),
 }

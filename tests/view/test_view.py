@@ -165,19 +165,11 @@ def test_rods_are_grey_and_not_called_rigid(bar):
         mech.add_nonlinear(f"beside {grey}", cosserat.body(cosserat.straight(1.0, 1, **section)))
 
 
-def test_instants_are_drawn_side_by_side(bar, tmp_path):
-    mech, sol = swinging(bar)
-    shapes = {"ball": view.box((0.1, 0.1, 0.1))}
-    view.instants(mech, sol, tmp_path / "two.png", times=[0.05, 0.1], shapes=shapes)
-    image = colourful(pixels(tmp_path / "two.png"))
-    assert image[:, : image.shape[1] // 2].any()
-    assert image[:, image.shape[1] // 2 :].any()
-
-
 def test_wrong_requests_are_refused(bar, tmp_path):
     mech, sol = swinging(bar)
     wrong, film, picture = {"boll": view.box((1, 1, 1))}, tmp_path / "a.gif", tmp_path / "a.png"
     long, short = [("x", {"one": [1, 2, 3]})], [("error", {"x": ([1, 2], [1.0])})]
+    odd = [("y", {"seen": ([0.0, 0.5, 1.0], [1.0, 2.0])})]
     for words, draw in {
         "ending '.jpg'": lambda: view.mode_shapes(bar, tmp_path / "modes.jpg"),
         "does not exist": lambda: view.animate(mech, sol, tmp_path / "nowhere" / "film.gif"),
@@ -186,6 +178,7 @@ def test_wrong_requests_are_refused(bar, tmp_path):
         "no interface 'tip'": lambda: view.mode_shapes(bar, picture, fixed=("tip",)),
         "no two directions": lambda: view.mode_shapes(bar, picture, view=(0, 0, 1), up=(0, 0, 2)),
         "3 values of 'one' for 2 times": lambda: view.history([0, 1], long, picture),
+        "2 values of 'seen' for 3 times": lambda: view.history([0, 1], odd, picture),
         "1 errors of 'x' for 2 sizes": lambda: view.convergence(short, picture, xlabel="modes"),
         r"view has shape \(2,\), needed is \(3,\).*three numbers": lambda: seen(view=(0, 1)),
         r"up = 'z' is not made of numbers.*e.g. \(0, 0, 1\)": lambda: seen(up="z"),

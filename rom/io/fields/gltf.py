@@ -133,7 +133,9 @@ def _add(
     corners = body.triangles.ravel()
     indices = document.accessor(corners, component=UNSIGNED_TYPE, target=INDICES_TARGET)
     primitive: Entry = {"attributes": {"POSITION": points}, "indices": indices}
-    primitive["material"] = document.put("materials", _material(body.colour))
+    surface = {"baseColorFactor": [*body.colour, 1.0], "metallicFactor": 0.2}
+    metal: Entry = {"pbrMetallicRoughness": surface | {"roughnessFactor": 0.6}, "doubleSided": True}
+    primitive["material"] = document.put("materials", metal)
     mesh: Entry = {"name": body.name, "primitives": [primitive]}
     if shapes:
         primitive["targets"] = [
@@ -162,11 +164,6 @@ def _targets(body: MovingMesh) -> tuple[list[Array], Array]:
     kept = np.flatnonzero(sizes > SHAPE_RTOL * sizes.max(initial=0.0))
     shapes = [moved[:, k].reshape(-1, 3) for k in kept]
     return shapes, body.q[:, kept] / np.where(reach[kept] > 0, reach[kept], 1.0)
-
-
-def _material(colour: tuple[float, float, float]) -> Entry:
-    surface = {"baseColorFactor": [*colour, 1.0], "metallicFactor": 0.2, "roughnessFactor": 0.6}
-    return {"pbrMetallicRoughness": surface, "doubleSided": True}
 
 
 def _scalar_last(p: Array) -> list[float]:

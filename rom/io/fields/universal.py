@@ -4,6 +4,7 @@ Source:
     SDRC, Universal file datasets 58 and 58b, as published by the University of Cincinnati.
 """
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import accumulate, pairwise
@@ -19,6 +20,7 @@ from rom.model import Array
 Complex = npt.NDArray[np.complex128]
 MAX_BYTES = 2**30  # of a file that is still read
 BLOCK_MARK = b"    -1"
+MARK_PATTERN = re.compile(rb"^" + BLOCK_MARK + rb"[ \t\r\v\f]*$", re.MULTILINE)  # alone in a line
 N_HEADER_RECORDS = 11  # before the values
 FREQUENCY_RESPONSE = 4
 PER_RECEPTANCE = {8: 0, 11: 1, 12: 2}  # displacement, velocity, acceleration: powers of i omega
@@ -139,12 +141,8 @@ def _line_end(data: bytes, place: int) -> int:
 
 def _mark(data: bytes, place: int) -> int:
     """Start of the next line that is the mark of datasets, or -1."""
-    while 0 <= (place := data.find(BLOCK_MARK, place)):
-        alone = data[place : _line_end(data, place)].strip() == b"-1"
-        if alone and (place == 0 or data[place - 1 : place] == b"\n"):
-            return place
-        place += 1
-    return -1
+    found = MARK_PATTERN.search(data, place)
+    return found.start() if found else -1
 
 
 def _closed(data: bytes, place: int) -> int:

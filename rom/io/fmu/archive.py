@@ -35,9 +35,18 @@ def write_archive(path: Path, content: Content) -> Path:
         sources["tables.h"] = content.data.encode()
     packed = {f"sources/{name}": data for name, data in sources.items()}
     packed |= {f"resources/{name}": data for name, data in content.resources.items()}
-    packed[f"binaries/{_platform()}/{identifier}.so"] = _library(sources, names)
+    bits = "64" if platform.architecture()[0] == "64bit" else "32"
+    place = f"binaries/{platform.system().lower()}{bits}/{identifier}.so"
+    packed[place] = _library(sources, names)
     packed["modelDescription.xml"] = model_description(content, guid, identifier, names)
-    return write_whole(path, lambda file: _pack(file, packed))
+
+    def pack(file: IO[bytes]) -> None:
+        with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+            archive.comment = ORIGIN_MARK.encode()
+            for name, data in sorted(packed.items()):
+                archive.writestr(zipfile.ZipInfo(name, ZIP_EPOCH), data, zipfile.ZIP_DEFLATED)
+
+    return write_whole(path, pack)
 
 
 def _guid(sources: dict[str, bytes], content: Content) -> str:
@@ -48,11 +57,6 @@ def _guid(sources: dict[str, bytes], content: Content) -> str:
         digest.update(f"{name} {len(data)}\n".encode() + data)
     digest.update(model_description(content))
     return f"{{{uuid.UUID(bytes=digest.digest()[:16])}}}"
-
-
-def _platform() -> str:
-    bits = "64" if platform.architecture()[0] == "64bit" else "32"
-    return f"{platform.system().lower()}{bits}"
 
 
 def _library(sources: dict[str, bytes], names: tuple[str, ...]) -> bytes:
@@ -73,10 +77,3 @@ def _library(sources: dict[str, bytes], names: tuple[str, ...]) -> bytes:
             why = f"no end within {COMPILE_TIME_LIMIT:g} s" if done.overtime else done.err.strip()
             raise ResourceError(f"{compiler} cannot compile the FMU: {why}.")
         return (folder / "out.so").read_bytes()
-
-
-def _pack(file: IO[bytes], files: dict[str, bytes]) -> None:
-    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
-        archive.comment = ORIGIN_MARK.encode()
-        for name in sorted(files):
-            archive.writestr(zipfile.ZipInfo(name, ZIP_EPOCH), files[name], zipfile.ZIP_DEFLATED)

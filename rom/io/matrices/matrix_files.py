@@ -19,16 +19,16 @@ Source:
 import re
 import warnings
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TextIO
 
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 
 from rom.decks.lines import whole
 from rom.errors import ConfigError, FileFormatError, UnsafeFileError, in_file
-from rom.io.files import Line, check_last_line, check_readable, damaged, need, write_lines
+from rom.io.files import check_last_line, check_readable, damaged, lines_of, need, write_lines
 from rom.io.matrices.dmig import Dofs, Entry, labelled, read_dmig
 from rom.io.matrices.op4 import Matrices, read_op4
 from rom.io.matrices.user_element import read_user_element
@@ -137,10 +137,9 @@ def _pairs(path: Path) -> Mapping[str, tuple[csr_matrix, Dofs | None]]:
 
 def _abaqus(path: Path) -> tuple[csr_matrix, Dofs]:
     """Lines ``node, component, node, component, value`` of ``*MATRIX GENERATE`` output."""
-    check_last_line(path)
-    rows, at = list[Entry](), Line(path)
-    with path.open(encoding="ascii", errors="replace") as file, damaged("this is no entry", at):
-        for at.number, line in enumerate(file, 1):
+    rows = list[Entry]()
+    with lines_of(path, "this is no entry", encoding="ascii") as lines:
+        for line in lines:
             if line.strip() and not line.startswith("*"):
                 *place, value = line.replace(",", " ").split()
                 i, a, j, b = map(whole, place)
@@ -180,7 +179,9 @@ def read_market(path: str | Path) -> csr_matrix:
             sizes = _sizes(line, 3 if form == "coordinate" else 2)
             if max(sizes[:2]) > MOST_ROWS or 2 * sizes[-1] > path.stat().st_size:
                 raise UnsafeFileError(f"sizes {sizes} do not fit the file.")
-            table = _market_table(file)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", UserWarning)  # of NumPy, if there is no line
+                table = np.loadtxt(file, comments="%", ndmin=2)
             read = _coordinates if form == "coordinate" else _dense
             i, j, values = read(table, sizes, SIGNS[symmetry])
     if SIGNS[symmetry]:
@@ -195,12 +196,6 @@ def _sizes(line: str, n: int) -> tuple[int, ...]:
     possible = len(sizes) == n and min(sizes) >= 0 and min(sizes[:2]) >= 1
     need(possible, f"{line.strip()!r} are no sizes")
     return sizes
-
-
-def _market_table(file: TextIO) -> Array:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # of NumPy, if there is no line
-        return np.loadtxt(file, comments="%", ndmin=2)
 
 
 def _coordinates(table: Array, sizes: tuple[int, ...], _: float) -> tuple[Index, Index, Array]:
@@ -265,41 +260,26 @@ def read_stored_matrix(path: str | Path) -> tuple[csr_matrix, Dofs]:
 def _table(path: Path) -> Array:
     """(entries, 3) row, column, value."""
     check_last_line(path)
-    try:
+    table = np.zeros((0, 0))
+    with suppress(ValueError):
         table = np.loadtxt(path, comments=None, ndmin=2, encoding="latin1")
-        if table.shape[1] == 3:
-            return table
-    except ValueError:
-        pass
-    with path.open(encoding="latin1") as file:
-        number = next((k for k, line in enumerate(file, 1) if not _is_entry(line)), 1)
-    raise FileFormatError(
-        "an entry is row, column, value.", where=f"{path}, line {number}", hint=REWRITE_HINT
-    )
-
-
-def _is_entry(line: str) -> bool:
-    try:
-        return len([float(word) for word in line.split()]) == 3
-    except ValueError:
-        return False
+    if table.shape[1] != 3:
+        with lines_of(path, "an entry is row, column, value", REWRITE_HINT) as lines:
+            for line in lines:
+                need(len([float(word) for word in line.split()]) == 3, f"{line[:40]!r} is none")
+            need(False, "one is none")  # what NumPy does not take for a number, Python does
+    return table
 
 
 def _dofs(path: Path) -> Dofs:
     """(n, 2); the label is text: read as a number, 12.10 would be 12.1."""
-    check_last_line(path)
-    rows = []
-    with path.open(encoding="latin1") as file:
-        for number, line in enumerate(file, 1):
-            found = LABEL_PATTERN.fullmatch(line.strip())
-            if not found:
-                raise FileFormatError(
-                    "a row is node.component, with 1 to 6 for the component.",
-                    where=f"{path}, line {number}",
-                    hint=REWRITE_HINT,
-                )
-            rows.append((int(found[1]), int(found[2])))
-    dofs = np.array(rows, dtype=np.int64)
-    if len(np.unique(dofs, axis=0)) < len(dofs):
-        raise FileFormatError("a row is listed twice.", where=str(path), hint=REWRITE_HINT)
-    return dofs
+    rows = dict[tuple[int, int], None]()
+    what = "a row is node.component, with 1 to 6 for the component"
+    with lines_of(path, what, REWRITE_HINT) as lines:
+        for line in lines:
+            word = line.strip()
+            need(LABEL_PATTERN.fullmatch(word), f"{word[:40]!r} is none")
+            label, component = map(int, word.split("."))
+            need((label, component) not in rows, f"{word} is listed twice")
+            rows[label, component] = None
+    return np.array(list(rows), dtype=np.int64)

@@ -193,7 +193,11 @@ class _Text:
         if line.endswith(WIDE_MARK):
             line = f"{int(line[:16]):8d}{int(line[16:32]):8d}{line[32:].removesuffix(WIDE_MARK)}"
         columns, rows, _, kind = (int(line[8 * k : 8 * k + 8]) for k in range(4))
-        self._set_format(line[40:].strip().upper())
+        text = line[40:].strip().upper() or "1P,5E16.9"
+        found = FORMAT_PATTERN.fullmatch(text)
+        if found is None or not int(found[1]) or not int(found[2]):
+            raise ValueError(f"the format {text!r} is unknown")
+        self.per_line, self.width = int(found[1]), int(found[2])
         matrix = _checked(columns, rows, kind, line[32:40], self.place)
         self.words = 2 if kind in DOUBLE_KINDS else 1  # that a number counts in sparse columns
         while True:
@@ -219,12 +223,6 @@ class _Text:
             head = 1
         matrix.add(column, row - 1, self._values(length // self.words))
         return length + head
-
-    def _set_format(self, text: str) -> None:
-        found = FORMAT_PATTERN.fullmatch(text or "1P,5E16.9")
-        if found is None or not int(found[1]) or not int(found[2]):
-            raise ValueError(f"the format {text!r} is unknown")
-        self.per_line, self.width = int(found[1]), int(found[2])
 
     def _values(self, n: int) -> Array:
         most = (len(self.lines) - self.number) * self.per_line

@@ -21,8 +21,8 @@ import numpy as np
 from scipy.sparse import csr_matrix, tril
 
 from rom.decks.lines import whole
-from rom.errors import ConfigError, FileFormatError, UnsafeFileError, in_file
-from rom.io.files import Line, check_last_line, damaged, need, write_lines
+from rom.errors import ConfigError, UnsafeFileError, in_file
+from rom.io.files import lines_of, need, write_lines
 from rom.io.matrices.dmig import Dofs
 from rom.model import Array
 from rom.names import ORIGIN_MARK
@@ -51,17 +51,16 @@ def read_user_element(path: str | Path) -> dict[str, tuple[csr_matrix, Dofs]]:
         UnsafeFileError: if it claims more nodes than a dense matrix can have.
     """
     path = Path(path)
-    check_last_line(path)
-    element, keyword, kind, at = _Element(), "", "", Line(path)
-    with path.open(encoding="latin1") as file, damaged("this is no user element", at):
-        for at.number, line in enumerate(file, 1):
+    element, keyword, kind = _Element(), "", ""
+    hint = "Write the file again; it is cut or changed."
+    with in_file(path), lines_of(path, "this is no user element", hint) as lines:
+        for line in lines:
             if line.startswith("**"):
                 keyword = _comment(element, keyword, line)
             elif line.startswith("*"):
                 keyword, kind = _keyword(element, line)
             elif line.strip():
                 _data(element, keyword, kind, line.replace(",", " ").split())
-    with in_file(path):
         return _matrices(element)
 
 
@@ -124,18 +123,16 @@ def _data(element: _Element, keyword: str, kind: str, words: list[str]) -> None:
 def _matrices(element: _Element) -> dict[str, tuple[csr_matrix, Dofs]]:
     if element.n_nodes > MOST_NODES:
         raise UnsafeFileError(f"an element of {element.n_nodes} nodes is not read.")
-    if element.n_nodes < 1 or not element.lists or not element.values:
-        raise FileFormatError("there is no linear user element with matrices.")
+    complete = element.n_nodes > 0 and element.lists and element.values
+    need(complete, "there is no linear user element with matrices")
     dofs = _dofs(element)
     n = len(dofs)
     found = {}
     for kind, values in element.values.items():
-        if len(values) != n * (n + 1) // 2 or not np.isfinite(values).all():
-            raise FileFormatError(
-                f"the matrix {kind} has {len(values)} numbers; the upper triangle of {n} rows has "
-                f"{n * (n + 1) // 2}, all finite.",
-                hint="Write the file again; it is cut or changed.",
-            )
+        wanted = n * (n + 1) // 2
+        what = f"{len(values)} numbers; the upper triangle of {n} rows has {wanted}, all finite"
+        fits = len(values) == wanted and np.isfinite(values).all()
+        need(fits, f"the matrix {kind} has {what}")
         A = np.zeros((n, n))
         A[np.tril_indices(n)] = values  # rows of this triangle are columns of the other
         found[kind] = csr_matrix(A), dofs
@@ -144,10 +141,8 @@ def _matrices(element: _Element) -> dict[str, tuple[csr_matrix, Dofs]]:
 
 def _dofs(element: _Element) -> Dofs:
     labels = element.labels or list(range(1, element.n_nodes + 1))
-    if len(labels) != element.n_nodes:
-        raise FileFormatError(
-            f"{len(labels)} nodes are named, but the element has {element.n_nodes}."
-        )
+    fits = len(labels) == element.n_nodes
+    need(fits, f"{len(labels)} nodes are named, but the element has {element.n_nodes}")
     ends = [place for place, _ in element.lists[1:]] + [element.n_nodes + 1]
     rows = [
         (labels[k - 1], component)
@@ -156,8 +151,7 @@ def _dofs(element: _Element) -> Dofs:
         for component in components
     ]
     dofs = np.array(rows, dtype=np.int64).reshape(-1, 2)
-    if len(np.unique(dofs, axis=0)) < len(dofs):
-        raise FileFormatError("a component of a node comes twice.")
+    need(len(np.unique(dofs, axis=0)) == len(dofs), "a component of a node comes twice")
     return dofs
 
 

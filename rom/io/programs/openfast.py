@@ -19,8 +19,8 @@ import numpy.typing as npt
 
 from rom.arguments import symmetric
 from rom.body.flexible import FlexibleBody
-from rom.errors import ConfigError, FileFormatError, QualityGateError, UnsafeFileError
-from rom.io.files import check_readable, write_lines
+from rom.errors import ConfigError, QualityGateError, UnsafeFileError
+from rom.io.files import check_readable, damaged, need, row, write_lines
 from rom.io.programs.interface_form import InterfaceForm, interface_form
 from rom.model import Array
 from rom.names import ORIGIN_MARK, check_known
@@ -39,6 +39,9 @@ MATRICES = {"!mass": "M", "!stiffness": "K", "!damping": "D", "!weight stiffness
 WEIGHT_LINE, LOADING_LINE = "!weight constant", "!loading and wave elevation"
 MAX_COORDINATES = 10_000  # coordinates
 ASYMMETRY_RTOL, TIME_STEP_RTOL = 1e-6, 1e-3
+REWRITE_HINT = (
+    "Write the file again; it is cut, changed, or of another kind (GuyanASCII is not read)."
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +93,7 @@ def write_openfast(
     """
     check_known(version, VERSIONS, f"version {version!r} of OpenFAST is unknown; known:")
     found = superelement(body, held=held, gravity=gravity)
-    lines = _current(found) if version == 5 else _old(found)
+    lines = _document(found, old=version < 5)
     return write_lines(path, [f"! {body.name}, {ORIGIN_MARK}", *lines])
 
 
@@ -131,34 +134,28 @@ def _rows(body: FlexibleBody, form: InterfaceForm, held: Sequence[str]) -> npt.N
     return np.r_[first : first + 6, 6 * len(form.names) : len(form.K)]
 
 
-def _current(found: Superelement) -> Iterator[str]:
-    yield f"!Dimension: {len(found.M)}"
-    for kind, A in zip(UNITS, (found.M, found.K, found.D), strict=True):
-        yield f"!{kind} Matrix (Units ({UNITS[kind]}))"
-        yield from map(_row, A)
-    yield "!Weight constant (Units (N, m))"
-    yield _row(found.weight)
-    yield "!Weight stiffness (Units (N, m))"
-    yield from map(_row, found.K_W)
-
-
-def _old(found: Superelement) -> Iterator[str]:
+def _document(found: Superelement, *, old: bool) -> Iterator[str]:
     n = len(found.M)
-    yield "! Flex 5 Format"
-    yield f"!Dimension: {n}"
-    yield f"!Time increment in simulation: {LOAD_DURATION:g}"
-    yield f"!Total simulation time in file: {LOAD_DURATION:g}"
+    size = f"!Dimension: {n}"
+    if old:
+        yield "! Flex 5 Format"
+    yield size
+    if old:
+        yield f"!Time increment in simulation: {LOAD_DURATION:g}"
+        yield f"!Total simulation time in file: {LOAD_DURATION:g}"
     for kind, A in zip(UNITS, (found.M, found.K, found.D), strict=True):
         yield f"!{kind} Matrix (Units ({UNITS[kind]}))"
-        yield f"!Dimension: {n}"
-        yield from map(_row, A)
-    yield f"!{LOADING_LINE[1:].title()} (Units (N, m))"
-    yield f"!Dimension: 1 time column - {n} force columns - 1 wave elevation column"
-    yield from (_row(np.r_[t, found.weight, 0.0]) for t in (0.0, LOAD_DURATION))
-
-
-def _row(values: Array) -> str:
-    return " ".join(f"{v:.16e}" for v in values)
+        yield from [size] * old
+        yield from map(row, A)
+    if old:
+        yield f"!{LOADING_LINE[1:].title()} (Units (N, m))"
+        yield f"!Dimension: 1 time column - {n} force columns - 1 wave elevation column"
+        yield from (row(np.r_[t, found.weight, 0.0]) for t in (0.0, LOAD_DURATION))
+        return
+    yield "!Weight constant (Units (N, m))"
+    yield row(found.weight)
+    yield "!Weight stiffness (Units (N, m))"
+    yield from map(row, found.K_W)
 
 
 def read_openfast(path: str | Path) -> Superelement:
@@ -172,8 +169,11 @@ def read_openfast(path: str | Path) -> Superelement:
     """
     path = check_readable(path)
     reader = _Reader(str(path), path.read_text(encoding="latin1").splitlines())
-    reader.run()
-    return reader.superelement()
+    with damaged("this is no superelement", reader, REWRITE_HINT):
+        reader.run()
+        found = reader.superelement()
+    _check(found, str(path))
+    return found
 
 
 class _Reader:
@@ -207,16 +207,16 @@ class _Reader:
         n = self.head.get(DIMENSION_LINE, 0)
         if n > MAX_COORDINATES:
             raise UnsafeFileError(f"{n:.0f} coordinates are not read.", where=self.path)
-        if n < 6 or n != int(n):
-            raise self.error(f"{DIMENSION_LINE!r} 6 or more has to come before the blocks")
+        whole = n >= 6 and n == int(n)
+        need(whole, f"{DIMENSION_LINE!r} 6 or more has to come before the blocks")
         return int(n)
 
     @property
     def steps(self) -> int:
         """Lines of loads that OpenFAST reads."""
         dt, T = self.head.get(STEP_LINE, 0.0), self.head.get(DURATION_LINE, -1.0)
-        if not (dt > 0 and 0 <= T / dt < len(self.lines)):
-            raise self.error(f"a time step {dt:g} s and a duration {T:g} s do not fit the file")
+        fits = dt > 0 and 0 <= T / dt < len(self.lines)
+        need(fits, f"a time step {dt:g} s and a duration {T:g} s do not fit the file")
         return round(T / dt) + 1
 
     def rows(self, k: int, widths: tuple[int, ...]) -> Array:
@@ -226,8 +226,8 @@ class _Reader:
         for _ in range(k):
             words = self.lines[self.at].split() if self.at < len(self.lines) else []
             self.at += 1
-            if len(words) not in widths or (found and len(words) != len(found[0])):
-                raise self.error(f"row {len(found) + 1} of {k} has {len(words)} words")
+            fits = len(words) in widths and (not found or len(words) == len(found[0]))
+            need(fits, f"row {len(found) + 1} of {k} has {len(words)} words")
             found.append([self.number(word) for word in words])
         return np.array(found)
 
@@ -236,29 +236,21 @@ class _Reader:
             value = float(word.lower().replace("d", "e"))
         except ValueError:
             value = np.nan
-        if not np.isfinite(value):
-            raise self.error(f"{word.strip()!r} is not a finite number")
+        need(np.isfinite(value), f"{word.strip()!r} is not a finite number")
         return value
 
-    def error(self, what: str) -> FileFormatError:
-        return FileFormatError(
-            f"{what}.",
-            where=f"{self.path}, line {min(self.at, len(self.lines))}",
-            hint="Write the file again; it is cut, changed, or of another kind (GuyanASCII is not "
-            "read).",
-        )
+    def __str__(self) -> str:
+        return f"{self.path}, line {min(self.at, len(self.lines))}"
 
     def superelement(self) -> Superelement:
         needed = {"M", "K", "D"} | ({"loads"} if self.old else {"weight", "K_W"})
-        if missing := sorted(needed - set(self.blocks)):
-            raise self.error(f"the blocks {missing} are missing")
-        n, b = self.n, self.blocks
+        missing = sorted(needed - set(self.blocks))
+        need(not missing, f"the blocks {missing} are missing")
+        n, b, dt = self.n, self.blocks, self.head.get(STEP_LINE, 0.0)
         loads = b.get("loads", np.zeros((0, n + 2)))
-        if np.abs(np.diff(loads[:, 0]) - self.head.get(STEP_LINE, 0.0)).max(initial=0.0) > (
-            TIME_STEP_RTOL * self.head.get(STEP_LINE, 0.0)
-        ):
-            raise self.error(f"the times of the loads are not {self.head[STEP_LINE]:g} s apart")
-        found = Superelement(
+        uneven = np.abs(np.diff(loads[:, 0]) - dt).max(initial=0.0)
+        need(uneven <= TIME_STEP_RTOL * dt, f"the times of the loads are not {dt:g} s apart")
+        return Superelement(
             M=b["M"],
             K=b["K"],
             D=b["D"],
@@ -268,8 +260,6 @@ class _Reader:
             loads=loads[:, 1 : n + 1],
             elevation=loads[:, n + 1] if loads.shape[1] == n + 2 else np.zeros(len(loads)),
         )
-        _check(found, self.path)
-        return found
 
 
 def _check(found: Superelement, path: str) -> None:

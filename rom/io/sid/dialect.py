@@ -51,7 +51,9 @@ def read_sid(path: str | Path, *, ge: str = "antisymmetric") -> StandardInput:
     """
     one_of("ge", ge, GE_FORMS)
     record = _settled(read_raw(path))
-    Ge, symmetric = record.blocks["Ge"], _symmetric_ge(record)
+    Ge = record.blocks["Ge"]
+    even = 0.5 * (by_mode(Ge.M0) + by_mode(Ge.M0).swapaxes(0, 1))
+    symmetric = even.transpose(1, 2, 0).reshape(Ge.M0.shape)
     scale = max(np.abs(Ge.M0).max(initial=0.0), _scales(record)[2])
     if ge == "antisymmetric" and np.abs(symmetric).max(initial=0.0) > RESIDUAL_RTOL * scale:
         share = np.abs(symmetric).max() / scale
@@ -128,12 +130,6 @@ def by_mode(A: Array) -> Array:
     return A.reshape(A.shape[0], 3, -1).transpose(2, 0, 1)
 
 
-def _symmetric_ge(record: StandardInput) -> Array:
-    Ge = by_mode(record.blocks["Ge"].M0)
-    even = 0.5 * (Ge + Ge.swapaxes(0, 1))
-    return even.transpose(1, 2, 0).reshape(record.blocks["Ge"].M0.shape)
-
-
 def _odd(A: Array) -> Array:
     return A - A.swapaxes(0, 1)
 
@@ -160,18 +156,16 @@ def _settled(file: RawFile) -> StandardInput:
     J1, Cr = first(record.blocks["J"], r), record.blocks["Cr"]
     Cr0, Cr1 = Cr.M0, first(Cr, r)
 
-    def gyroscopic(A: Array) -> float:
-        Gr = by_mode(A)
-        return _relative(Gr, J1 - _skew(Cr0), moment)
-
-    def coriolis(A: Array) -> float:
-        Ge = by_mode(A)
-        return _relative(_odd(Ge), 2 * _odd(Cr1), mass)
-
-    gr, ge = (_packing(record, name, test) for name, test in (("Gr", gyroscopic), ("Ge", coriolis)))
-    layout = mode_second, gr, ge, file.blocks["J"].sizes["ncol"] == 1
-    for name, by_axis in (("Gr", gr), ("Ge", ge)):
-        record.blocks[name] = _axis_by_axis(record.blocks[name], by_axis is not False)
+    residuals: dict[str, Callable[[Array], float]] = {
+        "Gr": lambda A: _relative(by_mode(A), J1 - _skew(Cr0), moment),
+        "Ge": lambda A: _relative(_odd(by_mode(A)), 2 * _odd(Cr1), mass),
+    }
+    packing = {name: _packing(record, name, residual) for name, residual in residuals.items()}
+    layout = mode_second, *packing.values(), file.blocks["J"].sizes["ncol"] == 1
+    for name in [name for name, by_axis in packing.items() if by_axis is False]:
+        M0, M1 = record.blocks[name].M0, record.blocks[name].M1
+        turned = None if M1 is None else repacked(M1, by_axis=True)
+        record.blocks[name] = Taylor(repacked(M0, by_axis=True), turned)
     fits = [
         name
         for name, dialect in DIALECTS.items()
@@ -187,13 +181,6 @@ def _packing(record: StandardInput, name: str, residual: Callable[[Array], float
     if np.array_equal(A, other):
         return None
     return bool(residual(A) <= residual(other))
-
-
-def _axis_by_axis(block: Taylor, already: bool) -> Taylor:
-    if already:
-        return block
-    M1 = None if block.M1 is None else repacked(block.M1, by_axis=True)
-    return Taylor(repacked(block.M0, by_axis=True), M1)
 
 
 def _record(file: RawFile, mode_second: bool) -> StandardInput:

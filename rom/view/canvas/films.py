@@ -44,8 +44,7 @@ class Film:
         """
         place = film_path(path)
         data = mp4(self) if place.suffix.lower() == ".mp4" else gif(self.pages, self.duration)
-        write_whole(place, lambda file: file.write(data))
-        return place
+        return write_whole(place, data)
 
     def __repr__(self) -> str:
         f, height, width, _ = self.pages.shape

@@ -1,9 +1,11 @@
 """Sheets of paper: pictures, words and colour bars, laid out in pixels from the top left."""
 
+import inspect
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ParamSpec
 
 import numpy as np
 
@@ -21,6 +23,8 @@ if TYPE_CHECKING:
 
     from rom.view.canvas.picture import Picture
 
+Given = ParamSpec("Given")
+Place = tuple[float, float, float, float]  # of axes: left end, top, width, height [pixel]
 Style = dict[str, Any]  # how matplotlib draws something, by its keywords
 DPI = 150
 TITLE_SIZE, BODY_SIZE, SMALL_SIZE = 12.5, 9.5, 8.5  # points
@@ -42,9 +46,18 @@ def sheet(width: int, height: int) -> "Picture":
     return figure
 
 
-def wanted(path: str | Path | None) -> Path | None:
-    """The path of a picture, checked, if it is to be written."""
-    return None if path is None else checked(path, ".png")
+def picture(draw: "Callable[Given, Figure]") -> "Callable[Given, Figure]":
+    """A function that draws a figure: in the look of the house, then written to its ``path``."""
+    order = inspect.signature(draw)
+
+    @wraps(draw)
+    def drawn(*args: Given.args, **named: Given.kwargs) -> "Figure":
+        path = order.bind(*args, **named).arguments.get("path")
+        place = None if path is None else checked(path, ".png")
+        with styled():
+            return save(draw(*args, **named), place)
+
+    return drawn
 
 
 def area(figure: "Figure", left: float, top: float, width: float, height: float) -> "Axes":
@@ -146,17 +159,29 @@ def colour_bar(
     axes.set_title(label, size=SMALL_SIZE, pad=6)
 
 
+def scale_beside(axes: "Axes", coloured: Any, label: str, **where: Any) -> None:
+    """The colour bar of what is drawn in axes, which takes some of their room."""
+    bar = axes.figure.colorbar(coloured, ax=axes, **where)
+    bar.set_label(label, size=SMALL_SIZE)
+    bar.ax.tick_params(labelsize=SMALL_SIZE)
+
+
 def pixels(figure: "Figure") -> Image:
     """(height, width, 3) the finished sheet."""
     figure.canvas.draw()
     return np.asarray(figure.canvas.buffer_rgba())[..., :3].copy()  # type: ignore[attr-defined]
 
 
-def taken(ax: object, n: int, name: str) -> tuple["Figure", list["Axes"]]:
-    """The axes of a caller of a function, one for each of n diagrams, and their figure."""
-    require("matplotlib")
+def areas(
+    ax: object, places: Sequence[Place], name: str, size: tuple[int, int], title: str, below: str
+) -> tuple["Figure", list["Axes"]]:
+    """Axes of the caller of a function, or at places on a page, see `titled`; and their figure."""
     from matplotlib.axes import Axes
 
+    if ax is None:
+        page = titled(*size, title, below)
+        return page, [area(page, *place) for place in places]
+    n = len(places)
     given = [ax] if isinstance(ax, Axes) else list(np.ravel(np.asarray(ax, dtype=object)))
     if len(given) != n or not all(isinstance(axes, Axes) for axes in given):
         raise ConfigError(

@@ -55,9 +55,7 @@ def png(figure: Figure) -> bytes:
 
 def written(figure: Figure, path: Path) -> Path:
     """Write any figure as PNG, whole or not at all."""
-    data = png(figure)
-    write_whole(path, lambda file: file.write(data))
-    return path
+    return write_whole(path, png(figure))
 
 
 class ScaledPlaces(MaxNLocator):

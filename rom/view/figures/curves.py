@@ -38,6 +38,7 @@ MIN_ERROR = 1e-12  # errors below are drawn there: round-off has no meaning
 
 
 @typed
+@page.picture
 def history(  # noqa: PLR0913  keywords of one picture
     t: npt.ArrayLike,
     panels: Sequence[tuple[str, Mapping[str, object]]],
@@ -69,18 +70,16 @@ def history(  # noqa: PLR0913  keywords of one picture
     Raises:
         ConfigError: if lengths differ, or pictures cannot be made here.
     """
-    path = page.wanted(path)
     t = np.asarray(t, dtype=float)
-    with page.styled():
-        names = [list(filter(None, curves)) for _, curves in panels]
-        figure, areas = _panels(ax, names, "history", title, caption, beside)
-        numbers = numbered([list(curves) for _, curves in panels])
-        for axes, (label, curves), looks in zip(areas, panels, numbers, strict=True):
-            _histories(axes, t, curves, looks)
-            axes.set_ylabel(label)
-            axes.set_xlim(t[0], t[-1])
-        _complete(areas, over or "time [s]", ax)
-        return page.save(figure, path)
+    names = [list(filter(None, curves)) for _, curves in panels]
+    figure, areas = _panels(ax, names, "history", title, caption, beside)
+    numbers = numbered([list(curves) for _, curves in panels])
+    for axes, (label, curves), looks in zip(areas, panels, numbers, strict=True):
+        _histories(axes, t, curves, looks)
+        axes.set_ylabel(label)
+        axes.set_xlim(t[0], t[-1])
+    _complete(areas, over or "time [s]", ax)
+    return figure
 
 
 def numbered(panels: Sequence[Sequence[str]]) -> list[list[int]]:
@@ -154,6 +153,7 @@ def _complete(areas: Sequence["Axes"], xlabel: str, ax: object) -> None:
 
 
 @typed
+@page.picture
 def frequencies(
     comparison: dict[str, Any],
     path: str | Path | None = None,
@@ -177,7 +177,6 @@ def frequencies(
     Raises:
         ConfigError: without a comparison, or if pictures cannot be made here.
     """
-    path = page.wanted(path)
     comparison = {support: table for support, table in comparison.items() if table["full"]}
     if not comparison:
         raise ConfigError("there is nothing to compare; give a table of one support.")
@@ -186,24 +185,22 @@ def frequencies(
         "element model, for each support of its interfaces; the dashed line is 0.1 %. Reduced "
         "frequencies are never below full ones."
     )
-    with page.styled():
-        figure, (axes,) = _panels(ax, [[*comparison]], "frequencies", title, caption, beside)
-        longest = 0
-        for k, (support, table) in enumerate(comparison.items()):
-            full, reduced = (np.array(table[key]) for key in ("full", "reduced"))
-            error = np.maximum(np.abs(reduced / full - 1), MIN_ERROR)
-            longest = max(longest, full.size)
-            look = line_look(k) | {"marker": MARKERS[k % len(MARKERS)]}
-            look["ms"] = max(4, 10 - 2 * k)  # curves may coincide
-            axes.semilogy(np.arange(1, full.size + 1), error, label=support, **look)
-        axes.axhline(1e-3, color=GREY, lw=1.0, ls="--")
-        axes.set_xticks(range(1, longest + 1))
-        axes.set_ylabel("relative error")
-        _complete([axes], "elastic mode", ax)
-        return page.save(figure, path)
+    figure, (axes,) = _panels(ax, [[*comparison]], "frequencies", title, caption, beside)
+    for k, (support, table) in enumerate(comparison.items()):
+        full, reduced = (np.array(table[key]) for key in ("full", "reduced"))
+        error = np.maximum(np.abs(reduced / full - 1), MIN_ERROR)
+        look = line_look(k) | {"marker": MARKERS[k % len(MARKERS)]}
+        look["ms"] = max(4, 10 - 2 * k)  # curves may coincide
+        axes.semilogy(np.arange(1, full.size + 1), error, label=support, **look)
+    axes.axhline(1e-3, color=GREY, lw=1.0, ls="--")
+    axes.set_xticks(range(1, max(len(table["full"]) for table in comparison.values()) + 1))
+    axes.set_ylabel("relative error")
+    _complete([axes], "elastic mode", ax)
+    return figure
 
 
 @typed
+@page.picture
 def convergence(
     panels: Sequence[tuple[str, Mapping[str, tuple[object, object]]]],
     path: str | Path | None = None,
@@ -232,24 +229,23 @@ def convergence(
     Raises:
         ConfigError: if lengths differ, or pictures cannot be made here.
     """
-    path = page.wanted(path)
-    with page.styled():
-        names = [[*curves] for _, curves in panels]
-        figure, areas = _panels(ax, names, "convergence", title, caption, beside)
-        for axes, (label, curves) in zip(areas, panels, strict=True):
-            for k, (name, (sizes, errors)) in enumerate(curves.items()):
-                x, y = np.asarray(sizes, dtype=float), np.asarray(errors, dtype=float)
-                one_each(f"errors of {name!r}", y.shape, "sizes", x.shape)
-                look = {"color": LINES[k % len(LINES)], "marker": MARKERS[k % len(MARKERS)]}
-                axes.loglog(x, np.maximum(np.abs(y), MIN_ERROR), label=name, **look)
-            axes.set_ylabel(label)
-            near_ticks(axes.yaxis)
-        _same_sizes(areas, [x for _, curves in panels for x, _ in curves.values()])
-        _complete(areas, xlabel, ax)
-        return page.save(figure, path)
+    names = [[*curves] for _, curves in panels]
+    figure, areas = _panels(ax, names, "convergence", title, caption, beside)
+    for axes, (label, curves) in zip(areas, panels, strict=True):
+        for k, (name, (sizes, errors)) in enumerate(curves.items()):
+            x, y = np.asarray(sizes, dtype=float), np.asarray(errors, dtype=float)
+            one_each(f"errors of {name!r}", y.shape, "sizes", x.shape)
+            look = {"color": LINES[k % len(LINES)], "marker": MARKERS[k % len(MARKERS)]}
+            axes.loglog(x, np.maximum(np.abs(y), MIN_ERROR), label=name, **look)
+        axes.set_ylabel(label)
+        near_ticks(axes.yaxis)
+    _same_sizes(areas, [x for _, curves in panels for x, _ in curves.values()])
+    _complete(areas, xlabel, ax)
+    return figure
 
 
 @typed
+@page.picture
 def campbell(  # noqa: PLR0913  keywords of one picture
     diagram: Any,
     path: str | Path | None = None,
@@ -285,7 +281,6 @@ def campbell(  # noqa: PLR0913  keywords of one picture
     Raises:
         ConfigError: if there is not one name per mode, or pictures cannot be made here.
     """
-    path = page.wanted(path)
     f, damping = (
         np.stack(without_round_off(list(values.T)), axis=1)
         for values in (diagram.frequencies, 100 * diagram.damping_ratios)
@@ -295,25 +290,21 @@ def campbell(  # noqa: PLR0913  keywords of one picture
     labels = names or [f"mode {k + 1}" for k in range(f.shape[1])]
     turns = 30 * diagram.speeds / np.pi
     damped = np.abs(damping).max(initial=0.0) > 1e-3
-    with page.styled():
-        legends = [[*labels, RAYS_LABEL, *(marks or {})]]
-        legends += [[*labels, *(marks or {})]] if damped else []
-        figure, areas = _panels(ax, legends, "campbell", title, caption, beside)
-        for k, label in enumerate(labels):
-            look = line_look(k)
-            areas[0].plot(turns, f[:, k], label=label, **look)
-            if damped:
-                areas[1].plot(turns, damping[:, k], label=label, **look)
-        for axes, label in zip(areas, ("frequency [Hz]", "damping [% of critical]"), strict=False):
-            axes.set_ylabel(label)
-            axes.set_xlim(turns[0], turns[-1])
-        _multiples(areas[0], diagram, turns, orders)
-        for axes in areas:
-            for name, speed in (marks or {}).items():
-                axes.axvline(30 * speed / np.pi, label=name, **LEVEL_STYLE)
-        _name_rays(areas[0], turns, orders)
-        _complete(areas, "speed [1/min]", ax)
-        return page.save(figure, path)
+    panels = {"frequency [Hz]": f} | ({"damping [% of critical]": damping} if damped else {})
+    legends = [[*labels, RAYS_LABEL, *(marks or {})], [*labels, *(marks or {})]][: len(panels)]
+    figure, areas = _panels(ax, legends, "campbell", title, caption, beside)
+    for axes, (label, values) in zip(areas, panels.items(), strict=True):
+        for k, name in enumerate(labels):
+            axes.plot(turns, values[:, k], label=name, **line_look(k))
+        axes.set_ylabel(label)
+        axes.set_xlim(turns[0], turns[-1])
+    _multiples(areas[0], diagram, turns, orders)
+    for axes in areas:
+        for name, speed in (marks or {}).items():
+            axes.axvline(30 * speed / np.pi, label=name, **LEVEL_STYLE)
+    _name_rays(areas[0], turns, orders)
+    _complete(areas, "speed [1/min]", ax)
+    return figure
 
 
 def _multiples(axes: "Axes", diagram: "Campbell", turns: Array, orders: Sequence[float]) -> None:
@@ -401,24 +392,20 @@ def _panels(
 ) -> tuple["Figure", list["Axes"]]:
     """Figure and axes: those of the caller, or one below the other on a page with their legends."""
     scenes, n = [beside] if isinstance(beside, Scene) else list(beside or ()), len(legends)
-    if ax is not None:
-        figure, areas = page.taken(ax, n + len(scenes), name)
-        if title:
-            areas[0].set_title(title, loc="left")
-        for axes, scene in zip(areas[n:], scenes, strict=True):
-            draw_scene(figure, axes, scene, scenes)
-        return figure, areas[:n]
     width = PAGE_WIDTH - 190 - (BESIDE_WIDTH + 30 if scenes else 0)
     rows = np.array([page.legend_shape(names, width)[0] for names in _once(legends)])
     feet = 60 + np.cumsum(PANEL_HEIGHT + 25 + page.ROW_HEIGHT * rows)
-    figure = page.titled(PAGE_WIDTH, int(feet[-1]) + 85, title, caption)
-    areas = [page.area(figure, 150, foot - PANEL_HEIGHT, width, PANEL_HEIGHT) for foot in feet]
+    places = [(150.0, foot - PANEL_HEIGHT, width, PANEL_HEIGHT) for foot in feet]
     tall = (feet[-1] - 45 + SCENE_GAP) / max(1, len(scenes))
     left = PAGE_WIDTH - BESIDE_WIDTH - 20
-    for k, scene in enumerate(scenes):
-        area = page.area(figure, left, 105 + k * tall, BESIDE_WIDTH, tall - SCENE_GAP)
-        draw_scene(figure, area, scene, scenes)
-    return figure, areas
+    places += [(left, 105 + k * tall, BESIDE_WIDTH, tall - SCENE_GAP) for k in range(len(scenes))]
+    size = PAGE_WIDTH, int(feet[-1]) + 85
+    figure, areas = page.areas(ax, places, name, size, title, caption)
+    if ax is not None and title:
+        areas[0].set_title(title, loc="left")
+    for axes, scene in zip(areas[n:], scenes, strict=True):
+        draw_scene(figure, axes, scene, scenes)
+    return figure, areas[:n]
 
 
 def finish(

@@ -17,13 +17,13 @@ from rom.view.figures.things import Scene
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.cm import ScalarMappable
     from matplotlib.figure import Figure
 
 PAGE_WIDTH = 1400  # [pixel]
 COLUMN_GAP = 120  # [pixel]
 ROW_GAP, BARE_GAP = 150, 90  # below a drawing with a legend, and without [pixel]
 BAR_WIDTH = 60  # of a colour bar [pixel]
+BESIDE: page.Style = {"fraction": 0.05, "pad": 0.03}  # where it is, in shares of a drawing
 MANY_CELLS, MANY_POINTS = 12, 40  # fewer values along a shade are squares; more points are small
 LABEL_RATIO = 0.04  # of a drawing, that the names of level curves stay away from its edge
 ON_SHADE = (("#d1495b", "white"), ("white", "#22262b"))  # fill and edge of points on colours
@@ -70,6 +70,7 @@ class Drawing:
 
 
 @typed
+@page.picture
 def plane(
     drawings: Sequence[Drawing | Scene],
     path: str | Path | None = None,
@@ -99,26 +100,21 @@ def plane(
     Raises:
         ConfigError: without a drawing, or if pictures cannot be made here.
     """
-    path = page.wanted(path)
     if not drawings:
         raise ConfigError("there is nothing to draw; give at least one drawing.")
-    if ax is not None:
-        figure, areas = page.taken(ax, len(drawings), "plane")
-        fill(figure, areas, drawings, _draw, legend=False)
-        return page.save(figure, path)
     rows = -(-len(drawings) // columns)
     gap = ROW_GAP if any(isinstance(x, Drawing) and legend_names(x) for x in drawings) else BARE_GAP
     width = (PAGE_WIDTH - 30) // columns - COLUMN_GAP
-    with page.styled():
-        figure = page.titled(PAGE_WIDTH, 100 + rows * (height + gap), title, caption)
-        areas = []
-        for k, drawing in enumerate(drawings):
-            row, column = divmod(k, columns)
-            left, top = 95 + column * (width + COLUMN_GAP), 110 + row * (height + gap)
-            narrow = BAR_WIDTH if isinstance(drawing, Drawing) and drawing.label else 0
-            areas.append(page.area(figure, left, top, width - narrow, height))
-        fill(figure, areas, drawings, _draw, legend=False)
-        return page.save(figure, path)
+    places = list[page.Place]()
+    for k, drawing in enumerate(drawings):
+        row, column = divmod(k, columns)
+        left, top = 95 + column * (width + COLUMN_GAP), 110 + row * (height + gap)
+        narrow = BAR_WIDTH if isinstance(drawing, Drawing) and drawing.label else 0
+        places.append((left, top, width - narrow, height))
+    size = PAGE_WIDTH, 100 + rows * (height + gap)
+    figure, areas = page.areas(ax, places, "plane", size, title, caption)
+    fill(figure, areas, drawings, _draw, legend=False)
+    return figure
 
 
 def _draw(axes: "Axes", drawing: Drawing, numbers: dict[str, int]) -> None:
@@ -132,7 +128,8 @@ def _draw(axes: "Axes", drawing: Drawing, numbers: dict[str, int]) -> None:
         how |= {"interpolation": "bilinear" if smooth else "nearest"}
         how |= {"aspect": "equal" if drawing.equal else "auto"}
         image = axes.imshow(drawing.shade.T, **how)
-        _colour_bar(axes, image, drawing)
+        image.set_clim(drawing.limits)
+        page.scale_beside(axes, image, drawing.label, **BESIDE)
     _fill(axes, drawing)
     for k, (label, curves) in enumerate(drawing.curves.items()):
         for n, curve in enumerate(curves):
@@ -152,13 +149,6 @@ def _draw(axes: "Axes", drawing: Drawing, numbers: dict[str, int]) -> None:
     if axes.get_legend_handles_labels()[0]:
         place = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.15), "borderaxespad": 0.0}
         axes.legend(fontsize=page.SMALL_SIZE, frameon=False, ncol=3, **place)
-
-
-def _colour_bar(axes: "Axes", coloured: "ScalarMappable", drawing: Drawing) -> None:
-    coloured.set_clim(drawing.limits)
-    bar = axes.figure.colorbar(coloured, ax=axes, fraction=0.05, pad=0.03)
-    bar.set_label(drawing.label, size=page.SMALL_SIZE)
-    bar.ax.tick_params(labelsize=page.SMALL_SIZE)
 
 
 def _draw_levels(axes: "Axes", drawing: Drawing) -> None:
@@ -197,5 +187,6 @@ def _fill(axes: "Axes", drawing: Drawing) -> None:
     blocks = PolyCollection(drawing.polygons, **look)
     axes.add_collection(blocks)
     if drawing.values is not None:
-        _colour_bar(axes, blocks, drawing)
+        blocks.set_clim(drawing.limits)
+        page.scale_beside(axes, blocks, drawing.label, **BESIDE)
     axes.autoscale_view()

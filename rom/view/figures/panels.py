@@ -72,6 +72,7 @@ class Panel:
 
 
 @typed
+@page.picture
 def panels(
     rows: Sequence[Sequence[Panel | Scene]],
     path: str | Path | None = None,
@@ -95,29 +96,24 @@ def panels(
     Raises:
         ConfigError: if lengths differ, or pictures cannot be made here.
     """
-    path = page.wanted(path)
     diagrams = [panel for row in rows for panel in row]
-    if ax is not None:
-        figure, areas = page.taken(ax, len(diagrams), "panels")
-        fill(figure, areas, diagrams, _draw, legend=True)
-        return page.save(figure, path)
-    with page.styled():
-        legends = [_legend_height(row) for row in rows]
-        heights = [_height(row) for row in rows]
-        feet = 65 + np.cumsum(np.add(legends, heights) + TOP_MARGIN + BOTTOM_MARGIN)
-        figure = page.titled(PAGE_WIDTH, int(feet[-1]) + 5, title, caption)
-        areas, above = [], []
-        for row, legend, height, foot in zip(rows, legends, heights, feet, strict=True):
-            top = foot - BOTTOM_MARGIN - height
-            for panel, (left, width) in zip(row, _columns(row), strict=True):
-                more = (legend, BOTTOM_MARGIN) if isinstance(panel, Scene) else (0, 0)
-                areas.append(page.area(figure, left, top - more[0], width, height + sum(more)))
-                above.append((width, legend))
-        fill(figure, areas, diagrams, _draw, legend=False)
-        for axes, panel, (width, legend) in zip(areas, diagrams, above, strict=True):
-            if isinstance(panel, Panel):
-                page.legend_above(axes, width, legend)
-        return page.save(figure, path)
+    legends = [_legend_height(row) for row in rows]
+    heights = [_height(row) if ax is None else 0 for row in rows]
+    feet = 65 + np.cumsum(np.add(legends, heights) + TOP_MARGIN + BOTTOM_MARGIN)
+    places, above = list[page.Place](), []
+    for row, legend, height, foot in zip(rows, legends, heights, feet, strict=True):
+        top = foot - BOTTOM_MARGIN - height
+        for panel, (left, width) in zip(row, _columns(row), strict=True):
+            more = (legend, BOTTOM_MARGIN) if isinstance(panel, Scene) else (0, 0)
+            places.append((left, top - more[0], width, height + sum(more)))
+            above.append((width, legend))
+    size = PAGE_WIDTH, int(feet[-1]) + 5
+    figure, areas = page.areas(ax, places, "panels", size, title, caption)
+    fill(figure, areas, diagrams, _draw, legend=ax is not None)
+    for axes, panel, (width, legend) in zip(areas, diagrams, above, strict=True):
+        if isinstance(panel, Panel) and ax is None:
+            page.legend_above(axes, width, legend)
+    return figure
 
 
 def _columns(row: Sequence[Panel | Scene]) -> list[tuple[float, float]]:

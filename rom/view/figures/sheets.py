@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.collections import Collection
     from matplotlib.figure import Figure
 
-PAGE_WIDTH, PANEL_HEIGHT = 1500, 430  # pixel
+PAGE_WIDTH, PANEL_HEIGHT, BAR_HEIGHT = 1500, 430, 25  # pixel; the bar is one of colours
 FILM_SIZE = (640, 700)  # of the picture in a film [pixel]
 TOOL_COLOUR = "#c9cfd6"
 SURFACE_COLOUR, EDGE_COLOUR, UNDEFORMED_COLOUR = "#dfe5ec", "#6b7480", "#d1495b"
@@ -55,6 +55,7 @@ class Shape:
 
 
 @typed
+@page.picture
 def deformed(  # noqa: PLR0913  keywords of one picture
     curves: Mapping[str, tuple[object, object]],
     shapes: Sequence[Shape],
@@ -89,43 +90,25 @@ def deformed(  # noqa: PLR0913  keywords of one picture
     Raises:
         ConfigError: if the shapes do not fit beside the curves, or pictures cannot be made here.
     """
-    path = page.wanted(path)
-    if ax is not None:
-        figure, (axes, *areas) = page.taken(ax, 1 + len(shapes), "deformed")
-        _tending(axes, curves, limit, (xlabel, ylabel))
-        axes.set_title(heading, size=page.BODY_SIZE, loc="left")
-        for area, shape in zip(areas, shapes, strict=True):
-            area.set_title(shape.title, size=page.BODY_SIZE)
-            drawn = _shape(area, shape)
-            if shape.values is not None:
-                figure.colorbar(drawn, ax=area, label=shape.label)
-        return page.save(figure, path)
+    from matplotlib.ticker import MaxNLocator
+
     left = PAGE_WIDTH - 30 - sum(s.width + 30 for s in shapes)
-    if left < 400:
+    if left < 400 and ax is None:
         raise ConfigError(f"{len(shapes)} shapes leave {left} pixels for the curves; take fewer.")
-    with page.styled():
-        figure = page.titled(PAGE_WIDTH, 225 + PANEL_HEIGHT, title, caption)
-        axes = page.area(figure, 110, 120, left - 140, PANEL_HEIGHT)
-        _tending(axes, curves, limit, (xlabel, ylabel))
-        page.words(figure, heading, 110, 80, size=page.BODY_SIZE)
-        for shape in shapes:
-            page.words(figure, shape.title, left + 10, 80, size=page.BODY_SIZE)
-            _shape(page.area(figure, left, 120, shape.width, PANEL_HEIGHT), shape)
-            if shape.values is not None:
-                bar = (left + 40, 120 + PANEL_HEIGHT + 32, shape.width - 80, 14)
-                limits = (0.0, float(shape.values.max()))
-                page.colour_bar(figure, limits, shape.label, bar)
-            left += shape.width + 30
-        return page.save(figure, path)
-
-
-def _tending(
-    axes: "Axes",
-    curves: Mapping[str, tuple[object, object]],
-    limit: tuple[str, float],
-    labels: Sequence[str],
-) -> None:
-    """Curves and the limit they tend to."""
+    places = [(110, 120, left - 140, PANEL_HEIGHT)]
+    for shape in shapes:
+        below = 0 if shape.values is None else BAR_HEIGHT
+        places.append((left, 120, shape.width, PANEL_HEIGHT + below))
+        left += shape.width + 30
+    size = PAGE_WIDTH, 225 + PANEL_HEIGHT
+    figure, (axes, *areas) = page.areas(ax, places, "deformed", size, title, caption)
+    axes.set_title(heading, size=page.BODY_SIZE, loc="left")
+    for area, shape in zip(areas, shapes, strict=True):
+        area.set_title(shape.title, size=page.BODY_SIZE, loc="left")
+        drawn = _shape(area, shape)
+        if shape.values is not None:
+            where = {"location": "bottom", "fraction": 0.03, "pad": 0.02, "aspect": 24}
+            page.scale_beside(area, drawn, shape.label, ticks=MaxNLocator(5), **where)
     for k, (name, (x, y)) in enumerate(curves.items()):
         look = {"color": LINES[k], "marker": MARKERS[k], "lw": 1.5}
         axes.semilogx(np.asarray(x), np.asarray(y), label=name, **look)
@@ -133,9 +116,10 @@ def _tending(
     ticks = np.unique(np.concatenate([np.asarray(x) for x, _ in curves.values()]))
     axes.set_xticks(ticks, [f"{t:g}" for t in ticks])
     axes.minorticks_off()
-    axes.set_xlabel(labels[0], size=page.BODY_SIZE)
-    axes.set_ylabel(labels[1], size=page.BODY_SIZE)
+    axes.set_xlabel(xlabel)
+    axes.set_ylabel(ylabel)
     finish(axes, legend=True)
+    return figure
 
 
 @typed

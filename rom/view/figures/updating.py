@@ -26,6 +26,7 @@ BODY_COLOUR, BODY_OPACITY = "#c3c9d0", 0.55
 
 
 @typed
+@page.picture
 def updating(  # noqa: PLR0913  keywords of one picture
     f: npt.ArrayLike,
     curves: Mapping[str, object],
@@ -60,27 +61,23 @@ def updating(  # noqa: PLR0913  keywords of one picture
     Raises:
         ConfigError: if lengths differ, or pictures cannot be made here.
     """
-    path, f = page.wanted(path), np.asarray(f, dtype=float)
+    f = np.asarray(f, dtype=float)
     lines = {name: x if isinstance(x, tuple) else (f, x) for name, x in curves.items()}
     for name, (own, values) in lines.items():
         one_each(f"values of {name!r}", np.shape(values), "frequencies", np.shape(own))
     scene = structure if isinstance(structure, Scene) else _frame(*structure)
-    figure: Figure
-    with page.styled():
-        if ax is None:
-            top = 85 + TOP_HEIGHT + 145
-            figure = page.titled(PAGE_WIDTH, top + BOTTOM_HEIGHT + 75, title, caption)
-            areas = [page.area(figure, 130, 85, PAGE_WIDTH - 170, TOP_HEIGHT)]
-            areas += [page.area(figure, left, top, 270, BOTTOM_HEIGHT) for left in (250, 560)]
-            areas += [page.area(figure, 880, top - 10, 590, BOTTOM_HEIGHT + 85)]
-        else:
-            figure, areas = page.taken(ax, 4, "updating")
-        _responses(areas[0], f, lines, label)
-        _changes(areas[1], areas[2], changes)
-        draw_scene(figure, areas[3], scene)
-        for axes in areas[1:3] if ax is None else ():
-            page.legend_above(axes, 270)
-        return page.save(figure, path)
+    top = 85 + TOP_HEIGHT + 145
+    places = [(130, 85, PAGE_WIDTH - 170, TOP_HEIGHT)]
+    places += [(left, top, 270, BOTTOM_HEIGHT) for left in (250, 560)]
+    places += [(880, top - 10, 590, BOTTOM_HEIGHT + 85)]
+    size = PAGE_WIDTH, top + BOTTOM_HEIGHT + 75
+    figure, areas = page.areas(ax, places, "updating", size, title, caption)
+    _responses(areas[0], f, lines, label)
+    _changes(areas[1], areas[2], changes)
+    draw_scene(figure, areas[3], scene)
+    for axes in areas[1:3] if ax is None else ():
+        page.legend_above(axes, 270)
+    return figure
 
 
 def _responses(

@@ -110,12 +110,11 @@ def _bearing(scenery: Scenery, joint: "Joint", axis: Array | None) -> tuple[Arra
     grounded = GROUND in {m.body for m in joint.markers}
     if mover is None or axis is None or not grounded or joint.kind != "revolute":
         return np.zeros(3), scenery.size
-    part = scenery.places.mechanism.part(mover.body)
-    along = matrix(part.p).T @ axis
+    along = matrix(scenery.places.mechanism.part(mover.body).p).T @ axis
     ends = [scenery.beyond(mover, sign * along) for sign in (-1.0, 1.0)]
     side = int(np.argmin(ends))
     shift = (2 * side - 1) * ends[side]
-    X = scenery.solid[mover.body] - part.point(mover)
+    X = scenery.around(mover)
     face = X[np.abs(X @ along - shift) < 0.02 * scenery.size]
     radial = face - np.outer(face @ along, along)
     radius = float(np.linalg.norm(radial, axis=1).max(initial=0.0))
@@ -144,10 +143,9 @@ def _grounded(scenery: Scenery, joint: "Joint", axis: Array | None) -> Iterator[
 
 def _foot(scenery: Scenery, marker: Marker, normal: Array) -> float:
     """How wide a body is where it leaves a wall, about a marker [m]; 0 without a surface."""
-    if marker.body not in scenery.solid:
+    X = scenery.around(marker)
+    if not len(X):
         return 0.0
-    part = scenery.places.mechanism.part(marker.body)
-    X = scenery.solid[marker.body] - part.point(marker)
     inward = scenery.places.pose(marker.body)[1][0].T @ normal
     face = X[X @ inward < FOOT_RATIO * np.ptp(X, axis=0).max()]
     radial = face - np.outer(face @ inward, inward)

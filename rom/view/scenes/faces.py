@@ -35,6 +35,7 @@ AWAY = np.array([(0, 0), *((i * k, j * k) for k in range(2, MAX_STEPS) for i, j 
 
 
 @typed
+@page.picture
 def faces(
     points: npt.ArrayLike,
     patches: Mapping[str, npt.ArrayLike],
@@ -57,7 +58,6 @@ def faces(
     Raises:
         ConfigError: if there is no triangle, or pictures cannot be made here.
     """
-    path = page.wanted(path)
     x = np.asarray(points, dtype=float)
     triangles = {label: np.asarray(t, dtype=np.int64) for label, t in patches.items()}
     if not any(map(len, triangles.values())):
@@ -68,8 +68,7 @@ def faces(
     images = render(list(_actors(both, triangles)), camera)
     sides = _numbers(both, triangles, camera)
     placed = [_placed(_spots(side, list(triangles)), camera.size) for side in sides]
-    with page.styled():
-        return page.save(_sheet(images, placed, _words(x[used], triangles, placed), title), path)
+    return _sheet(images, placed, _words(x[used], triangles, placed), title)
 
 
 def _turned(x: Array, camera: Camera) -> Array:
@@ -153,12 +152,10 @@ def _words(x: Array, triangles: Mapping[str, Index], placed: list[Labels]) -> st
 
 
 def _sheet(images: Image, placed: list[Labels], words: str, title: str) -> "Figure":
-    _, height, width, _ = images.shape
+    height = images.shape[1]
     figure = page.titled(PAGE_WIDTH, HEADER_HEIGHT + 2 * (height + GAP), title, words)
     for k, side in enumerate(placed):
-        axes = page.area(figure, 0, HEADER_HEIGHT + k * (height + GAP), width, height)
-        axes.set_axis_off()
-        axes.imshow(images[k], aspect="auto", interpolation="nearest")
+        axes = page.place(figure, images[k], 0, HEADER_HEIGHT + k * (height + GAP)).axes
         for spot, at in side:
             _write(axes, spot, at)
     return figure

@@ -101,6 +101,7 @@ def animate(  # noqa: PLR0913  keywords of one picture, all with defaults
 
 
 @typed
+@page.picture
 def instants(  # noqa: PLR0913  keywords of one picture, all with defaults
     mechanism: AnyMechanism,
     solution: AnySolution,
@@ -124,15 +125,13 @@ def instants(  # noqa: PLR0913  keywords of one picture, all with defaults
     Raises:
         ConfigError: for an unknown body, or if pictures cannot be made here.
     """
-    path = page.wanted(path)
     given = different(solution, N_INSTANTS) if times is None else np.asarray(times, dtype=float)
     steps = np.array([int(np.argmin(np.abs(solution.t - t))) for t in given.ravel()])
     look = Look(shapes or {}, magnify, symbols, traces, upright(mechanism, up))
     stage = _stage(mechanism, solution, steps, look)
     series = seen(stage.scene("", view, look.up), STILL_WIDTH)
-    with page.styled():
-        words = f"{caption} {_words(stage, magnify, coloured=series.coloured)}".lstrip()
-        return page.save(series_page(series, clock_texts(solution.t[steps]), words), path)
+    words = f"{caption} {_words(stage, magnify, coloured=series.coloured)}".lstrip()
+    return series_page(series, clock_texts(solution.t[steps]), words)
 
 
 @typed
@@ -296,6 +295,7 @@ def _words(stage: Stage, magnify: float, *, coloured: bool = True) -> str:
 
 
 @typed
+@page.picture
 def start(
     mechanism: AnyMechanism,
     path: str | Path | None = None,
@@ -318,7 +318,6 @@ def start(
     Raises:
         ConfigError: if pictures cannot be made here.
     """
-    path = page.wanted(path)
     up = upright(mechanism, up)
     things = _things(mechanism, symbols=symbols, up=up)
     whole = seen(Scene(title, things, view=view, up=up), START_WIDTH)
@@ -327,8 +326,7 @@ def start(
         "Flexible bodies are drawn by their surface, rigid ones as tubes from the mass centre to "
         "their markers, in a block of the same mass and inertia."
     )
-    with page.styled():
-        return page.save(scene_page(whole, words), path)
+    return scene_page(whole, words)
 
 
 def start_actors(mechanism: "Mechanism") -> list[Actor]:

@@ -29,12 +29,15 @@ class Scenery:
     size: float  # of a joint, about its radius [m]
     up: Array  # (3,) upright unit vector
 
+    def around(self, marker: Marker) -> Array:
+        """(n, 3) points of the surface of a body from a marker, in its frame [m]; or none."""
+        if marker.body not in self.solid:
+            return np.zeros((0, 3))
+        return self.solid[marker.body] - self.places.mechanism.part(marker.body).point(marker)
+
     def beyond(self, marker: Marker, direction: Array) -> float:
         """How far the surface of a body goes from a marker in a direction (3,) of its frame [m]."""
-        if marker.body not in self.solid:
-            return 0.0
-        X = self.solid[marker.body] - self.places.mechanism.part(marker.body).point(marker)
-        return max(0.0, float((X @ direction).max()))
+        return float((self.around(marker) @ direction).max(initial=0.0))
 
     def seen_from(self, marker: Marker, others: Sequence[Marker]) -> Array:
         """(k, 3) places of other markers in all instants, from one in the frame of its body [m]."""

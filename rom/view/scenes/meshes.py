@@ -23,6 +23,7 @@ MARK_COLOURS = ("#d1495b", "#2f7f9f", "#edae49", "#66a182", "#8d6a9f", "#00798c"
 
 
 @typed
+@page.picture
 def mesh(
     model: FEModel,
     path: str | Path | None = None,
@@ -43,7 +44,6 @@ def mesh(
     Raises:
         ConfigError: if the model has no surface, or pictures cannot be made here.
     """
-    path = page.wanted(path)
     camera = seen(Scene(title, meshed(model), view=view, up=up), PAGE_WIDTH).camera
     hidden = [name for name in model.interfaces if not in_sight(model, name, camera)]
     told = {name: f"{name} (turned away)" for name in hidden}
@@ -56,8 +56,7 @@ def mesh(
         "the outer surface; coloured surfaces are the interfaces, through which the body touches "
         "the rest of the mechanism."
     )
-    with page.styled():
-        return page.save(scene_page(whole, words), path)
+    return scene_page(whole, words)
 
 
 @typed

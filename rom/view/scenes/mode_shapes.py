@@ -26,6 +26,7 @@ COINCIDENT_RTOL = 1e-6  # of the wheel's size: nodes of neighbouring sectors
 
 
 @typed
+@page.picture
 def mode_shapes(
     body: AnyBody,
     path: str | Path | None = None,
@@ -49,7 +50,6 @@ def mode_shapes(
         ConfigError: if the body has no surface, or pictures cannot be made here.
         InterfaceError: if an interface is unknown.
     """
-    path = page.wanted(path)
     surface_of(body)
     body = body.in_units("SI")
     omega, V = body.modes(fixed=fixed)
@@ -62,8 +62,7 @@ def mode_shapes(
         f"coordinates), {support}."
     )
     title = f"Mode shapes of {body.name}"
-    figure = modes_page(body.surface, shapes, title, words, what="body", view=view, up=up)
-    return page.save(figure, path)
+    return modes_page(body.surface, shapes, title, words, what="body", view=view, up=up)
 
 
 def displacement(body: AnyBody, motion: Array) -> Array:
@@ -93,12 +92,11 @@ def modes_page(
         f"{words} The largest displacement is drawn as {100 * AMPLITUDE_RATIO:g} % of the size of "
         f"the {what}; grey lines show the undeformed edges."
     )
-    view = seen(scene, STILL_WIDTH)
-    with page.styled():
-        return series_page(view, list(shapes), caption)
+    return series_page(seen(scene, STILL_WIDTH), list(shapes), caption)
 
 
 @typed
+@page.picture
 def wheel_modes(  # noqa: PLR0913  keywords of one picture
     model: FEModel,
     shapes: Mapping[str, npt.ArrayLike],
@@ -126,7 +124,6 @@ def wheel_modes(  # noqa: PLR0913  keywords of one picture
     Raises:
         ConfigError: if there is nothing to draw, or pictures cannot be made here.
     """
-    path = page.wanted(path)
     surface_of(model)
     if not shapes:
         raise ConfigError("at least one mode of the wheel is needed to draw.")
@@ -136,7 +133,7 @@ def wheel_modes(  # noqa: PLR0913  keywords of one picture
         raise ConfigError(f"each shape needs {3 * model.points.shape[0]} numbers per sector.")
     around = _around([model] * N, hidden, axis, range(N))
     moved = {name: around.displaced(list(u)) for name, u in zip(shapes, U, strict=True)}
-    return page.save(modes_page(around, moved, title, caption, what="wheel", view=view), path)
+    return modes_page(around, moved, title, caption, what="wheel", view=view)
 
 
 @typed

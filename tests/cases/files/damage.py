@@ -8,7 +8,7 @@ import pytest
 
 import rom
 from cases.solid import block
-from rom.errors import RomError
+from rom.errors import FileFormatError, RomError
 from rom.mbs.results.state import Memory, State
 
 NUMBER = re.compile(rb"[-+]?\d+(\.\d*)?([EDed][-+]?\d+)?")
@@ -54,6 +54,29 @@ def misnumbered(data, rng):
 
 
 WAYS = (flipped, cut, grown, shuffled, misnumbered)
+
+
+def changed(text, name, read, *rows, error=FileFormatError):
+    """A test that a file is refused by its name when a part of its text is another one.
+
+    Args:
+        text: of a file that is read, or a function without arguments that gives it.
+        name: of the file.
+        read: takes its path.
+        rows: the part, what stands in its first place, the class, and what the message must match.
+        error: the class, where rows leave it out.
+    """
+
+    @pytest.mark.parametrize("row", rows)
+    def test(row, tmp_path):
+        old, new, *kind, words = row
+        whole = text() if callable(text) else text
+        assert old in whole
+        (tmp_path / name).write_text(whole.replace(old, new, 1))
+        with pytest.raises(*kind or [error], match=f"(?s){name}.*{words}"):
+            read(tmp_path / name)
+
+    return test
 
 
 def damaged(data, rng, n, ways=WAYS):

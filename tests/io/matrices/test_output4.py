@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-import rom
+from cases.files.damage import changed
 from rom.errors import ConfigError, FileFormatError
 from rom.io import read_matrix, read_op4
 from rom.io.matrices.op4 import write_op4
@@ -207,18 +207,13 @@ def test_what_is_written_is_what_the_description_says(tmp_path):
     assert path.read_text() == text_of(A, "A", "dense", 2, "1P,3E23.16")
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "said"),
-    [
-        (f"{2:8d}{2:8d}A", f"{2:8d}{5:8d}A", "unknown type 5"),
-        ("3D23.16", "3Z23.16", "format '3Z23.16' is unknown"),
-        (f"{5:8d}{7:8d}", f"{0:8d}{7:8d}", "7 rows and 0 columns"),
-        (f"{5:8d}{7:8d}", f"{5:8d}{4:8d}", "reaches beyond 4 rows"),
-    ],
+SIZE = f"{5:8d}{7:8d}"
+test_what_is_no_matrix_is_named_with_its_line = changed(
+    text_of(sample(2), "A", "dense", 2, "3D23.16"),
+    "e.op4",
+    read_op4,
+    (f"{2:8d}{2:8d}A", f"{2:8d}{5:8d}A", r"line \d+: .*unknown type 5"),
+    ("3D23.16", "3Z23.16", r"line \d+: .*format '3Z23.16' is unknown"),
+    (SIZE, f"{0:8d}{7:8d}", r"line \d+: .*7 rows and 0 columns"),
+    (SIZE, f"{5:8d}{4:8d}", r"line \d+: .*reaches beyond 4 rows"),
 )
-def test_what_is_no_matrix_is_named_with_its_line(old, new, said, tmp_path):
-    text = text_of(sample(2), "A", "dense", 2, "3D23.16")
-    assert old in text
-    (tmp_path / "e.op4").write_text(text.replace(old, new, 1))
-    with pytest.raises(FileFormatError, match=rf"e\.op4, line \d+: .*{said}"):
-        rom.io.read_op4(tmp_path / "e.op4")
