@@ -22,6 +22,7 @@ from rom.components.journal_bearing.films.kinematics import (
     journal_wrench,
     stepped_place,
 )
+from rom.components.journal_bearing.films.oil import CELSIUS_ZERO
 from rom.components.journal_bearing.films.pressure import (
     find_pressure,
     outflow,
@@ -37,9 +38,9 @@ from rom.components.journal_bearing.films.tabulated import (
     thinnest_of,
 )
 from rom.mbs.elements.contact.points import COMPLEX_STEP
-from rom.mbs.kernels.algebra import row
+from rom.mbs.kernels.algebra import row, scale
 from rom.mbs.kernels.compiled import inner
-from rom.mbs.kernels.constraints import pair_stiffness
+from rom.mbs.kernels.constraints import pair_stiffness, push_pair
 from rom.mbs.kernels.element_calls import pair_tangents, residuals, tangents
 from rom.mbs.kernels.tables import Array1, Array2, Array3, Index1, Scratch1, Scratch2, Table, table
 
@@ -49,7 +50,6 @@ CONSTANT, WALTHER_A, WALTHER_B, DENSITY, HEAT, INLET, HEATED, LAG, ROUGHNESS = r
 KNOWN, TIME, TEMPERATURE, THINNEST, LARGEST, POWER, SIDE_FLOW, MOTION = range(8)
 FIRST_CONTENT = MOTION + col.N_MOTIONS
 SETTLING_MARK = -1.0  # in place of 1 for a known film: its temperature is the one that stays
-CELSIUS_ZERO = 273.15  # [K]
 MAX_WARMINGS = 50  # of a film whose grooves have pressure
 WARMING_TOL = 1e-10  # of a temperature [K]
 MAX_BISECTIONS = 60  # of a temperature: all digits
@@ -240,14 +240,6 @@ def set_state(journals, k, place):
 
 
 @inner
-def largest_pressure(journals, k):
-    """Largest pressure of film k [Pa]."""
-    films = journals.films
-    unit = journals.viscosity[k] * (films.size[k, col.RADIUS] / films.size[k, col.CLEARANCE]) ** 2
-    return journals.peak[k] * unit
-
-
-@inner
 def set_thinnest(journals, k):
     """Set the thinnest film of film k; says whether it is one, and in its table if it has one."""
     films = journals.films
@@ -272,7 +264,8 @@ def film_of(s, W, journals, k):
         found = celsius == celsius
     if not found:
         return False
-    journals.largest[k] = largest_pressure(journals, k)
+    ratio = journals.films.size[k, col.RADIUS] / journals.films.size[k, col.CLEARANCE]
+    journals.largest[k] = journals.peak[k] * (journals.viscosity[k] * ratio**2)
     remember(W, journals, k, celsius)
     return True
 
@@ -291,11 +284,7 @@ def film_wrenches(s, W, journals, q, v, _lam):
             continue
         F, torque = film_forces(journals, k, journals.films.answer[k])
         force, on_journal, on_bush = journal_wrench(axes, relative[0], F, torque)
-        for p in range(3):
-            W.wrench[i, p] += force[p]
-            W.wrench[i, 3 + p] += on_journal[p]
-            W.wrench[j, p] -= force[p]
-            W.wrench[j, 3 + p] += on_bush[p]
+        push_pair(W, j, i, force, scale(-1.0, on_bush), on_journal)
         bend_bore(s, W, journals, k)
         W.power[2] += lost_power(journals, k)
         W.power[1] += torque * journals.turning[k]  # of what keeps it spinning
@@ -340,14 +329,6 @@ def set_column(W, journals, k, p, by_position):
 
 
 @inner
-def scale_pair(W, c):
-    """Multiply W.Q by a factor."""
-    for p in range(12):
-        for q in range(12):
-            W.Q[p, q] *= c
-
-
-@inner
 def set_film_slopes(journals, k):
     """Set the derivatives of the answers of film k."""
     if journals.number[k] >= 0:
@@ -367,14 +348,14 @@ def film_tangents(s, W, journals, _lam, ck, cc):
         set_film_slopes(journals, k)
         for p in range(12):
             set_column(W, journals, k, p, True)
-        scale_pair(W, ck)
+        W.Q[:] *= ck
         pair_stiffness(s, W, *pair, W.Kt)
         add_bore_tangents(s, W, journals, k, col.FIRST_OPENED, ck, W.Kt)
         for p in range(12):
             set_column(W, journals, k, p, False)
         carried_stiffness(s, W, pair, ck, W.Kt)
         add_bore_rows(s, W, journals, k, -1, ck, W.Kt)
-        scale_pair(W, cc)
+        W.Q[:] *= cc
         pair_stiffness(s, W, *pair, W.S)
         add_bore_tangents(s, W, journals, k, by_rate, cc, W.S)
 
