@@ -5,9 +5,8 @@ import math
 from rom.components.gear_mesh.gears import table as col
 from rom.components.gear_mesh.gears.rims import add_rim_tangent, closing_of_rims, load_rims
 from rom.components.gear_mesh.gears.table import has_rims
-from rom.mbs.kernels.algebra import add, cross, dot, row, scale, sub
+from rom.mbs.kernels.algebra import add, cross, dot, put, row, scale, sub
 from rom.mbs.kernels.compiled import inner
-from rom.mbs.kernels.constraints import push_pair
 
 ACROSS, CLOSING = range(2)  # rows of Meshes.lever
 
@@ -42,6 +41,13 @@ def add_product(tangent, factor, one, two):
     for p in range(12):
         for q in range(12):
             tangent[p, q] += factor * one[p] * two[q]
+
+
+@inner
+def add_force(wrench, arm, force):
+    """Add a force at an arm from a marker to its wrench."""
+    put(wrench, 0, force)
+    put(wrench, 3, cross(arm, force))
 
 
 @inner
@@ -88,8 +94,8 @@ def rub(s, W, meshes, k, what, cell, place):
     arms, n, across = directions
     if what == col.FORCES:
         force = scale(load * grip, across)
-        both = cross(arms[0], force), cross(arms[1], force)
-        push_pair(W, meshes.i[k], meshes.j[k], force, *both)
+        add_force(W.wrench[meshes.i[k]], arms[0], scale(-1.0, force))
+        add_force(W.wrench[meshes.j[k]], arms[1], force)
         load_rims(s, W, meshes, at, add(scale(load, n), force))
         W.power[2] += load * grip * speed
         W.power[1] += load * grip * spinning

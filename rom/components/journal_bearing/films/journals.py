@@ -38,9 +38,9 @@ from rom.components.journal_bearing.films.tabulated import (
     thinnest_of,
 )
 from rom.mbs.elements.contact.points import COMPLEX_STEP
-from rom.mbs.kernels.algebra import row, scale
+from rom.mbs.kernels.algebra import row
 from rom.mbs.kernels.compiled import inner
-from rom.mbs.kernels.constraints import pair_stiffness, push_pair
+from rom.mbs.kernels.constraints import pair_stiffness
 from rom.mbs.kernels.element_calls import pair_tangents, residuals, tangents
 from rom.mbs.kernels.tables import Array1, Array2, Array3, Index1, Scratch1, Scratch2, Table, table
 
@@ -284,7 +284,11 @@ def film_wrenches(s, W, journals, q, v, _lam):
             continue
         F, torque = film_forces(journals, k, journals.films.answer[k])
         force, on_journal, on_bush = journal_wrench(axes, relative[0], F, torque)
-        push_pair(W, j, i, force, scale(-1.0, on_bush), on_journal)
+        for p in range(3):
+            W.wrench[i, p] += force[p]
+            W.wrench[i, 3 + p] += on_journal[p]
+            W.wrench[j, p] -= force[p]
+            W.wrench[j, 3 + p] += on_bush[p]
         bend_bore(s, W, journals, k)
         W.power[2] += lost_power(journals, k)
         W.power[1] += torque * journals.turning[k]  # of what keeps it spinning
@@ -329,6 +333,14 @@ def set_column(W, journals, k, p, by_position):
 
 
 @inner
+def scale_pair(W, c):
+    """Multiply W.Q by a factor."""
+    for p in range(12):
+        for q in range(12):
+            W.Q[p, q] *= c
+
+
+@inner
 def set_film_slopes(journals, k):
     """Set the derivatives of the answers of film k."""
     if journals.number[k] >= 0:
@@ -348,14 +360,14 @@ def film_tangents(s, W, journals, _lam, ck, cc):
         set_film_slopes(journals, k)
         for p in range(12):
             set_column(W, journals, k, p, True)
-        W.Q[:] *= ck
+        scale_pair(W, ck)
         pair_stiffness(s, W, *pair, W.Kt)
         add_bore_tangents(s, W, journals, k, col.FIRST_OPENED, ck, W.Kt)
         for p in range(12):
             set_column(W, journals, k, p, False)
         carried_stiffness(s, W, pair, ck, W.Kt)
         add_bore_rows(s, W, journals, k, -1, ck, W.Kt)
-        W.Q[:] *= cc
+        scale_pair(W, cc)
         pair_stiffness(s, W, *pair, W.S)
         add_bore_tangents(s, W, journals, k, by_rate, cc, W.S)
 
