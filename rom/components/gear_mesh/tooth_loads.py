@@ -58,6 +58,9 @@ def tooth_loads(solution: Solution, name: str) -> tuple[ToothLoads, ...]:
     names = solution.packed.element_names.get(GEAR_MESHES_FAMILY, ())
     check_known(name, names, f"no gear mesh {name!r}; there are")
     k, table = names.index(name), solution.packed.elements[GEAR_MESHES_FAMILY]
-    seen = (table.slices[k, : int(table.n_slices[k])].copy() for _ in at_instants(solution))
-    columns = [PLACE, HEIGHT, LENGTH, LOAD]
-    return tuple(ToothLoads(*found[:, columns].T, found[:, SIDE] < 0) for found in seen)
+    seen = []
+    for _ in at_instants(solution):
+        found = table.slices[k, : int(table.n_slices[k])].copy()
+        place, height, length, force = found[:, [PLACE, HEIGHT, LENGTH, LOAD]].T
+        seen.append(ToothLoads(place, height, length, force, found[:, SIDE] < 0))
+    return tuple(seen)
