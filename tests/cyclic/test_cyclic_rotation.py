@@ -64,8 +64,6 @@ def test_a_wheel_whose_support_softens_diverges():
 def test_wrong_arguments_are_named():
     ring = beam_ring(6, 4)
     refuses(ConfigError, r"at rest use cyclic_modes", rom.travelling_modes, ring, 2, 2, speed=0.0)
-    for call in (rom.travelling_modes, rom.cyclic_modes):
-        refuses(ConfigError, "speed = nan", call, ring, 2, 2, speed=np.nan)
     refuses(ConfigError, "n = 49", rom.travelling_modes, ring, 2, 49, speed=1.0)
     refuses(ConfigError, "no matrices", lambda: rom.travelling_modes(mass_ring(6), 2, 1, speed=1.0))
     loose = replace(mass_ring(6, k=0.0), centrifugal=csr_matrix((2, 2)))

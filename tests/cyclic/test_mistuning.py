@@ -94,11 +94,9 @@ def test_wrong_arguments_are_named():
     wheel = rom.mistuned_wheel(bladed_ring(6), 1)
     refuses(ConfigError, r"6 above -1", wheel.modes, np.zeros(5))
     refuses(ConfigError, r"6 above -1", wheel.modes, np.full(6, -1.5))
-    with pytest.raises(ConfigError, match=r"no region 'wing'; it has \['blade'\]"):
-        rom.mistuned_wheel(bladed_ring(6), 1, blade="wing")
+    words = r"no region 'wing'; it has \['blade'\]"
+    refuses(ConfigError, words, rom.mistuned_wheel, bladed_ring(6), 1, blade="wing")
     refuses(ConfigError, r"2 forces for", wheel.amplification, np.zeros(6), np.ones(2), **SWEEP)
-    still = SWEEP | {"damping": 0.0}
-    refuses(ConfigError, "damping = 0 must", wheel.amplification, np.zeros(6), FORCE, **still)
     refuses(ConfigError, "tuned wheel at", wheel.amplification, np.zeros(6), 0 * FORCE, **SWEEP)
     weak = replace(wheel, blade=50 * wheel.blade)
     refuses(ModelError, "without stiffness", weak.modes, np.full(6, -0.9))

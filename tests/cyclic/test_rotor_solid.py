@@ -207,7 +207,6 @@ def test_a_thin_spinning_disc_splits_by_its_turning_alone():
 def test_springs_that_hold_nothing_are_refused(published):
     face = published.face
     refuses(ConfigError, "hold nothing", rom.supported_sector, published, face)
-    refuses(ConfigError, "across = -1", rom.supported_sector, published, face, across=-1.0)
     small = rom.reduce_sector(published, n_modes=5)
     held = {"face": face, "across": 1.0}
     refuses(InterfaceError, "'cyclic_low' is no interface", rom.supported_sector, small, **held)

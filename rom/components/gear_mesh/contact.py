@@ -98,9 +98,7 @@ class Mesh:
         if self.correction.measured:
             raise ModelError("maps and run-out are for elements; use Mechanism.gear_mesh.")
         if not (k.size and np.isfinite(k).all() and (k > 0).all()):
-            raise ModelError(
-                f"stiffness {np.asarray(self.stiffness)} of the teeth must be positive [N/m^2]."
-            )
+            raise ModelError(f"stiffness {k} of the teeth must be positive [N/m^2].")
         for errors, z in zip(self.correction.pitch, self.pair.teeth, strict=True):
             if len(errors):
                 one_each("pitch errors", len(errors), "teeth", z, error=ModelError)

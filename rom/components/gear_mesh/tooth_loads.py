@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from rom.arguments import typed
 from rom.components.gear_mesh.gears.meshes import GEAR_MESHES_FAMILY
-from rom.components.gear_mesh.gears.table import HEIGHT, LENGTH, LOAD, PLACE, SIDE, Meshes
+from rom.components.gear_mesh.gears.table import HEIGHT, LENGTH, LOAD, PLACE, SIDE
 from rom.mbs.results.recomputed import at_instants
 from rom.mbs.results.solution import Solution
 from rom.model import Array
@@ -58,11 +58,9 @@ def tooth_loads(solution: Solution, name: str) -> tuple[ToothLoads, ...]:
     names = solution.packed.element_names.get(GEAR_MESHES_FAMILY, ())
     check_known(name, names, f"no gear mesh {name!r}; there are")
     k, table = names.index(name), solution.packed.elements[GEAR_MESHES_FAMILY]
-    return tuple(_of_table(table, k) for _ in at_instants(solution))
-
-
-def _of_table(table: Meshes, k: int) -> ToothLoads:
-    """The slices that the last residual found."""
-    found = table.slices[k, : int(table.n_slices[k])].copy()
-    place, height, length, force = found[:, [PLACE, HEIGHT, LENGTH, LOAD]].T
-    return ToothLoads(place, height, length, force, found[:, SIDE] < 0)
+    seen = []
+    for _ in at_instants(solution):
+        found = table.slices[k, : int(table.n_slices[k])].copy()
+        place, height, length, force = found[:, [PLACE, HEIGHT, LENGTH, LOAD]].T
+        seen.append(ToothLoads(place, height, length, force, found[:, SIDE] < 0))
+    return tuple(seen)

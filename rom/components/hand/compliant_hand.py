@@ -73,10 +73,8 @@ class Finger:
     @cached_property
     def joints(self) -> tuple[tuple[int, int, int, int], ...]:
         """Vertex and frame of the plates at the base and at the top of each spring."""
-        bases = [j * (self.n + 1) for j in range(len(self.springs))]
-        frames = [i if i else 0 for i in bases]
-        tops = [i + self.n for i in bases]
-        return tuple((b, f, t, t + 1) for b, f, t in zip(bases, frames, tops, strict=True))
+        bases = (j * (self.n + 1) for j in range(len(self.springs)))
+        return tuple((b, b, b + self.n, b + self.n + 1) for b in bases)
 
     @cached_property
     def rod(self) -> Rod:

@@ -169,5 +169,5 @@ def _moved(arm: Array) -> Array:
 
 def _check(bodies: Sequence[FlexibleBody], springs: Sequence[HelicalSpring]) -> None:
     if len(bodies) != len(springs) or not bodies:
-        text = f"{len(springs)} springs and {len(bodies)} phalanges."
-        raise ModelError(text, hint="Each spring carries one phalanx.")
+        both = f"{len(springs)} springs and {len(bodies)} phalanges"
+        raise ModelError(f"{both}: each spring carries one phalanx.")

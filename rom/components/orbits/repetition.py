@@ -27,7 +27,11 @@ def refuse_what_changes(flow: Flow, turns: Turns, start: Start, driven: bool) ->
 
     Where the period is not given, nothing is driven: nothing may depend on time.
     """
-    _refuse_memory(flow)
+    # oil that is conserved fills films over revolutions, and heat slower: no unknowns here
+    for name in flow.packed.remembering:
+        text = f"{name!r} remembers its oil, its heat, or where friction held, beyond a period."
+        hint = "Give a film cavitation='reynolds' and a viscosity as its oil, or simulate."
+        raise ModelError(text, where=name, hint=hint)
     shift = flow.period if driven else flow.period * np.sqrt(2)  # no period of anything
     for signal in flow.packed.signals:
         if signal.name != "clock":
@@ -36,16 +40,6 @@ def refuse_what_changes(flow: Flow, turns: Turns, start: Start, driven: bool) ->
     if driven:
         later = replace(start.state, t=flow.t0 + shift)
         _refuse_parts(_phases(flow, start.state), _phases(flow, later))
-
-
-def _refuse_memory(flow: Flow) -> None:
-    """Oil that is conserved fills films over revolutions, and heat slower: no unknowns here."""
-    for name in flow.packed.remembering:
-        raise ModelError(
-            f"{name!r} remembers its oil, its heat, or where friction held, beyond a period.",
-            where=name,
-            hint="Give a film cavitation='reynolds' and a viscosity as its oil, or simulate.",
-        )
 
 
 def _phases(flow: Flow, state: State) -> dict[str, float]:

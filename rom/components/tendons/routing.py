@@ -127,8 +127,7 @@ def directions(tendons, i):
 @inner
 def place_turning_gradient(tendons, i):
     """Set how the angle changes by which a cable turns at eyelet i, from the bend of its pieces."""
-    for p in range(18):
-        tendons.wrap_gradient[i, p] = 0.0
+    tendons.wrap_gradient[i, :] = 0.0
     _, one, two = turning(*directions(tendons, i))
     for side in range(2):
         k = i - 1 + side

@@ -265,12 +265,14 @@ def pack(tendons: Mapping[str, Tendon], places: Places) -> Tendons:
     stations = [one for _, one in named]
     sizes = [len(tendon.stations) for tendon in tendons.values()]
     p, m = len(stations), max(sizes)
+    cables = tendons.values()
+    rubs = [any(one.friction > 0.0 for one in cable.stations[1:-1]) for cable in cables]
     return Tendons(
         starts(sizes),
-        rows_of((tendon.numbers for tendon in tendons.values()), 4),
+        rows_of((cable.numbers for cable in cables), 4),
         integers(_signal(name, tendon, places) for name, tendon in tendons.items()),
-        integers(tendon.pulled for tendon in tendons.values()),
-        integers(_rated(tendon) for tendon in tendons.values()),
+        integers(cable.pulled for cable in cables),
+        integers(cable.numbers[1] > 0.0 or rub for cable, rub in zip(cables, rubs, strict=True)),
         integers(places.marker[one.marker] for one in stations),
         rows_of((one.axes.ravel() for one in stations), 6),
         np.array([one.radius for one in stations]),
@@ -279,10 +281,6 @@ def pack(tendons: Mapping[str, Tendon], places: Places) -> Tendons:
         *(np.zeros(x) for x in (p, p, (p, 12), (p, 3), p, (p, 18), p, p, p, (p, 12), (p, 36))),
         *(np.zeros(x) for x in ((3, m, m), (2, 6 * m), (6 * m, 6 * m), (6 * m, 6 * m))),
     )
-
-
-def _rated(tendon: Tendon) -> bool:
-    return tendon.numbers[1] > 0.0 or any(one.friction > 0.0 for one in tendon.stations[1:-1])
 
 
 def _signal(name: str, tendon: Tendon, places: Places) -> int:

@@ -190,9 +190,7 @@ def place_tangents(s, W, tendons, k, ck, cc):
     """Add ck times the stiffness of tendon k to W.Kt and cc times its damping to W.S."""
     first, last = last_piece(tendons, k)
     n = 6 * (last - first + 1)
-    for p in range(n):
-        for q in range(n):
-            tendons.stiffness[p, q], tendons.damping[p, q] = 0.0, 0.0
+    tendons.stiffness[:n, :n], tendons.damping[:n, :n] = 0.0, 0.0
     for i in range(first, last):
         place_turning_force(W, tendons, first, i)
     for i in range(first + 1, last):
@@ -236,8 +234,7 @@ def change_of_tension(tendons, k, i):
     """Set change[0], [1] (6 m,): derivative of the tension of piece i by motions and velocities."""
     first, last = last_piece(tendons, k)
     change, slope, row = tendons.change, tendons.slope, i - first
-    for q in range(6 * (last - first + 1)):
-        change[0, q], change[1, q] = 0.0, 0.0
+    change[:, : 6 * (last - first + 1)] = 0.0
     for c in range(first, last):
         at, by_length, by_rate = 6 * (c - first), slope[0, row, c - first], slope[1, row, c - first]
         for p in range(3):

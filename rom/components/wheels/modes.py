@@ -98,11 +98,7 @@ def cyclic_modes(sector: CyclicSector, diameter: int, n: int, *, speed: float = 
 
 @typed
 def wheel_modes(
-    sector: CyclicSector,
-    n: int,
-    *,
-    diameters: Sequence[int] | None = None,
-    speed: float = 0.0,
+    sector: CyclicSector, n: int, *, diameters: Sequence[int] | None = None, speed: float = 0.0
 ) -> tuple[CyclicModes, ...]:
     """Lowest modes of a wheel with each number of nodal diameters.
 

@@ -286,9 +286,7 @@ class CyclicSector:
 
 
 def each_diameter(
-    sector: CyclicSector,
-    function: Callable[[int], Value],
-    diameters: Sequence[int] | None = None,
+    sector: CyclicSector, function: Callable[[int], Value], diameters: Sequence[int] | None = None
 ) -> list[Value]:
     """Values of a function of each number of nodal diameters, or those given, shared by all ranks.
 

@@ -428,8 +428,6 @@ def test_tables_of_any_extent_are_carried_on_once_round(first, last):
 
 
 test_what_cannot_be_is_named = refused(
-    (lambda: rotor_load(blading(), 8.0, 1.0, 17.47), "pitch = 17.47"),
-    (lambda: turbine(2, wind=8.0, pitch=17.47), "pitch = 17.47"),
     (
         lambda: Profile("x", np.radians([-9.0, 20.0]), np.ones(2), np.ones(2)),
         "profile 'x' is known from -9 to 20 degrees",

@@ -156,7 +156,3 @@ def test_work_of_the_torque_is_the_energy(driven):
     assert sol.energy.drives[-1] > 1e6
     assert np.abs(sol.energy.balance).max() < 1e-3 * sol.energy.kinetic.max()
     assert rom.audit(sol).ok
-
-
-def test_a_turbine_without_blades_is_refused():
-    refuses(ConfigError, "segments = 0", turbine, 0)

@@ -1,5 +1,7 @@
 """Rolling bearings: Hertz in closed form, loads and angles of Stribeck and Harris, energy, cage."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -10,6 +12,7 @@ import rom
 from cases.long import few
 from cases.mbs.mechanisms import prepared, residual_at
 from cases.mbs.tangents import by_position, by_velocity, energy_gradient, forces_at, shifted
+from cases.refusals import refused, refuses
 from rom.components.rolling_bearing.bearings import ROLLING_BEARINGS_FAMILY
 from rom.components.rolling_bearing.races import elliptic_stiffness
 from rom.errors import ConfigError, ModelError
@@ -224,28 +227,24 @@ def test_damping_takes_energy_and_never_gives_any(damping):
     assert np.abs(sol.energy.balance).max() < 1e-7 * sol.energy.total[0]
 
 
-@pytest.mark.parametrize(("numbers", "message"), [
-    ({"ball_diameter": 0.07}, "no bearing has 9 balls"),
-    ({"balls": 20}, "do not fit on a circle"),
-    ({"clearance": 2e-3}, "clearance = 0.002 must"),
-    ({"conformity": (0.5, 0.52)}, "a groove is a little wider"),
-    ({"contact_angle": 25.0}, "not below 80 degrees"),
-])  # fmt: skip
-def test_what_is_no_bearing_is_refused(numbers, message):
-    with pytest.raises(ModelError, match=message):
-        BallBearing(**{"balls": 9, "ball_diameter": 12.7e-3, "pitch_diameter": 65e-3} | numbers)
+test_what_is_no_bearing_is_refused = refused(
+    (lambda: replace(BALLS, ball_diameter=0.07), "no bearing has 9 balls"),
+    (lambda: replace(BALLS, balls=20), "do not fit"),
+    (lambda: replace(BALLS, clearance=2e-3), "clearance = 0.002 must"),
+    (lambda: replace(BALLS, conformity=(0.5, 0.52)), "a groove is a little wider"),
+    (lambda: replace(BALLS, contact_angle=25.0), "not below 80 degrees"),
+    error=ModelError,
+)
 
 
 def test_rings_that_are_not_at_one_place_are_refused():
     mech = rom.Mechanism()
-    shaft = mech.add_rigid("shaft", mass=1.0, inertia=(1e-2,) * 3, at=ORIGIN)
-    a, b = shaft.marker(ORIGIN), mech.ground.marker((0, 0, 2e-3))
-    ground = mech.ground.marker(ORIGIN)
-    for other, more, words in ((b, {}, "rings of bearing 'b' are 2 mm apart"),
-                               (ground, {"axis": ORIGIN}, "axis of b has length zero"),
-                               (a, {}, "connects body 'shaft' with itself")):  # fmt: skip
-        with pytest.raises(ConfigError, match=words):
-            mech.rolling_bearing("b", a, other, **{"axis": Z, "bearing": BALLS} | more)
+    a = mech.add_rigid("shaft", mass=1.0, inertia=(1e-2,) * 3, at=ORIGIN).marker(ORIGIN)
+    b, ground = mech.ground.marker((0, 0, 2e-3)), mech.ground.marker(ORIGIN)
+    for other, axis, words in ((b, Z, "rings of bearing 'b' are 2 mm apart"),
+                               (ground, ORIGIN, "axis of b has length zero"),
+                               (a, Z, "connects body 'shaft' with itself")):  # fmt: skip
+        refuses(ConfigError, words, mech.rolling_bearing, "b", a, other, axis=axis, bearing=BALLS)
     assert not mech.rolling_bearings
 
 

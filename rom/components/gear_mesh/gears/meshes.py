@@ -323,6 +323,7 @@ def pack(meshes: Mapping[str, GearMesh], places: Places) -> Meshes:
     """The meshes as arrays."""
     found, n = list(meshes.values()), col.COORDINATES
     maps = [m for name, mesh in meshes.items() for m in _maps(mesh.pair, mesh.correction, name)]
+    pitch = [np.array(each, dtype=float) for mesh in found for each in mesh.correction.pitch]
     markers = ([places.marker[getattr(mesh, side)] for mesh in found] for side in "ij")
     return Meshes(
         *map(integers, markers),
@@ -335,7 +336,7 @@ def pack(meshes: Mapping[str, GearMesh], places: Places) -> Meshes:
         integers(mesh.cells for mesh in found),
         *_joined([mesh.stiffness for mesh in found]),
         *_joined([mesh.hertz.constants(mesh.pair) if mesh.hertz else NO_ERRORS for mesh in found]),
-        *_joined([_from_lowest(errors) for mesh in found for errors in mesh.correction.pitch]),
+        *_joined([late - late.min(initial=np.inf) for late in pitch]),  # gaps; the first has none
         *_joined([m.ravel() for m in maps]),
         np.array([m.shape for m in maps], dtype=np.int64).reshape(-1, 3),
         integers(places.memory(name, mesh.start) for name, mesh in meshes.items()),
@@ -361,12 +362,6 @@ def _most_slices(mesh: GearMesh) -> int:
     along = 1.5 * (pair.path[1] - pair.path[0]) + mesh.entry
     lines = (along + pair.width * np.tan(abs(pair.base_helix))) / pair.base_pitch + 3
     return 2 * mesh.cells * int(np.ceil(lines))
-
-
-def _from_lowest(errors: npt.ArrayLike) -> Array:
-    """Pitch errors as gaps, the tooth that touches first without one."""
-    found = np.asarray(errors, dtype=float)
-    return found - found.min() if found.size else found
 
 
 def _sizes(mesh: GearMesh) -> list[float]:

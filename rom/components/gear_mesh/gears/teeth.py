@@ -58,7 +58,7 @@ def add_lines(s, W, meshes, k, what):
         meshes.approach[k] = max(rolled, -rolled - meshes.size[k, col.BACKLASH]) - opened
     if not path[0] < path[1]:  # too far apart to meet, or there is no common tangent
         return 0.0
-    clear_sums(meshes)
+    meshes.gradient[:], meshes.hessian[:] = 0.0, 0.0
     if what != col.ENERGY:
         set_rates(W, meshes, k)
         set_speed(W, meshes, k)
@@ -93,15 +93,6 @@ def add_flank(s, W, meshes, k, what, place, path):
             if what != col.ENERGY:
                 push_line(s, W, meshes, k, what, count, place)
     return total
-
-
-@inner
-def clear_sums(meshes):
-    """Empty the derivatives of the energy by the coordinates."""
-    for a in range(col.COORDINATES):
-        meshes.gradient[a] = 0.0
-        for b in range(col.COORDINATES):
-            meshes.hessian[0, a, b], meshes.hessian[1, a, b] = 0.0, 0.0
 
 
 @inner

@@ -22,6 +22,7 @@ from rom.components.journal_bearing.films.kinematics import (
     journal_wrench,
     stepped_place,
 )
+from rom.components.journal_bearing.films.oil import CELSIUS_ZERO
 from rom.components.journal_bearing.films.pressure import (
     find_pressure,
     outflow,
@@ -49,7 +50,6 @@ CONSTANT, WALTHER_A, WALTHER_B, DENSITY, HEAT, INLET, HEATED, LAG, ROUGHNESS = r
 KNOWN, TIME, TEMPERATURE, THINNEST, LARGEST, POWER, SIDE_FLOW, MOTION = range(8)
 FIRST_CONTENT = MOTION + col.N_MOTIONS
 SETTLING_MARK = -1.0  # in place of 1 for a known film: its temperature is the one that stays
-CELSIUS_ZERO = 273.15  # [K]
 MAX_WARMINGS = 50  # of a film whose grooves have pressure
 WARMING_TOL = 1e-10  # of a temperature [K]
 MAX_BISECTIONS = 60  # of a temperature: all digits
@@ -240,14 +240,6 @@ def set_state(journals, k, place):
 
 
 @inner
-def largest_pressure(journals, k):
-    """Largest pressure of film k [Pa]."""
-    films = journals.films
-    unit = journals.viscosity[k] * (films.size[k, col.RADIUS] / films.size[k, col.CLEARANCE]) ** 2
-    return journals.peak[k] * unit
-
-
-@inner
 def set_thinnest(journals, k):
     """Set the thinnest film of film k; says whether it is one, and in its table if it has one."""
     films = journals.films
@@ -272,7 +264,8 @@ def film_of(s, W, journals, k):
         found = celsius == celsius
     if not found:
         return False
-    journals.largest[k] = largest_pressure(journals, k)
+    ratio = journals.films.size[k, col.RADIUS] / journals.films.size[k, col.CLEARANCE]
+    journals.largest[k] = journals.peak[k] * (journals.viscosity[k] * ratio**2)
     remember(W, journals, k, celsius)
     return True
 

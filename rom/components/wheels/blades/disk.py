@@ -33,13 +33,17 @@ def bladed_wheel(
         AIAA J. 39 (2001) 1182; see docs/theory/cyclic_symmetry.md.
     """
     j = np.arange(sector.n_sectors)
-    given = _disk(sector)
+    own, given = np.r_[sector.root, sector.cantilever], {}
+    for name in ("K", "M", "coriolis", "centrifugal"):  # the last two where it turns
+        if (tuned := getattr(sector, name)) is not None:
+            given[name] = tuned.toarray()
+            given[name][np.ix_(own, own)] -= getattr(sector.blade, name)
     blocks: dict[str, list[list[Array]]] = {name: [] for name in given}
     roots, rigid = [], []
     for n in sector.diameters:
         standing = sector.standing(n)
-        own, V = _condensed(sector, given, n, n_waves, n_root)
-        for name, parts in own.items():
+        condensed, V = _condensed(sector, given, n, n_waves, n_root)
+        for name, parts in condensed.items():
             blocks[name].append([_real(A, standing) for A in parts])
         moved = np.exp(1j * n * sector.angle * j)[:, None, None] * V
         size = np.sqrt((1 if standing else 2) / sector.n_sectors)
@@ -116,14 +120,3 @@ def _condensed(
     blocks["K"][1:] = [none, none.T, np.diag(square[:n_waves])]  # by orthogonality
     blocks["M"][3] = np.eye(n_waves)
     return blocks, V
-
-
-def _disk(sector: SubstructuredSector) -> dict[str, Array]:
-    """Matrices of the sector without its blade, those of rotation where it turns."""
-    at = np.r_[sector.root, sector.cantilever]
-    found = {}
-    for name in ("K", "M", "coriolis", "centrifugal"):
-        if (whole := getattr(sector, name)) is not None:
-            found[name] = whole.toarray()
-            found[name][np.ix_(at, at)] -= getattr(sector.blade, name)
-    return found

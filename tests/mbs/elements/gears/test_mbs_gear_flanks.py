@@ -13,6 +13,7 @@ from cases.components.geared import ORIGIN, free_wheels
 from cases.mbs.mechanisms import prepared, residual_at
 from cases.mbs.parts import on_axle
 from cases.mbs.tangents import shifted
+from cases.refusals import refused, refuses
 from rom.components import gear_mesh
 from rom.components.gear_mesh import Correction, GearPair, Hertz, bending_table, contact_compliance
 from rom.components.gear_mesh.gears.meshes import GEAR_MESHES_FAMILY
@@ -142,12 +143,10 @@ def test_a_file_of_numbers_is_a_map(tmp_path):
     path.write_text("\n\n".join("\n".join(",".join(map(repr, map(float, line))) for line in tooth)
                                 for tooth in maps))  # fmt: skip
     assert_allclose(gear_mesh.flank_map(path), maps)
-    path.write_text("1,2\n3\n")
-    with pytest.raises(ModelError, match=r"pinion\.csv is no map of flanks"):
-        gear_mesh.flank_map(path)
-    path.write_text("1,2\n3,x\n")
-    with pytest.raises(ModelError, match=r"is no map of flanks: .*'x'"):
-        gear_mesh.flank_map(path)
+    for text, words in (("1,2\n3\n", ""), ("1,2\n3,x\n", "'x'")):
+        path.write_text(text)
+        found = rf"pinion\.csv is no map of flanks: .*{words}"
+        refuses(ModelError, found, gear_mesh.flank_map, path)
 
 
 @pytest.mark.parametrize("pair", [SPUR, RING], ids=["external", "internal"])
@@ -334,25 +333,25 @@ def test_slices_beside_a_ridge_lift_off():
 NAN = np.full((4, 3), np.nan)
 
 
-@pytest.mark.parametrize(("more", "message"), [
-    ({"correction": Correction(maps=(np.zeros((25, 4, 3)), None))}, r"\(25, 4, 3\).*or \(26"),
-    ({"correction": Correction(maps=(None, np.zeros(4)))}, r"working flanks of the gear .*\(4,\)"),
-    ({"correction": Correction(back_maps=(NAN, None))}, "back flanks of the pinion .* 12 values"),
-    ({"correction": Correction(pitch=(np.full(26, np.nan), ()))}, "is not finite"),
-    ({"correction": Correction(run_out=((1e-3, 0.0), (0, 0)))}, "run-out 0.001 m of 'mesh'"),
-    ({"coupling": 1.0}, "at least 0 and at most 0.03"),
-    ({"conservative": True}, "energy of mesh 'mesh' would jump"),
-])  # fmt: skip
-def test_what_no_flank_is_like_is_refused(more, message):
-    with pytest.raises((ConfigError, ModelError), match=message):
-        wheels(**more)
+def cut(**flanks):
+    return lambda: wheels(correction=Correction(**flanks))
 
 
-def test_hands_that_do_not_mesh_are_named():
-    helical = replace(SPUR, helix=0.3)
-    assert replace(helical, gear_helix=-0.3).gear_helix == -0.3
-    with pytest.raises(ModelError, match="maps and run-out are for elements"):
-        gear_mesh.Mesh(SPUR, K, Correction(maps=(np.zeros((2, 2)), None)))
+test_what_no_flank_is_like_is_refused = refused(
+    (cut(maps=(np.zeros((25, 4, 3)), None)), r"\(25, 4, 3\).*or \(26"),
+    (cut(maps=(None, np.zeros(4))), r"working flanks of the gear .*\(4,\)"),
+    (cut(back_maps=(NAN, None)), "back flanks of the pinion .* 12 values"),
+    (cut(pitch=(np.full(26, np.nan), ())), "is not finite"),
+    (cut(run_out=((1e-3, 0.0), (0, 0))), "run-out 0.001 m of 'mesh'"),
+    (lambda: wheels(coupling=1.0), "at least 0 and at most 0.03"),
+    (lambda: wheels(conservative=True), "energy of mesh 'mesh' would jump"),
+    (lambda: gear_mesh.Mesh(SPUR, K, Correction(maps=(np.eye(2), None))), "are for elements"),
+    error=(ConfigError, ModelError),
+)
+
+
+def test_a_hand_that_fits_is_taken():
+    assert replace(SPUR, helix=0.3, gear_helix=-0.3).gear_helix == -0.3
 
 
 def test_depths_of_teeth_are_those_of_the_compliance():

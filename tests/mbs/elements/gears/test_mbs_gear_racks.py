@@ -12,6 +12,7 @@ from cases.gear_unit import PlaneMesh
 from cases.long import few
 from cases.mbs.mechanisms import prepared, residual_at
 from cases.mbs.tangents import assert_forces_are_the_gradient, by_position, by_velocity, shifted
+from cases.refusals import refuses
 from rom.components.gear_mesh import Correction, GearPair, Hertz, Mesh, RackPair, stiffness_table
 from rom.components.gear_mesh.gears.meshes import GEAR_MESHES_FAMILY
 from rom.errors import ConfigError, ModelError
@@ -205,9 +206,7 @@ def test_a_pinion_that_spins_in_its_frame_drives_its_rack():
 
 
 def test_what_a_rack_does_not_have_is_refused():
-    with pytest.raises(ConfigError, match="rack of 'mesh' does not turn"):
-        free(SPUR, correction=Correction(run_out=((0, 0), (1e-6, 0))))
-    with pytest.raises(ModelError, match="racks are for elements"):
-        Mesh(SPUR, K)
-    with pytest.raises(ModelError, match="racks and internal teeth are not known"):
-        stiffness_table(SPUR, force=1e5)
+    off = Correction(run_out=((0, 0), (1e-6, 0)))
+    refuses(ConfigError, "rack of 'mesh' does not turn", free, SPUR, correction=off)
+    refuses(ModelError, "racks are for elements", Mesh, SPUR, K)
+    refuses(ModelError, "racks and internal teeth", stiffness_table, SPUR, force=1e5)

@@ -1,4 +1,4 @@
-"""Meshes of files; wheels that do not mesh are refused with their names, there as in Python."""
+"""Meshes of files; wheels that do not mesh are refused with their names where the mesh is."""
 
 import re
 
@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
-from rom.components.gear_mesh import GearPair, RackPair
+from rom.components.gear_mesh import RackPair
 from rom.config.mechanism import read_mechanism
 from rom.errors import ConfigError, ModelError
 
@@ -62,24 +62,6 @@ WRONG = {  # sizes of the pair, keys of the mesh, where the other wheel stands [
 }  # fmt: skip
 
 
-def place(where):
-    """(3,) of the other wheel."""
-    return (where, 0, 0) if np.isscalar(where) else where
-
-
-@pytest.mark.parametrize("case", WRONG)
-def test_what_does_not_mesh_is_refused(case):
-    sizes, more, where, message = WRONG[case]
-    sizes = SIZES | sizes
-    teeth = sizes.pop("teeth")
-    mech = rom.Mechanism()
-    pinion = mech.add_rigid("a", mass=1.0, inertia=(1.0,) * 3, at=(0, 0, 0))
-    ends = pinion.marker((0, 0, 0)), mech.ground.marker(place(where))
-    with pytest.raises((ConfigError, ModelError), match=f"(?s){message}"):
-        pair = GearPair(tuple(teeth), **sizes) if teeth[1] else RackPair(teeth[0], **sizes)
-        mech.gear_mesh("m", *ends, pair=pair, **MESH | more)
-
-
 FILE = """
 [simulation]
 t_end = 1e-3
@@ -107,7 +89,8 @@ def written(folder, where, *tables):
 @pytest.mark.parametrize("case", WRONG)
 def test_files_with_what_does_not_mesh_are_refused_where_the_mesh_is(case, tmp_path):
     sizes, more, where, message = WRONG[case]
-    path = written(tmp_path, list(place(where)), MESH | more, SIZES | sizes)
+    place = [where, 0, 0] if np.isscalar(where) else list(where)
+    path = written(tmp_path, place, MESH | more, SIZES | sizes)
     with pytest.raises((ConfigError, ModelError), match=f"(?s){message}") as refused:
         read_mechanism(path).mechanism()
     key = re.search(r"gear_meshes\.m\.(\w+) = ", str(refused.value))  # one read alone

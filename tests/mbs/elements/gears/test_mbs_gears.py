@@ -11,6 +11,7 @@ from cases.gear_unit import PlaneMesh
 from cases.mbs.mechanisms import prepared, random_body, residual_at, tangents_at
 from cases.mbs.parts import on_axle
 from cases.mbs.tangents import by_position, by_velocity, elastic_forces, shifted
+from cases.refusals import refuses
 from rom import rotation
 from rom.components.gear_mesh import Correction, GearPair, Mesh, stiffness_table
 from rom.components.gear_mesh.gears.meshes import GEAR_MESHES_FAMILY
@@ -228,23 +229,19 @@ def test_wheels_pressed_into_each_other_are_named():
                        axis=(1, 0, 0))  # fmt: skip
     mech.drive("press", "gear slides", lambda t: -t, rate=lambda t: -1.0 + 0 * t)
     mech.drive("hold", "pinion slides", lambda t: 0.0 * t)
-    with pytest.raises(SolverError, match="wheels of 'mesh' are so close"):
-        rom.simulate(mech, t_end=0.1, dt=1e-3, progress=False)
+    refuses(SolverError, "wheels of 'mesh' are so close", rom.simulate, mech, t_end=0.1, dt=1e-3)
 
 
-@pytest.mark.parametrize(("more", "message"), [
-    ({"axis": (0, 0, 0)}, "axis of mesh has length zero"),
-    ({"stiffness": []}, "stiffness of the teeth of 'mesh'"),
-    ({"correction": Correction(pitch=((0.0, 1.0), ()))}, "pitch errors of 'mesh' has shape"),
-])  # fmt: skip
-def test_what_is_no_mesh_is_refused(more, message):
+def test_what_is_no_mesh_is_refused():
     mech = rom.Mechanism()
-    ends = [mech.add_rigid(n, mass=1.0, inertia=(1e-3,) * 3, at=(x, 0, 0)).marker(ORIGIN)
-            for n, x in (("a", 0.0), ("b", SPUR.distance))]  # fmt: skip
-    with pytest.raises(ConfigError, match=message):
-        mech.gear_mesh("mesh", *ends, **{"axis": Z, "pair": SPUR, "stiffness": K} | more)
-    with pytest.raises(ConfigError, match="connects body 'a' with itself"):
-        mech.gear_mesh("mesh", ends[0], ends[0], axis=Z, pair=SPUR, stiffness=K)
+    a, b = (mech.add_rigid(n, mass=1.0, inertia=(1e-3,) * 3, at=(x, 0, 0)).marker(ORIGIN)
+            for n, x in (("a", 0.0), ("b", SPUR.distance)))  # fmt: skip
+    given, late = {"axis": Z, "pair": SPUR, "stiffness": K}, Correction(pitch=((0.0, 1.0), ()))
+    for other, more, words in ((b, {"axis": (0, 0, 0)}, "axis of mesh has length zero"),
+                               (b, {"stiffness": []}, "stiffness of the teeth of 'mesh'"),
+                               (b, {"correction": late}, "pitch errors of 'mesh' has shape"),
+                               (a, {}, "connects body 'a' with itself")):  # fmt: skip
+        refuses(ConfigError, words, mech.gear_mesh, "mesh", a, other, **given | more)
     assert not mech.gear_meshes
 
 
@@ -261,10 +258,8 @@ def test_an_internal_gear_is_one_of_negative_radii():
     last = np.sqrt(26e-3**2 - (24e-3 * np.cos(np.radians(20))) ** 2)
     assert_allclose(RING.path, [first, last], rtol=1e-12)
     assert RING.backlash == pytest.approx(2e-5)
-    with pytest.raises(ModelError, match="not known; give numbers"):
-        stiffness_table(RING, force=1e5)
-    with pytest.raises(ModelError, match=r"use Mechanism\.gear_mesh"):
-        Mesh(RING, K)
+    refuses(ModelError, "not known; give numbers", stiffness_table, RING, force=1e5)
+    refuses(ModelError, r"use Mechanism\.gear_mesh", Mesh, RING, K)
 
 
 def gaps_behind(z1, z2, addendum):
