@@ -45,7 +45,7 @@ class Solids:
     """One material, or a table of them by region."""
 
     parts: ClassVar[Mapping[str, Table]] = SOLID.tables
-    summary: str = f"{SOLID.summary}; or table of them by region"
+    summary: str = "isotropic or orthotropic table, or a table of them by region"
 
     def read(self, value: object, place: Place) -> Values:
         """Values of the material, or of each region under "regions"."""
@@ -138,9 +138,9 @@ TABLE = Table("A component.", (
             Key("shapes", Whole(1), "So many shapes are added; as tol asks if missing."),
             Key("steps", Whole(1), "States on the way to the largest load.", 4),
             Key("about", Quantity("m", ((3,),)), "A point of its axis; the reference if missing."),
+            Key("fixed", Words(), "Held beside the reference, wholly or as `name:yz`.", ()),
             about="Loads under which it is to deflect far, and shapes for them.",
             without="n_modes n_shapes n_steps",
-            fixed=Words(),
             spin=Quantity("rad/s", ((3,),)),
         ), "Reach large deflection."),
         Key("stress", Flag(), "Make stress on the surface recoverable.", False),
