@@ -1,5 +1,6 @@
 """Bases of shapes, one method each.
 
-`method` has Guyan and Craig-Bampton; `fixed_interface`, `free_interface`, `assumed`, `enhanced`,
-`krylov`, `balanced` and `loads` the others; `selection` says how many modes a band needs.
+`method` has Guyan and Craig-Bampton, enhanced too, and loads beside any of them; `fixed_interface`,
+`free_interface`, `assumed`, `krylov` and `balanced` the others; `selection` says how many modes a
+band needs.
 """
