@@ -25,7 +25,7 @@ OUTPUT_FLAG = "-o/--output"
 def numbers_of(kind: Quantity) -> Callable[[str], Any]:
     """What reads the value of an option: numbers with commas, of the shape and limits of a kind."""
     n = kind.shapes[0]
-    wanted = f"{n[0] or 'only'} numbers with commas" if n else "a number (write a decimal point)"
+    wanted = f"{n[0] or 'only'} numbers with commas" if n else "a number"
 
     def read(text: str) -> object:
         try:
@@ -33,7 +33,8 @@ def numbers_of(kind: Quantity) -> Callable[[str], Any]:
         except ValueError:
             x = np.array(np.nan)
         if not (np.isfinite(x).all() and kind.has_shape(x.shape)):
-            raise argparse.ArgumentTypeError(f"{text!r} is not {wanted}")
+            hint = " (write a decimal point)" if "," in text and not n else ""
+            raise argparse.ArgumentTypeError(f"{text!r} is not {wanted}{hint}")
         if kind.fault(x):
             raise argparse.ArgumentTypeError(f"{text} {kind.must}")
         return tuple(x.tolist()) if n else float(x)
