@@ -56,7 +56,7 @@ def write_lines(path: str | Path, lines: Iterable[str]) -> Path:
     return write_whole(path, ("\n".join(lines) + "\n").encode())
 
 
-def row(values: Iterable[float]) -> str:
+def numbers_line(values: Iterable[float]) -> str:
     """Numbers of 17 digits as a line of text."""
     return " ".join(f"{v:.16e}" for v in values)
 

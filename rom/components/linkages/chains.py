@@ -152,12 +152,9 @@ class Linkage(ABC):
         return out.reshape(*q1.shape, 2, 2)
 
     @property
+    @abstractmethod
     def _links(self) -> tuple[Link, ...]:
-        """All links in the order of the attributes, couplers last."""
-        names: tuple[str, ...] = self.__slots__
-        parts = (getattr(self, name) for name in names)
-        each = (part if isinstance(part, tuple) else (part,) for part in parts)
-        return tuple(link for part in each for link in part if isinstance(link, Link))
+        """All links, couplers last."""
 
     @abstractmethod
     def _moved(self, links: tuple[Link, ...], q: tuple[Array, Array], at: Index) -> Motion:

@@ -132,6 +132,10 @@ class SlideArm(Linkage):
     link: Link
     payload: Mass = 0.0
 
+    @property
+    def _links(self) -> tuple[Link, ...]:
+        return (self.link,)
+
     def tip(self, q1: npt.ArrayLike, q2: npt.ArrayLike) -> Array:
         """(..., 2) where the end of the link is [m]; q1 in [m], q2 in [rad]."""
         q1, q2 = both(q1, q2)
@@ -169,6 +173,10 @@ class SlideFiveBar(ClosedLinkage):
     couplers: tuple[Link, Link]
     payload: Mass = 0.0
     side: int = 1
+
+    @property
+    def _links(self) -> tuple[Link, ...]:
+        return self.couplers
 
     def _elbows(self, q1: Array, q2: Array) -> tuple[Array, Array]:
         left, right = (

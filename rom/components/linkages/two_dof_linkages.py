@@ -126,6 +126,10 @@ class TwoLink(Linkage):
     payload: Mass = 0.0
     relative: bool = False
 
+    @property
+    def _links(self) -> tuple[Link, ...]:
+        return self.first, self.second
+
     def tip(self, q1: npt.ArrayLike, q2: npt.ArrayLike) -> Array:
         """(..., 2) where the end of the chain is at angles (...) [m]; q1 and q2 in [rad]."""
         q1, q2 = both(q1, q2)
@@ -162,6 +166,10 @@ class FiveBar(ClosedLinkage):
     couplers: tuple[Link, Link]
     payload: Mass = 0.0
     side: int = 1
+
+    @property
+    def _links(self) -> tuple[Link, ...]:
+        return self.cranks + self.couplers
 
     def posture(self, q1: npt.ArrayLike, q2: npt.ArrayLike) -> Array:
         """Where the joints are at angles of the cranks.

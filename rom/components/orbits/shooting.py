@@ -19,7 +19,6 @@ from rom.components.orbits.flow import Flow, Start
 from rom.errors import ConfigError, ModelError
 from rom.mbs.analysis.local_equations import free_motions, snapshot
 from rom.mbs.analysis.tangent import sizes
-from rom.mbs.elements.family import starts
 from rom.mbs.kernels.system import ANGLE, ROLL
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import GROUND, Part
@@ -119,20 +118,10 @@ class Turns:
 
 def turns_of(mechanism: Mechanism, turns: Mapping[str, float | None] | None, state: State) -> Turns:
     """What the user says advances."""
-    names, found = list(mechanism.parts), []
-    r = np.array([part.r for part in mechanism.parts.values()], dtype=np.int64)
-    # of each body in q and v
-    places = dict(zip(names, zip(starts(7 + r), starts(6 + r), strict=True), strict=False))
+    names, found, places = list(mechanism.parts), [], _places(mechanism)
     for given, angle in (turns or {}).items():
         name = _joint_of(mechanism, given)
-        if name in mechanism.joints:
-            body, axis, point, sign = _of_joint(mechanism, mechanism.joints[name])
-        else:
-            known = [*(n for n, j in mechanism.joints.items() if j.turn), *names]
-            check_known(name, known, f"turns: no joint or body {name!r}; there are")
-            spin = state.v[places[name][1] + 3 :][:3]
-            axis, point = _own_axis(mechanism.parts[name], spin), np.zeros(3)
-            body, sign = name, 1.0
+        body, axis, point, sign = _hinged(mechanism, name, state, places)
         beyond = 1.0 if angle is None else np.remainder(angle + np.pi, FULL_TURN) - np.pi
         if abs(beyond) < WHOLE_TURN_TOL:
             continue  # the same place
@@ -142,6 +131,15 @@ def turns_of(mechanism: Mechanism, turns: Mapping[str, float | None] | None, sta
     return Turns(tuple(found))
 
 
+def _places(mechanism: Mechanism) -> dict[str, tuple[int, int]]:
+    """Places of each body in q and v."""
+    found, q, v = {}, 0, 0
+    for name, part in mechanism.parts.items():
+        found[name] = (q, v)
+        q, v = q + 7 + part.r, v + 6 + part.r
+    return found
+
+
 def _joint_of(mechanism: Mechanism, name: str) -> str:
     """The only joint with an angle in which a body turns; else what the user named."""
     joints = mechanism.joints.values()
@@ -149,8 +147,19 @@ def _joint_of(mechanism: Mechanism, name: str) -> str:
     return found[0] if name in mechanism.parts and len(found) == 1 else name
 
 
-def _of_joint(mechanism: Mechanism, joint: Joint) -> tuple[str, Array, Array, float]:
+def _hinged(
+    mechanism: Mechanism, name: str, state: State, places: dict[str, tuple[int, int]]
+) -> tuple[str, Array, Array, float]:
     """Body, axis and a point of it in the frame of the body, and the sign of its angle."""
+    if name in mechanism.joints:
+        return _of_joint(mechanism, mechanism.joints[name])
+    known = [*(n for n, j in mechanism.joints.items() if j.turn), *mechanism.parts]
+    check_known(name, known, f"turns: no joint or body {name!r}; there are")
+    at = places[name][1]
+    return name, _own_axis(mechanism.parts[name], state.v[at + 3 : at + 6]), np.zeros(3), 1.0
+
+
+def _of_joint(mechanism: Mechanism, joint: Joint) -> tuple[str, Array, Array, float]:
     if joint.turn is None or joint.turn.kind != ANGLE:
         raise ConfigError(f"turns: {joint.name!r} is {joint.kind}; take a revolute joint.")
     one, two = joint.markers[:2]

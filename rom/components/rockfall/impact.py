@@ -351,11 +351,13 @@ def scaled(g: Gallery, factors: dict[str, float]) -> Gallery:
         if name == STRENGTH_NAME and not isinstance(g.cushion, Layer):
             raise ConfigError(f"{name} needs a cushion of type Layer.")
         kind = "modulus" if isinstance(g.cushion, Layer) else "stiffness"
-        part, _, number = path.format(stiffness=kind).rpartition(".")
-        if part:
-            record = getattr(g, part)
-            changed = replace(record, **{number: factor**power * getattr(record, number)})
-            g = replace(g, **{part: changed})
-        else:
-            g = replace(g, **{number: factor**power * getattr(g, number)})
+        g = _scaled(g, path.format(stiffness=kind), factor**power)
     return g
+
+
+def _scaled(g: Gallery, path: str, factor: float) -> Gallery:
+    part, _, name = path.rpartition(".")
+    if not part:
+        return replace(g, **{name: factor * getattr(g, name)})
+    record = getattr(g, part)
+    return replace(g, **{part: replace(record, **{name: factor * getattr(record, name)})})

@@ -266,13 +266,12 @@ def pack(tendons: Mapping[str, Tendon], places: Places) -> Tendons:
     sizes = [len(tendon.stations) for tendon in tendons.values()]
     p, m = len(stations), max(sizes)
     cables = tendons.values()
-    rubs = [any(one.friction > 0.0 for one in cable.stations[1:-1]) for cable in cables]
     return Tendons(
         starts(sizes),
         rows_of((cable.numbers for cable in cables), 4),
         integers(_signal(name, tendon, places) for name, tendon in tendons.items()),
         integers(cable.pulled for cable in cables),
-        integers(cable.numbers[1] > 0.0 or rub for cable, rub in zip(cables, rubs, strict=True)),
+        integers(_rated(cable) for cable in cables),
         integers(places.marker[one.marker] for one in stations),
         rows_of((one.axes.ravel() for one in stations), 6),
         np.array([one.radius for one in stations]),
@@ -281,6 +280,10 @@ def pack(tendons: Mapping[str, Tendon], places: Places) -> Tendons:
         *(np.zeros(x) for x in (p, p, (p, 12), (p, 3), p, (p, 18), p, p, p, (p, 12), (p, 36))),
         *(np.zeros(x) for x in ((3, m, m), (2, 6 * m), (6 * m, 6 * m), (6 * m, 6 * m))),
     )
+
+
+def _rated(tendon: Tendon) -> bool:
+    return tendon.numbers[1] > 0.0 or any(one.friction > 0.0 for one in tendon.stations[1:-1])
 
 
 def _signal(name: str, tendon: Tendon, places: Places) -> int:

@@ -22,7 +22,7 @@ import numpy as np
 from rom.body.flexible import FlexibleBody
 from rom.body.stiffening import ELASTIC_LOAD, known_loads
 from rom.errors import ConfigError
-from rom.io.files import row, write_lines
+from rom.io.files import numbers_line, write_lines
 from rom.io.sid.body import invariants
 from rom.model import Array
 from rom.names import ORIGIN_MARK
@@ -64,22 +64,22 @@ def _document(body: FlexibleBody, labels: list[str]) -> Iterator[str]:
     yield " ".join(labels)
     for number, what in ((3, "DISPLACEMENTS"), (4, "VELOCITIES")):
         yield from _group(number, f"INITIAL MODAL {what}")
-        yield row(np.zeros(r))
+        yield numbers_line(np.zeros(r))
     for axis, letter in enumerate("XYZ"):
         yield from _group(5 + axis, f"NODAL {letter} COORDINATES")
-        yield from map(row, points[:, axis, None])
+        yield from map(numbers_line, points[:, axis, None])
     yield from _group(8, "MODE SHAPES")
     for k in range(r):
         yield f"**    NORMAL MODE SHAPE #  {k + 1}"
         for m in body.markers.values():
-            yield row(np.r_[m.translation[:, k], m.rotation[:, k]])
+            yield numbers_line(np.r_[m.translation[:, k], m.rotation[:, k]])
     yield from _group(9, "MODAL MASS MATRIX", body.M)
     yield from _group(10, "MODAL STIFFNESS MATRIX", body.K)
     centre = body.first_moment / body.mass
     about = body.inertia - body.mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
     yield from _group(12, "RIGID BODY INERTIA MATRIX")
-    yield row([body.mass])
-    yield from map(row, [centre, *about])
+    yield numbers_line([body.mass])
+    yield from map(numbers_line, [centre, *about])
     yield from _group(13, "MODAL DAMPING MATRIX", body.D)
     for number, (name, A) in enumerate(invariants(body).items(), 14):
         yield from _group(number, f"INVARIANT {name[3:]}", A.reshape(3, -1))
@@ -94,11 +94,11 @@ def _stiffening(body: FlexibleBody) -> Iterator[str]:
     yield f"{len(taken)}"
     for load in taken:
         yield f"{own[load]}"
-        yield from map(row, body.K_geo[load])
+        yield from map(numbers_line, body.K_geo[load])
 
 
 def _group(number: int, title: str, rows: Array | None = None) -> Iterator[str]:
     yield "**"
     yield f"** RECORD GROUP {number}, {title}"
     if rows is not None:
-        yield from map(row, rows)
+        yield from map(numbers_line, rows)

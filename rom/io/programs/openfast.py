@@ -20,7 +20,7 @@ import numpy.typing as npt
 from rom.arguments import symmetric
 from rom.body.flexible import FlexibleBody
 from rom.errors import ConfigError, QualityGateError, UnsafeFileError
-from rom.io.files import check_readable, damaged, need, row, write_lines
+from rom.io.files import check_readable, damaged, need, numbers_line, write_lines
 from rom.io.programs.interface_form import InterfaceForm, interface_form
 from rom.model import Array
 from rom.names import ORIGIN_MARK, check_known
@@ -146,16 +146,16 @@ def _document(found: Superelement, *, old: bool) -> Iterator[str]:
     for kind, A in zip(UNITS, (found.M, found.K, found.D), strict=True):
         yield f"!{kind} Matrix (Units ({UNITS[kind]}))"
         yield from [size] * old
-        yield from map(row, A)
+        yield from map(numbers_line, A)
     if old:
         yield f"!{LOADING_LINE[1:].title()} (Units (N, m))"
         yield f"!Dimension: 1 time column - {n} force columns - 1 wave elevation column"
-        yield from (row(np.r_[t, found.weight, 0.0]) for t in (0.0, LOAD_DURATION))
+        yield from (numbers_line(np.r_[t, found.weight, 0.0]) for t in (0.0, LOAD_DURATION))
         return
     yield "!Weight constant (Units (N, m))"
-    yield row(found.weight)
+    yield numbers_line(found.weight)
     yield "!Weight stiffness (Units (N, m))"
-    yield from map(row, found.K_W)
+    yield from map(numbers_line, found.K_W)
 
 
 def read_openfast(path: str | Path) -> Superelement:
