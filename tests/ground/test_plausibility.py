@@ -24,7 +24,7 @@ from rom.io.native import body_arrays
 from rom.mbs import BallBearing, Groove, JournalBearing, Oil, Pulley, RollerBearing
 from rom.mbs.elements.contact.impact import Impact
 from rom.mbs.parts.signals import Examined
-from rom.plausible import scaled_doubt
+from rom.plausible import far_doubt, scaled_doubt
 from rom.units import unit_system
 
 
@@ -522,3 +522,10 @@ def test_loads_may_jump():
     push = mech.parts["bob"].marker("a")
     mech.force("push", push, lambda t: np.array([0.0, 0.0, 5.0 * (t > 0.0333)]))
     assert said(lambda: rom.simulate(mech, t_end=0.05, dt=1e-3)) == []
+
+
+@pytest.mark.parametrize(("distance", "n"), [(99.0, 0), (1e3, 1), (1e6, 1)])
+def test_digits_lost_are_two_for_each_factor_of_ten(distance, n):
+    text = far_doubt(distance, 1.0, "it")
+    assert bool(text) == bool(n)
+    assert not n or f"about {2 * np.log10(distance):.0f} of 16" in text
