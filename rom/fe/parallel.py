@@ -11,8 +11,9 @@ from typing import Any, TypeVar
 from mpi4py import MPI
 
 from rom.errors import ParallelError, RomError
-from rom.process.launcher import ranks
+from rom.process.launcher import keep_the_core, ranks
 
+keep_the_core()  # mpi4py has started Open MPI
 T = TypeVar("T")
 N_EAGER_TRIES = 100  # looks for a message that may come at once
 FIRST_SLEEP, LONGEST_SLEEP = 1e-5, 5e-3  # [s] between two looks for one that does not

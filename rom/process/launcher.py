@@ -44,15 +44,25 @@ def share_the_machine() -> None:
     if not any(name in os.environ for name in (THREADS_VARIABLE, *OTHER_VARIABLES)):
         os.environ[THREADS_VARIABLE] = "1"
         if "numpy" in sys.modules:
-            _tell(OPENBLAS_FILE, OPENBLAS_CALLS)
+            _tell(OPENBLAS_FILE, OPENBLAS_CALLS, 1)
     if YIELD_VARIABLE not in os.environ:
         os.environ[YIELD_VARIABLE] = "1"
         if "mpi4py.MPI" in sys.modules:
-            _tell(OPEN_MPI_FILE, OPEN_MPI_CALLS)
+            _tell(OPEN_MPI_FILE, OPEN_MPI_CALLS, 1)
 
 
-def _tell(file: str, calls: tuple[str, ...]) -> None:
-    """Call with 1 what a library that is loaded has of these functions."""
+def keep_the_core() -> None:
+    """Let a process that is alone stay on its core when it looks for messages.
+
+    MUMPS looks in each solution, and Open MPI, which cannot know that nobody will send one, gives
+    the core away each time: beside other work a solution would take as long as their time slices.
+    """
+    if ranks()[1] == 1 and YIELD_VARIABLE not in os.environ:
+        _tell(OPEN_MPI_FILE, OPEN_MPI_CALLS, 0)
+
+
+def _tell(file: str, calls: tuple[str, ...], value: int) -> None:
+    """Call with a value what a library that is loaded has of these functions."""
     import ctypes
     import re
 
@@ -63,6 +73,6 @@ def _tell(file: str, calls: tuple[str, ...]) -> None:
             library = ctypes.CDLL(path)
             for name in calls:
                 if hasattr(library, name):
-                    getattr(library, name)(1)
+                    getattr(library, name)(value)
     except OSError:  # there are other systems than Linux
         return
