@@ -55,10 +55,8 @@ class Plan:
     """Where to measure and to shake, and what the test will tell.
 
     Attributes:
-        sensors: the chosen ones.
-        inputs: the chosen ones.
-        sensor_numbers: (n_s,) their numbers among the candidates.
-        input_numbers: (n_e,) likewise.
+        sensors, inputs: the chosen ones.
+        sensor_numbers, input_numbers: (n_s,) and (n_e,) among the candidates.
         names: (n,) of the unknowns, damping ratios last.
         covariance: (n, n) that the logarithms of the unknowns will have [1].
         unseen: directions, {name: share [1]} in the parameters, that the data will not see.
@@ -220,7 +218,7 @@ def place(  # noqa: PLR0913  keywords of one call
         floor: the same where there is no response, per unit force [unit of the quantity per N];
             None for a thousandth of the largest response: 60 dB below it cables and analysers see
             themselves. Without a floor antiresonances tell more than they can.
-        quantity: "displacement", "velocity" or "acceleration".
+        quantity: of all sensors.
         fixed: what will be held, see `FlexibleBody.frequencies`.
         attached: {name: `GroundSpring`, `AddedMass` or `JointSpring`} with unknown factors.
         damping: expected ratio of all modes [1].

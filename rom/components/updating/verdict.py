@@ -158,12 +158,7 @@ class Updated:
         Logarithms of the unknowns are normal about what was found, with its covariance. The spread
         of the responses is what is not known of them if the model is right.
 
-        Args:
-            frequencies: (n_f,) lines [Hz].
-            sensors: anywhere on the body.
-            inputs: likewise.
-            n: number of draws.
-            seed: of the random numbers.
+        Sensors and inputs may be anywhere on the body, at lines (n_f,) [Hz]; n draws are made.
 
         Returns:
             (n, n_f, n_s, n_e) displacement per force [m/N].
