@@ -242,13 +242,9 @@ class CyclicSector:
         return np.array(columns, dtype=complex).reshape(-1, self.n).T
 
     def wheel(self, *others: Matrix) -> tuple[csr_matrix, ...]:
-        """Matrices of the whole wheel, dofs of sector j in its own turned axes.
+        """K, M and others of the whole wheel, (N f, N f): block j is sector j in its turned axes.
 
-        Args:
-            others: further matrices, each (n, n) for all sectors alike or a list of N of them.
-
-        Returns:
-            K, M and the others, (N f, N f) each; block j belongs to sector j.
+        Others are (n, n) for all sectors alike or lists of N of them.
         """
         own, following = self.parts()
         N = self.n_sectors
@@ -291,9 +287,6 @@ def each_diameter(
     """Values of a function of each number of nodal diameters, or those given, shared by all ranks.
 
     The function must not wait for other ranks.
-
-    Raises:
-        ConfigError: if the wheel cannot have one of them.
     """
     every = [sector.checked(n) for n in (sector.diameters if diameters is None else diameters)]
     costs = [1.0 if sector.standing(n) else PAIR_COST for n in every]
@@ -301,11 +294,7 @@ def each_diameter(
 
 
 def region(model: FEModel, name: str) -> tuple[csr_matrix, csr_matrix]:
-    """(n, n) stiffness [N/m] and mass [kg] of one region, on every rank.
-
-    Raises:
-        ConfigError: if it is unknown.
-    """
+    """(n, n) stiffness [N/m] and mass [kg] of one region, on every rank."""
     check_known(name, model.regions, f"the sector has no region {name!r}; it has")
     share = model.regions[name]
     return all_rows(model, share.K), all_rows(model, share.M)
