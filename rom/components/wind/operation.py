@@ -96,9 +96,8 @@ def operate(
             then the generator takes what the wind gives.
 
     Raises:
-        ConfigError: for a step or an end that cannot be, or a wind in which the turbine is parked,
-            with its time, or a speed or a pitch to hold that is none, or blades of another turbine
-            that are not held.
+        ConfigError: for a wind in which the turbine is parked, with its time, a speed or a pitch to
+            hold that is none, or blades of another turbine that are not held.
     """
     blades = blading() if blades is None else blades
     t = dt * np.arange(round(t_end / dt) + 1)
