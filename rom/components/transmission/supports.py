@@ -76,11 +76,8 @@ def shaft_whirl(
 ) -> ShaftWhirl:
     """Whirl frequencies of a shaft on bearings.
 
-    Args:
-        shaft: with its discs.
-        supports: {node: bearing}.
-        speed: of rotation, from X to Y if positive [rad/s].
-        n: number of frequencies, lowest first; None for all.
+    Supports are {node: bearing}, the speed of rotation is positive from X to Y [rad/s]; the n
+    lowest frequencies are found, None for all.
 
     Raises:
         ModelError: if a bearing sits beyond the shaft, or the bearings leave a rigid motion free.
@@ -97,9 +94,7 @@ def shaft_whirl(
 def critical_speeds(shaft: Shaft, supports: Mapping[int, Support]) -> tuple[Array, Array]:
     """Speeds at which a whirl is as fast as the rotation, damping left out.
 
-    Args:
-        shaft: with its discs.
-        supports: {node: bearing}, their stiffness symmetric.
+    Supports are {node: bearing}, their stiffness symmetric.
 
     Returns:
         speeds (m,) [rad/s], ascending, and directions (m,) as in `ShaftWhirl`. A thin disc may
