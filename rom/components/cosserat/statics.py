@@ -102,12 +102,8 @@ def newton(
 ) -> tuple[Shape, Array] | None:
     """The shape near one where corrections vanish, and further unknowns; None if not found.
 
-    Args:
-        rod: the rod.
-        shape: where the search starts.
-        correction: function of a shape and the further unknowns (k,) that gives increments (6 N + 9
-            + k,) in the order of `clamped`; None where its equations are singular.
-        more: (k,) further unknowns at the start.
+    The correction is a function of a shape and the further unknowns (k,) that gives increments (6 N
+    + 9 + k,) in the order of `clamped`; None where its equations are singular.
     """
     x, p, unknown = shape.x.copy(), shape.p.copy(), np.array(more, dtype=float)
     n, length = 6 * rod.h.size + 9, rod.h.sum()
@@ -164,11 +160,7 @@ def loads(
 def fitting(
     rod: Rod, load: tuple[npt.ArrayLike, npt.ArrayLike], free: npt.ArrayLike | None
 ) -> tuple[tuple[Array, Array], Mask]:
-    """Loads, and which dofs are free, as arrays.
-
-    Raises:
-        ConfigError: if their shapes differ from those of the rod.
-    """
+    """Loads, and which dofs are free, as arrays."""
     free = clamped(rod) if free is None else np.asarray(free, dtype=bool)
     force, moment = (np.array(part, dtype=float) for part in load)
     found, needed = (force.shape, moment.shape), (rod.x.shape, (len(rod.p), 3))
@@ -245,19 +237,12 @@ def linearised(
     load: tuple[Array, Array] | None = None,
     spin: npt.ArrayLike = (0.0, 0.0, 0.0),
 ) -> tuple[Array, Array]:
-    """Forces out of balance and their tangent, unknowns in the order of `clamped`.
+    """(n,) forces out of balance [N, N m] and (n, n) tangent [N/m, N/rad, N m/rad].
 
-    Both count positions in world axes and rotations in section axes; the tangent is the exact
-    derivative, symmetric where moments are in balance.
-
-    Args:
-        rod: the rod.
-        shape: where it is.
-        load: dead loads, see `loads`.
-        spin: (3,) angular velocity of the axes about their origin [rad/s].
-
-    Returns:
-        (n,) forces and moments [N, N m] and (n, n) tangent [N/m, N/rad, N m/rad].
+    Unknowns are in the order of `clamped`. Both count positions in world axes and rotations in
+    section axes; the tangent is the exact derivative, symmetric where moments are in balance. The
+    load is as of `loads`, the spin the angular velocity (3,) of the axes about their origin
+    [rad/s].
     """
     W = work(rod)
     given = loads(rod) if load is None else load
