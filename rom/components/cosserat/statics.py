@@ -138,7 +138,7 @@ def loads(
     force: npt.ArrayLike = 0.0,
     weight: npt.ArrayLike = 0.0,
 ) -> tuple[Array, Array]:
-    """Dead loads.
+    """Dead forces (N + 1, 3) on vertices [N], moments (N + 2, 3) on plate, segments, plate [N m].
 
     Args:
         rod: the rod.
@@ -146,9 +146,6 @@ def loads(
         tip_moment: (3,) moment on the plate at the end [N m].
         force: (N + 1, 3) forces on the vertices [N].
         weight: (3,) acceleration of gravity [m/s^2].
-
-    Returns:
-        (N + 1, 3) forces on vertices [N], (N + 2, 3) moments on plate, segments, plate [N m].
     """
     f, m = np.zeros_like(rod.x), np.zeros((rod.h.size + 2, 3))
     f += np.asarray(force, dtype=float) + np.outer(rod.mass, np.broadcast_to(weight, 3))

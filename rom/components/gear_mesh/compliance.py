@@ -173,9 +173,9 @@ def stiffness_table(
 def bending_table(
     pair: GearPair, *, n: int = 41, E: float = 206e9, nu: float = 0.3, body: Body = "weber"
 ) -> tuple[Array, Hertz]:
-    """Stiffness of one pair without its contact, and the contact, which follows the load.
+    """(n,) stiffness [N/m^2] of one pair without its contact, and the contact, by the load.
 
-    For `rom.Mechanism.gear_mesh`, as ``stiffness`` and ``hertz``.
+    For `rom.Mechanism.gear_mesh`, as ``stiffness`` per length of contact line and ``hertz``.
 
     Args:
         pair: spur or helical gears.
@@ -183,9 +183,6 @@ def bending_table(
         E: Young's modulus [Pa].
         nu: Poisson's ratio of the contact; bending has 0.3.
         body: see `tooth_compliance`.
-
-    Returns:
-        (n,) stiffness per length of contact line [N/m^2], and the contact.
 
     Raises:
         ModelError: as `pair_stiffness`.

@@ -114,16 +114,12 @@ def parts_of_compliance(
     orientation: npt.ArrayLike | None = None,
     n: int = 16,
 ) -> tuple[Array, Array]:
-    """What springs and phalanges add to the compliance of the tip of a straight finger.
+    """(6, 6) compliance [m/N, rad/N m] of springs, and of phalanges, at a straight finger's tip.
 
     The compliance of parts in series is their sum, each moved to the tip: C = sum_j X_j C_j X_j^T,
     X_j = [1, -skew(s_j); 0, 1] with the way s_j from the end of the part to the tip.
 
-    Arguments are as of `solid_finger`.
-
-    Returns:
-        (6, 6) of the springs and (6, 6) of the phalanges, world axes, as of `tip_compliance` [m/N,
-        rad/N m].
+    Arguments are as of `solid_finger`, world axes as of `tip_compliance`.
 
     Raises:
         ModelError: if bodies and springs do not match.

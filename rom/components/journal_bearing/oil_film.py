@@ -148,7 +148,7 @@ class Film:
         return size * self._drag(self.fill)
 
     def friction(self, streamers: bool = True) -> float:
-        """Friction over load times R/c [1], by streamers of oil where it cavitates, too."""
+        """Friction over load times R/c [1]; with streamers also of the oil where it cavitates."""
         return self._drag(1.0 if streamers else self.fill) / float(np.hypot(*self.F[:2]))
 
     @property

@@ -18,11 +18,10 @@ from rom.names import check_known
 
 @typed
 def film_pressures(solution: Solution, name: str) -> Array:
-    """The pressure in a film at each instant; of an equilibrium after `rom.mbs.snapshot`.
+    """(n_t, nt, nz) pressure in a film [Pa]; of an equilibrium after `rom.mbs.snapshot`.
 
-    Returns:
-        (n_t, nt, nz) in nt columns around the bush, the first one in the direction from which
-        angles count, and nz cells along its axis; of an aligned film half the width [Pa].
+    Of nt columns around the bush the first one is in the direction from which angles count; nz
+    cells are along its axis, of an aligned film half the width.
 
     Raises:
         ConfigError: if there is no such bearing, or its film is read from a table.

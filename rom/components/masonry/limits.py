@@ -1,10 +1,8 @@
 """Could it stand? Arches and walls of rigid stones that take no tension, by statics alone.
 
 If any forces in the joints balance the weight, press and stay within friction, dry masonry stands
-(the lower bound theorem; with friction it is exact for joints that dilate as they slip).
-`arch` and `wall` lay the stones, `stands` looks for such forces by linear programming and
-`load_factor` for the largest load,
-`minimum_thickness` is the closed form for circular arches of infinitely many voussoirs.
+(the lower bound theorem; with friction it is exact for joints that dilate as they slip). Linear
+programming looks for them.
 
 Source:
     Heyman, The stone skeleton, Int. J. Solids Struct. 2 (1966) 249; by linear programming:

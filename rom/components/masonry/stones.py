@@ -1,9 +1,7 @@
 """Dry masonry: arches and walls of stones that press, rock and slip on each other.
 
 A stone is a polygon with a frame and elastic shapes: three uniform strains, as in discontinuous
-deformation analysis, or the modes of a reduced body. `rom.components.masonry.motion` moves an
-assembly of stones, `rom.components.masonry.limits` lays arches and walls, and asks statics what
-they could carry.
+deformation analysis, or the modes of a reduced body.
 
 Source:
     After Shi's discontinuous deformation analysis (1988) and its use for masonry by Bagi.

@@ -1,6 +1,4 @@
-"""Rolling bearings as elements: what users describe, and their arrays.
-
-Forces of balls and rollers between two rings that move at will.
+"""Rolling bearings as elements: forces of balls and rollers between two rings that move at will.
 
 Axes are those of the outer ring: z along it, u_j to ball j and tau_j = z x u_j. The cage turns by a
 share g of the angle theta of the inner ring about z. With D from the centre of the outer ring to

@@ -1,7 +1,5 @@
 """Round bodies that turn in a frame which does not, as elements: their gyroscopic forces.
 
-Gyroscopic forces of a round body whose material turns through its frame.
-
 The frame follows the bending of a shaft, say, but does not turn with it. A displacement u of a body
 of revolution is a field in that frame, through which the material passes with the velocity
 W z x X. Its own velocity is W z x X + du/dt + W A u,

@@ -92,13 +92,11 @@ def shaft_whirl(
 
 
 def critical_speeds(shaft: Shaft, supports: Mapping[int, Support]) -> tuple[Array, Array]:
-    """Speeds at which a whirl is as fast as the rotation, damping left out.
+    """(m,) speeds [rad/s] at which a whirl is as fast as the rotation, and (m,) its directions.
 
-    Supports are {node: bearing}, their stiffness symmetric.
-
-    Returns:
-        speeds (m,) [rad/s], ascending, and directions (m,) as in `ShaftWhirl`. A thin disc may
-        leave fewer forward speeds than backward ones: its own moment stiffens the shaft ever more.
+    Supports are {node: bearing}, their stiffness symmetric; damping is left out. Speeds ascend,
+    directions are as in `ShaftWhirl`. A thin disc may leave fewer forward speeds than backward
+    ones: its own moment stiffens the shaft ever more.
 
     Raises:
         ModelError: as in `shaft_whirl`, or if a stiffness is not symmetric.

@@ -51,7 +51,7 @@ def noisy(H: Complex, level: float, rng: np.random.Generator) -> Complex:
 def estimators(
     x: Complex, f: Complex, ratio: Annotated[float, NotNegative()] = 1.0
 ) -> tuple[Complex, Complex, Complex, Array]:
-    """H1, H2, Hv and the coherence of averaged spectra.
+    """H1, H2, Hv (...,) [m/N] and the coherence (...,) [1] of averaged spectra.
 
     Noise on the force makes H1 too small by signal / (signal + noise), noise on the response makes
     H2 too large likewise. Hv is total least squares scaled by the ratio of both: with the powers
@@ -63,9 +63,6 @@ def estimators(
         x: (n_a, ...) spectra of the response [m], one for each average.
         f: (n_a, ...) spectra of the force [N], the same shape.
         ratio: noise of responses over that of forces, each over its signal [1].
-
-    Returns:
-        H1, H2, Hv (...,) [m/N] and the coherence (...,) [1].
 
     Raises:
         ConfigError: for fewer than two averages: coherence would be one whatever the noise.

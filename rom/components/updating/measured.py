@@ -43,7 +43,7 @@ class Channels:
             nearest one.
 
     Raises:
-        ConfigError: if a direction has no length, or unless as many bodies are named.
+        ConfigError: if a direction has no length, or not as many bodies are named.
     """
 
     points: Annotated[npt.ArrayLike, Number("m", (3,), (None, 3))]

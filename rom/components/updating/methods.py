@@ -69,7 +69,7 @@ class Update:
 def responses(
     model: Model, p: ArrayLike, zeta: ArrayLike, omega: Array, inputs: tuple[int, ...]
 ) -> Complex:
-    """Receptances at the sensors.
+    """(n_f, n_s, n_e) receptances at the sensors [m/N].
 
     Args:
         model: with its sensors.
@@ -77,9 +77,6 @@ def responses(
         zeta: (m,) damping ratios of the lowest elastic modes [1].
         omega: (n_f,) circular frequencies [rad/s].
         inputs: sensors at which forces act.
-
-    Returns:
-        (n_f, n_s, n_e) [m/N].
 
     Raises:
         ConfigError: for an input that is no sensor, or a frequency that is not finite.
@@ -180,12 +177,9 @@ def _through(left: Complex, S: tuple[Array, ...], right: Complex, omega: Array) 
 def sensitivity(
     model: Model, p: ArrayLike, zeta: ArrayLike, omega: Array, inputs: tuple[int, ...]
 ) -> tuple[Complex, Complex]:
-    """Receptances, and their derivatives by p and ln zeta.
+    """Receptances (n_f, n_s, n_e) [m/N], and derivatives (..., n_p + m) by p and ln zeta.
 
     Arguments are as of `responses`.
-
-    Returns:
-        (n_f, n_s, n_e) and (n_f, n_s, n_e, n_p + m) [m/N].
 
     Raises:
         ConfigError, ModelError: as `responses`.

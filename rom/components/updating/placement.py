@@ -106,7 +106,7 @@ class Plan:
 
 @typed
 def candidates(body: FlexibleBody | Family, n: int, *, fixed: Held = ()) -> Channels:
-    """Points spread over the surface of a body, each with the three axes as directions.
+    """Channels along three axes at each of n points spread over the surface of a body.
 
     Each next point is the one farthest from those before. Points that supports hold are left out.
 
@@ -114,9 +114,6 @@ def candidates(body: FlexibleBody | Family, n: int, *, fixed: Held = ()) -> Chan
         body: with its outer surface; a family of bodies, or several in an assembly: all surfaces.
         n: number of points.
         fixed: what is held in the test, see `FlexibleBody.frequencies`.
-
-    Returns:
-        3 n channels.
 
     Raises:
         ConfigError: if the surface has fewer points that move.

@@ -258,17 +258,15 @@ class CyclicSector:
         return tuple(assembled(A) for A in (self.K, self.M, *others))
 
     def on_wheel(self, shapes: Complex, diameter: int, phase: float = 0.0) -> Array:
-        """Real displacements of all sectors, in the axes of the wheel where there are points.
+        """(N, n, m) real displacements of all sectors, in axes of the wheel where there are points.
 
-        Mass-normalised shapes of a sector become mass-normalised shapes of the wheel.
+        Mass-normalised shapes of a sector become mass-normalised shapes of the wheel, in units of
+        them.
 
         Args:
             shapes: (n, m) complex displacements of sector 0, in units of any kind.
             diameter: number of nodal diameters.
             phase: turns the wave [rad]; a quarter of 2 pi gives its partner.
-
-        Returns:
-            (N, n, m), in units of the shapes.
         """
         j = np.arange(self.n_sectors)
         wave = np.exp(1j * (diameter * self.angle * j - phase))

@@ -56,7 +56,7 @@ class GyroscopicModes:
     shapes: Complex
 
     def waves(self) -> tuple[Array, Complex]:
-        """w (n,) > 0 [rad/s], ascending, and shapes (n, n) of length 1 [1]: motions exp(i w t)."""
+        """Ascending w (n,) > 0 [rad/s], shapes (n, n) of length 1 [1] of the motions exp(i w t)."""
         n = len(self.shapes)
         q = self.shapes[:, n:]
         return self.w[n:], q / np.linalg.norm(q, axis=0)
@@ -257,11 +257,12 @@ class BladedWheel:
         at: PerBlade,
         speed: float = 0.0,
     ) -> Complex:
-        """Answer of all blades to forces that travel around the wheel.
+        """(w, N, p) complex displacements [m] of all blades under forces that run around the wheel.
 
         Blade j feels force * exp(i E j alpha) * exp(i omega t) with the engine order E: for E > 0
         the wave runs against the rotation, as that of a wheel past struts at rest does. Every mode
-        of the wheel has the same share of critical damping.
+        of the wheel has the same share of critical damping; displacements are in the axes of each
+        sector.
 
         Args:
             blades: N of them, in the order of the sectors.
@@ -273,9 +274,6 @@ class BladedWheel:
             at: (p,) dofs of the model of a blade, or (p, n) rows, whose displacements are wanted;
                 or a list of N of them.
             speed: angular speed [rad/s], with Coriolis forces.
-
-        Returns:
-            (w, N, p) complex displacements [m], in the axes of each sector.
 
         Raises:
             ConfigError: for a force or a place off the blades.

@@ -114,7 +114,7 @@ class MistunedWheel:
         damping: Damping,
         at: npt.ArrayLike,
     ) -> Complex:
-        """Answer of all blades to forces that travel around the wheel.
+        """(w, N, p) complex displacements [m] of all blades under forces that run around the wheel.
 
         Sector j feels force * exp(i E j alpha) * exp(i omega t) with the engine order E; every
         mode of the mistuned wheel has the same share of critical damping.
@@ -127,9 +127,6 @@ class MistunedWheel:
             omega: (w,) circular frequencies [rad/s].
             damping: share of critical damping of each mode [1].
             at: (p,) dof numbers of a sector, or (p, n) rows [1], whose displacements are wanted.
-
-        Returns:
-            (w, N, p) complex displacements [m].
 
         Raises:
             ConfigError: for wrong deviations, or damping that is not positive.
