@@ -86,8 +86,7 @@ def recorded(t: npt.ArrayLike, values: npt.ArrayLike) -> Table:
 def read_record(path: str | Path, *, scale: float = 1.0) -> Table:
     """A record from a text file of two columns, time [s] and value; # begins a comment.
 
-    Columns are parted by commas or blanks; values are scaled, as by 9.81 for accelerations in g
-    [1].
+    Columns are parted by commas or blanks; values are scaled [1], as by 9.81 for those in g.
 
     Raises:
         FileFormatError: if the file has no two columns of numbers.

@@ -136,8 +136,7 @@ class Bodies:
     def at_rest_as_a_whole(self, x: Array, v: Array) -> tuple[Array, Array]:
         """(n, 3) positions, velocities [1] of a system that rests as a whole, P = L = 0, and E = 0.
 
-        They are about the mass centre, from a configuration x (n, 3) [1] and velocities v (n, 3)
-        [1], which are scaled.
+        They are about the mass centre, from x (n, 3) [1] and velocities v (n, 3) [1], to be scaled.
 
         Raises:
             ConfigError: for other bodies than these.

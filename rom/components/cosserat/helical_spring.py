@@ -33,8 +33,7 @@ class HelicalSpring:
         coils: number of active coils [1].
         length: free length [m].
         E, nu: Young's modulus [Pa] and Poisson's ratio [1] of the wire.
-        total_coils: coils that lie on each other when the spring is solid [1]; None for the active
-            ones.
+        total_coils: coils that lie on each other in a solid spring [1]; None for the active ones.
 
     Raises:
         ModelError: if a size is not positive, or the coils touch already when it is free.

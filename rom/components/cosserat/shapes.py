@@ -125,8 +125,7 @@ def straight(
         length: of the rod [m].
         n: number of segments.
         start: (3,) first vertex [m].
-        frame: (3, 3) section axes as columns [1], the third along the rod; without it the world
-            axes.
+        frame: (3, 3) section axes as columns [1], the third along the rod; None for the world's.
         section: rigidities, mass and more as for `rod`.
 
     Raises:

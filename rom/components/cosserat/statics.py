@@ -237,9 +237,8 @@ def linearised(
     """(n,) forces out of balance [N, N m] and (n, n) tangent [N/m, N/rad, N m/rad].
 
     Unknowns are in the order of `clamped`. Both count positions in world axes and rotations in
-    section axes; the tangent is the exact derivative, symmetric where moments are in balance. The
-    load is as of `loads`, the spin the angular velocity (3,) of the axes about their origin
-    [rad/s].
+    section axes; the tangent is the exact derivative, symmetric where moments balance. The load is
+    as of `loads`, the spin the angular velocity (3,) of the axes about their origin [rad/s].
     """
     W = work(rod)
     given = loads(rod) if load is None else load

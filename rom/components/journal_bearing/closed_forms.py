@@ -105,8 +105,7 @@ def long_pressure(theta: npt.ArrayLike, eccentricity: float) -> Array:
 def long_force(eccentricity: float) -> Array:
     """(2,) half of Sommerfeld's film per length: force against the eccentricity and across it.
 
-    The force is in units of viscosity speed R (R/c)^2, the eccentricity in clearances, between 0
-    and 1 [1].
+    The force is in units of viscosity speed R (R/c)^2, the eccentricity in clearances, 0 to 1 [1].
 
     Raises:
         ModelError: if the eccentricity is not between 0 and 1.

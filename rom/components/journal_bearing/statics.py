@@ -102,8 +102,7 @@ class Stability:
 
     Attributes:
         stiffness: that the whirl feels [N/m].
-        whirl_ratio: frequency of the whirl at the threshold over the speed [1]; 0 if it never
-            whirls.
+        whirl_ratio: frequency of the whirl at the threshold over the speed [1]; 0 if there is none.
         critical_mass: per bearing, from which on the rotor whirls [kg]; inf if it never does.
     """
 

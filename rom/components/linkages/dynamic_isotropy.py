@@ -280,16 +280,14 @@ def closed_loci(index: Array, level: float, ranges: Ranges = TURNS) -> list[Arra
     Args:
         index: (n, n) values on `angle_grid`, in units of the field.
         level: the value, in units of the field.
-        ranges: (low, high) of each coordinate, as of that grid [rad or m]; None for an angle that
-            makes whole turns.
+        ranges: (low, high) of each coordinate, as of that grid [rad or m]; None for whole turns.
 
     Returns:
         (k, 2) coordinates of each curve [rad or m], continuous; the last point of a closed one is
         the first one, moved by whole turns if the curve goes around the torus.
 
     Raises:
-        ConfigError: if the field is not that of a square grid, or has gaps; for ranges that cannot
-            be.
+        ConfigError: if the field is no square grid or has gaps; for ranges that cannot be.
     """
     square = np.ndim(index) == 2 and np.shape(index)[0] == np.shape(index)[1] > 1
     if not square or not np.isfinite(index).all():

@@ -86,8 +86,7 @@ class PolarArm:
     def inertia(self, q1: npt.ArrayLike, q2: npt.ArrayLike) -> Array:
         """(..., 2, 2) generalised inertia [kg m^2, kg m, kg].
 
-        Coordinates are the angle of the guide (...,) [rad] and the displacement of the slide from
-        the pivot (...,) [m].
+        Coordinates are the angle of the guide (...,) [rad] and the way of the slide (...,) [m].
         """
         _, s = both(q1, q2)
         A = np.empty((*s.shape, 2, 2))

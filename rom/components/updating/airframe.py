@@ -76,8 +76,7 @@ class Airframe:
         K: {(part, kind): (r, r)} stiffness [N/m, N m/rad] by part and kind of deformation; of the
             kind "joint" is what holds the part, if it gives way.
         M: {part: (r, r)} mass by part [kg, kg m^2].
-        T: (6 n, r) displacements and rotations of all nodes [m, rad] from the independent
-            coordinates.
+        T: (6 n, r) displacements and rotations of all nodes [m, rad] by independent coordinates.
     """
 
     points: Array
@@ -112,8 +111,7 @@ def airframe(
     """The structure with beam elements no longer than ``size`` [m].
 
     The section of a beam is rigid: no shear, no warping; masses are consistent. Each of the five
-    joints gives way to rotation about each axis by the same stiffness [N m/rad]; all is one
-    material.
+    joints gives way to rotation about each axis by the same stiffness [N m/rad].
 
     Raises:
         ConfigError: for a size or a stiffness that is not positive.

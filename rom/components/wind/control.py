@@ -172,8 +172,7 @@ def steady(
             control: that of another turbine.
 
     Raises:
-        ConfigError: for a wind in which the turbine is parked, or blades of another one that are
-            not held.
+        ConfigError: for a wind in which the turbine is parked, or other blades that are not held.
     """
     if held is not None:
         return rotor_load(blading() if blades is None else blades, wind, *held(wind), tower=tower)
@@ -213,8 +212,7 @@ def power_curve(
         the coefficients ``power_coefficient`` and ``thrust_coefficient`` of the rotor [1].
 
     Raises:
-        ConfigError: for winds that are no list, or in which the turbine is parked, or blades of
-            another one.
+        ConfigError: for winds that are no list, or as of `steady`.
     """
     winds = vector("winds", winds)
     points = [steady(float(wind), blades, tower=tower, held=held) for wind in winds]

@@ -82,8 +82,7 @@ def operate(
 ) -> Operation:
     """Let the controlled turbine work in a wind over time, from its steady state in the first.
 
-    The rotor is rigid; a tilted one meets the wind by the cosine of its tilt, the same at all
-    azimuths.
+    The rotor is rigid; a tilted one meets the wind by the cosine of its tilt at all azimuths.
 
     Args:
         wind: its speed [m/s] over time [s]; `rom.components.histories.read_record` reads a

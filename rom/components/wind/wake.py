@@ -151,8 +151,7 @@ def in_late_wind(
     ``cosserat.body(blade(...))``. Other arguments are as of `in_wind`.
 
     Raises:
-        ConfigError: for a wind that is no speed over time or comes from behind, or a density that
-            cannot be.
+        ConfigError: for a wind that is no speed over time or comes from behind, or a wrong density.
     """
     winds = over_time(wind)
     far = far_away((1.0, 0.0, 0.0), axis, tower=tower, density=density)

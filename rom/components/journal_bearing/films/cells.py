@@ -85,8 +85,7 @@ def cells_of(
 ) -> Cells:
     """The cells of some bearings.
 
-    Functions (n, m) are those by which the bore of each opens the film in its cells, None of a
-    rigid one.
+    Functions (n, m) are those by which each bore opens the film in its cells, None of a rigid one.
     """
     k, grids = len(bearings), [one.grid for one in bearings]
     shapes = np.array([grid.fixed.shape for grid in grids], dtype=np.int64).reshape(-1, 2)

@@ -155,8 +155,7 @@ def parameter_tracker(  # noqa: PLR0913  keywords of one call
 
     Parameters are {name: `Drift`} of the family or of what is attached, {name: `GroundSpring`,
     `AddedMass` or `JointSpring`}; others stay at one. The family is as of `rom.update`, in SI
-    units; the damping is the ratio of all modes at factors of one [1]. Other arguments are as of
-    `tracker`.
+    units, the damping that of all modes at factors of one [1]. The rest is as of `tracker`.
 
     Raises:
         ConfigError: as `tracker`, or for an unknown parameter or none.

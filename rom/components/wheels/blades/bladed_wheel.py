@@ -67,8 +67,7 @@ class GyroscopicModes:
         Args:
             p: (n,) forces on mass-normalised modes [N kg^-1/2].
             sweep: (w,) circular frequencies omega [rad/s].
-            damping: a motion decays at this share zeta [1] of its w, as exp(i w sqrt(1 - zeta^2)
-                t).
+            damping: a motion decays at this share zeta [1] of its w, exp(i w sqrt(1 - zeta^2) t).
         """
         slower = np.sqrt(1.0 - damping**2)
         met = self.velocities.conj().T @ p
@@ -101,8 +100,7 @@ class BladedWheel:
             mass-normalised waves with all roots held.
         M: (d, d) its mass [kg; 1].
         roots: (N, r, c) how the roots of the blades move by these coordinates, in units of them.
-        rigid: (c, k) rigid motions of a free wheel, in units of the coordinates; k = 0 if it is
-            held.
+        rigid: (c, k) rigid motions of a free wheel, in units of the coordinates; k = 0 if held.
         coriolis: (d, d) Coriolis matrix of the disk per rad/s [kg], or None.
         centrifugal: (d, d) change of K per (rad/s)^2 [kg]; None at rest.
     """
@@ -190,9 +188,8 @@ class BladedWheel:
     ) -> Modes:
         """Circular frequencies [rad/s] and mass-normalised modes, the n lowest; None for all.
 
-        Frequencies (n,) ascend, rigid motions of a free wheel exactly zero; columns of Phi are in
-        the coordinates of `matrices`. Coriolis forces of the speed [rad/s] are left out, see
-        `waves`.
+        Frequencies (n,) ascend, rigid motions of a free wheel exactly zero; Phi is in coordinates
+        of `matrices`. Coriolis forces of the speed [rad/s] are left out, see `waves`.
 
         Raises:
             ConfigError: see `matrices`; for a free wheel at speed.
@@ -261,8 +258,7 @@ class BladedWheel:
 
         Blade j feels force * exp(i E j alpha) * exp(i omega t) with the engine order E: for E > 0
         the wave runs against the rotation, as that of a wheel past struts at rest does. Every mode
-        of the wheel has the same share of critical damping; displacements are in the axes of each
-        sector.
+        has the same share of critical damping; displacements are in the axes of each sector.
 
         Args:
             blades: N of them, in the order of the sectors.
@@ -309,8 +305,7 @@ class BladedWheel:
             blades: see `response`.
             force: see `response`; on the tuned wheel the first of a list acts everywhere.
             at: the amplitude is the norm of these displacements; of a list, as with the force.
-            sweep: engine_order, omega, damping and speed of `response`; the tuned peak is found in
-                the same sweep.
+            sweep: engine_order, omega, damping and speed of `response`, also of the tuned peak.
 
         Raises:
             ConfigError: as `response`, or if the force does not move the tuned wheel there.
