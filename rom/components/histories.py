@@ -50,14 +50,7 @@ class Table:
             raise ConfigError(f"the history has {shapes}; two or more of each are needed.")
 
     def __call__(self, t: Array) -> Array:
-        """Values at times.
-
-        Args:
-            t: (m,) times [s].
-
-        Raises:
-            ConfigError: for times outside the history.
-        """
+        """Values at times (m,) [s] within the history."""
         known, values = np.asarray(self.t, dtype=float), np.asarray(self.values, dtype=float)
         for at in (np.min(t), np.max(t)):
             if not known[0] <= at <= known[-1]:
@@ -72,9 +65,7 @@ class Table:
 def recorded(t: npt.ArrayLike, values: npt.ArrayLike) -> Table:
     """A record at equal intervals.
 
-    Args:
-        t: (n,) times [s].
-        values: (n,) values [unit of the history].
+    At times t (n,) [s] it has values (n,) [unit of the history].
 
     Raises:
         ConfigError: if it is no history, or samples are missing.
@@ -95,9 +86,7 @@ def recorded(t: npt.ArrayLike, values: npt.ArrayLike) -> Table:
 def read_record(path: str | Path, *, scale: float = 1.0) -> Table:
     """A record from a text file of two columns, time [s] and value; # begins a comment.
 
-    Args:
-        path: of the file; columns are parted by commas or blanks.
-        scale: of the values, such as 9.81 for accelerations in g [1].
+    Columns are parted by commas or blanks; values are scaled [1], as by 9.81 for those in g.
 
     Raises:
         FileFormatError: if the file has no two columns of numbers.
@@ -146,35 +135,21 @@ def sine(
 
 @typed
 def rectangle(amplitude: float, duration: Annotated[float, Positive("s")]) -> History:
-    """A value that stays for a time [s] and ends.
-
-    Raises:
-        ConfigError: if there is no such pulse.
-    """
+    """A value that stays for a time [s] and ends."""
     return lambda t: np.where(np.asarray(t) < duration, amplitude, 0.0)
 
 
 @typed
 def ramp(duration: Annotated[float, Positive("s")]) -> History:
-    """From 0 to 1 along half a cosine in a time [s], and 1 from there on.
-
-    Raises:
-        ConfigError: if the time is not positive.
-    """
+    """From 0 to 1 along half a cosine in a time [s], and 1 from there on."""
     return lambda t: (1 - np.cos(np.pi * np.clip(np.asarray(t) / duration, 0.0, 1.0))) / 2
 
 
 def corners_of(name: str, pair: Pair, n: int = 1, *, rows: bool = False) -> tuple[Array, Array]:
     """Times (m,) [s] and values (m, n) [unit of the history] of a pair.
 
-    Args:
-        name: for messages.
-        pair: times (m,) [s] and values (m,) or (m, n) [unit of the history].
-        n: number of columns.
-        rows: whether values (m,) do not stand for all columns.
-
-    Raises:
-        ConfigError: if they are none.
+    Values may be (m,) or (m, n) [unit of the history]; with ``rows`` values (m,) do not stand for
+    all columns.
     """
     try:
         t, y = (np.asarray(x, dtype=float) for x in pair)
@@ -211,15 +186,8 @@ def straightened(
 
     Lines stray from functions by 1e-5 of the largest value at most, where those have no jumps.
 
-    Args:
-        name: for messages.
-        history: a function may return (k,) or (k, n) for (k,) times [unit of the history].
-        span: first and last time that are needed [s].
-        n: number of columns.
-        rows: whether values (k,) do not stand for all columns.
-
-    Raises:
-        ConfigError: if it is no history, or does not reach over the span.
+    A function may return (k,) or (k, n) for (k,) times; with ``rows`` values (k,) do not stand for
+    all columns. The span is the first and the last time that are needed [s].
     """
     if not callable(history):
         pair: Any = ((0.0,), (history,)) if is_number(history) else history
@@ -245,11 +213,7 @@ def straightened(
 
 
 def values_at(name: str, history: History, t: Array) -> Array:
-    """(n,) values of a history at times t (n,) [s].
-
-    Raises:
-        ConfigError: if it gives anything but as many finite numbers.
-    """
+    """(n,) values of a history at times t (n,) [s]."""
     if callable(history):
         return corners_of(name, (t, history(t)))[1][:, 0]
     times, values = straightened(name, history, (t[0], t[-1]))

@@ -106,34 +106,20 @@ class Actions:
 
 @dataclass(frozen=True, slots=True)
 class Prepared:
-    """Actions as arrays; the columns of the table are factors, displacements, and places of tools.
+    """Actions as arrays; columns of the table are factors, displacements, and places of tools."""
 
-    Attributes:
-        times: (m,) [s] at which a history has a corner.
-        table: (m, c) loads, tractions, driven dofs, two for each tool.
-        loads: (q, n, 2) [N].
-        sides: (w, 2), with the solid on the left.
-        stress: (w, 2) pressure and shear [Pa].
-        of_side: (w,) column of the factor.
-        driven: (k,) dof numbers, the held ones last, and their columns; -1 for held ones.
-        faces: (f, 7) corner, unit tangent and outer normal of each face of a tool, its length.
-        first: (tools + 1,) where the faces of each tool begin.
-        friction: (tools,) [1].
-        names: of the tools.
-    """
-
-    times: Array
-    table: Array
-    loads: Array
-    sides: Index
-    stress: Array
-    of_side: Index
-    driven: Index
-    columns: Index
-    faces: Array
-    first: Index
-    friction: Array
-    names: tuple[str, ...]
+    times: Array  # (m,) [s] at which a history has a corner
+    table: Array  # (m, c) loads, tractions, driven dofs, two for each tool
+    loads: Array  # (q, n, 2) [N]
+    sides: Index  # (w, 2), with the solid on the left
+    stress: Array  # (w, 2) pressure and shear [Pa]
+    of_side: Index  # (w,) column of the factor
+    driven: Index  # (k,) dof numbers, the held ones last
+    columns: Index  # (k,) of these; -1 for held ones
+    faces: Array  # (f, 7) corner, unit tangent and outer normal of each face of a tool, its length
+    first: Index  # (tools + 1,) where the faces of each tool begin
+    friction: Array  # (tools,) [1]
+    names: tuple[str, ...]  # of the tools
 
     @property
     def forces(self) -> tuple[Array, Index, Array, Index]:
@@ -163,17 +149,11 @@ class Prepared:
 
 @dataclass(frozen=True, slots=True)
 class Touch:
-    """What a tool does to nodes.
+    """What a tool does to nodes."""
 
-    Attributes:
-        forces: (n, 2) on the nodes [N].
-        slip: (n,) elastic slip, which the friction holds [m].
-        entries: nodes (k,) and their stiffness (k, 2, 2) [N/m].
-    """
-
-    forces: Array
-    slip: Array
-    entries: tuple[Index, Array]
+    forces: Array  # (n, 2) on the nodes [N]
+    slip: Array  # (n,) elastic slip, which the friction holds [m]
+    entries: tuple[Index, Array]  # nodes (k,) and their stiffness (k, 2, 2) [N/m]
 
 
 def touch(
@@ -217,25 +197,14 @@ def disc(
 ) -> Array:
     """(n, 2) corners of a round outline; flat between them, they lie on the circle [m].
 
-    Args:
-        center: (2,) [m].
-        radius: [m].
-        n: number of corners.
-
-    Raises:
-        ConfigError: for a radius that is not positive, or fewer than three corners.
+    The center is (2,) [m].
     """
     angle = 2 * np.pi * np.arange(n) / n
     return np.asarray(center) + radius * np.column_stack([np.cos(angle), np.sin(angle)])
 
 
 def prepared(body: Sheet, actions: Actions, span: tuple[float, float] = (0.0, 1.0)) -> Prepared:
-    """Check actions and put them into arrays; histories become lines over a span of time [s].
-
-    Raises:
-        ConfigError: if histories, dofs, sides or tools do not fit; naming which.
-        MeshError: if a tool begins inside the sheet, or the sheet in it.
-    """
+    """Check actions and put them into arrays; histories become lines over a span of time [s]."""
     loads = np.zeros((len(actions.loads), *body.points.shape))
     for k, load in enumerate(actions.loads):
         loads[k] = nodal(f"forces of load {k}", load.forces, body)
@@ -272,11 +241,7 @@ def nodal(name: str, values: npt.ArrayLike, body: Sheet) -> Array:
 
 
 def dofs_of(held: npt.ArrayLike, body: Sheet, name: str = "held") -> Index:
-    """Numbers of dofs, 2 * node + axis.
-
-    Raises:
-        ConfigError: if the sheet has no such dofs.
-    """
+    """Numbers of dofs, 2 * node + axis."""
     dofs = whole_numbers(f"{name} dofs", held).ravel()
     if dofs.size and (dofs.min() < 0 or dofs.max() >= body.points.size):
         raise ConfigError(

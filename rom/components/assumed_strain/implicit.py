@@ -110,18 +110,11 @@ def equilibrium(
 ) -> tuple[Array, Array, int]:
     """Rest under dead loads, which grow in equal steps; `quasi_static` has all other actions.
 
-    Args:
-        body: the sheet.
-        metal: its material.
-        load: (n, 2) dead forces [N].
-        held: (k,) dof numbers that do not move.
-        steps: load steps.
-
-    Returns:
-        Positions (n, 2) [m], history as of `forces`, and the most Newton iterations of a step.
+    Of dead forces load (n, 2) [N] and held numbers (k,) of dofs come positions (n, 2) [m], history
+    as of `forces`, and the most Newton iterations of a step.
 
     Raises:
-        ConfigError: if loads or held dofs do not fit, or without a step.
+        ConfigError: if loads or held dofs do not fit.
         SolverError: if Newton's method does not find equilibrium, even in halves of a step;
             ``error.solution`` holds the steps before.
     """
@@ -142,14 +135,9 @@ def implicit_motion(
 ) -> Course:
     """Motion with inertia by generalized-alpha steps, from one instant to the next.
 
-    Args:
-        body: the sheet, without stress at the first time.
-        metal: its material.
-        actions: loads, pressure, driven nodes and tools.
-        times: (k,) instants [s].
-        v: (n, 2) velocities at the start [m/s]; None: at rest.
-        rho_inf: what a step leaves of fastest vibrations, 0 to 1 [1]; with tools 0.5 at most,
-            since impacts gain energy above.
+    Velocities v (n, 2) [m/s] are those at the start; None: at rest. Of the fastest vibrations a
+    step leaves rho_inf [1]; with tools 0.5 at most, since impacts gain energy above. Other
+    arguments are as of `quasi_static`.
 
     Raises:
         ConfigError: if actions, times or velocities do not fit.

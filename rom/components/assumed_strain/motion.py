@@ -79,11 +79,7 @@ class Metal:
 def tangent(body: Sheet, metal: Metal, x: Array, history: Array | None = None) -> csr_matrix:
     """(2n, 2n) tangent stiffness [N/m], where the positions began the linear one.
 
-    Args:
-        body: the sheet.
-        metal: its material.
-        x: (n, 2) positions [m].
-        history: (t, p, 5) as of `forces` [1]; None: virgin.
+    At positions x (n, 2) [m] and a history (t, p, 5) as of `forces` [1]; None: virgin.
 
     Raises:
         ConfigError: if positions or history do not fit the sheet.
@@ -98,16 +94,10 @@ def tangent(body: Sheet, metal: Metal, x: Array, history: Array | None = None) -
 def forces(
     body: Sheet, metal: Metal, x: Array, history: Array | None = None
 ) -> tuple[Array, Array]:
-    """Internal forces at a position.
+    """(n, 2) internal forces [N] at a position, and the history after it.
 
-    Args:
-        body: the sheet.
-        metal: its material.
-        x: (n, 2) positions [m].
-        history: (t, p, 5) plastic strain 11, 22, 12, 33 and the accumulated one [1]; None: virgin.
-
-    Returns:
-        Forces (n, 2) [N] and the history after it.
+    Positions x are (n, 2) [m], a history (t, p, 5) plastic strain 11, 22, 12, 33 and the
+    accumulated one [1]; None: virgin.
 
     Raises:
         ConfigError: if positions or history do not fit the sheet.
@@ -175,7 +165,7 @@ def fly(
         actions: loads, pressure, driven nodes and tools.
 
     Raises:
-        ConfigError: if velocities, held dofs, actions, duration or pictures do not fit.
+        ConfigError: if velocities, held dofs or actions do not fit.
         MeshError: if a tool begins inside the sheet.
         SolverError: if the motion is lost; ``error.solution`` holds the pictures before.
     """
@@ -228,10 +218,8 @@ def stiffness_by_sides(body: Sheet, metal: Metal, *, share: tuple[int, int] = (0
     theirs, averaged by area: the same as that of the four nodes in a patch. A side needs nothing
     but its triangles, so that processes can share the sides; their matrices add up to K.
 
-    Args:
-        body: a plane sheet; of its points and triangles, not of its element.
-        metal: its material.
-        share: (number of this process, number of processes).
+    The sheet is plane, of its points and triangles, not of its element; a share is (number of this
+    process, number of processes).
 
     Raises:
         ConfigError: with axial symmetry, or for a share that does not exist.

@@ -26,10 +26,8 @@ from rom.model import Array, FEModel, Index, Interface, Mask, SurfaceMesh
 def in_space(body: Sheet, metal: Metal, interfaces: dict[str, Index]) -> FEModel:
     """Stiffness and mass of a plane-stress sheet in the plane z = 0, free, for any reduction.
 
-    Args:
-        body: the sheet, plane stress.
-        metal: its material.
-        interfaces: {name: (k,) nodes} that hold whole triangles: a line could turn about itself.
+    The sheet is in plane stress; interfaces {name: (k,) nodes} hold whole triangles: a line could
+    turn about itself.
 
     Raises:
         ConfigError: for another state than plane stress.
@@ -135,12 +133,7 @@ def _free_slopes(K: Array, free: Index) -> None:
 
 
 def _fitted_slopes(
-    body: Sheet,
-    side: Index,
-    places: Index,
-    inner: Mask,
-    normal: Array,
-    parts: tuple[Index, ...],
+    body: Sheet, side: Index, places: Index, inner: Mask, normal: Array, parts: tuple[Index, ...]
 ) -> csr_matrix:
     """(s, n) normal slope of each inner side from deflections [1/m]; nothing at an edge."""
     e, X, two = np.flatnonzero(inner), body.points, places[inner] % len(body.triangles)

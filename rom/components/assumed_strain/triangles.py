@@ -74,7 +74,6 @@ def sheet(
         thickness: of a plane solid [m].
 
     Raises:
-        ConfigError: for an unknown element or state, or a thickness that is not positive.
         MeshError: if a triangle is turned over or names no point, a point has no triangle, a side
             belongs to three, or a radius is negative.
     """
@@ -103,11 +102,7 @@ def endless(value: object) -> bool:
 def whole_numbers(
     name: str, value: npt.ArrayLike, shape: tuple[int | None, ...] | None = None
 ) -> Index:
-    """Whole numbers, which counts of nodes or dofs are, of a shape; True and False are none.
-
-    Raises:
-        ConfigError: for anything else.
-    """
+    """Whole numbers, which counts of nodes or dofs are, of a shape; True and False are none."""
     found = finite(name, value, shape)
     if np.any(found % 1) or np.abs(found).max(initial=0.0) > LARGEST_WHOLE:
         raise ConfigError(
@@ -203,21 +198,11 @@ def rectangle(
     corners: Annotated[npt.ArrayLike, Number("m", (4, 2))],
     diagonal: Literal["/", "\\", "x"] = "/",
 ) -> tuple[Array, Index]:
-    """Points and triangles of a quadrilateral.
+    """Points (m, 2) [m] and triangles (t, 3) of a quadrilateral of corners (4, 2) [m].
 
-    Rows of points follow each other from the first side to the third; quadrilaterals are split by
-    "/", by the other diagonal, or by both with "x".
-
-    Args:
-        n: divisions along the first and the second side.
-        corners: (4, 2) counter-clockwise [m].
-        diagonal: how to split.
-
-    Returns:
-        Points (m, 2) [m] and triangles (t, 3).
-
-    Raises:
-        ConfigError: for fewer than one division, other corners, or another way to split.
+    Corners go counter-clockwise, n are divisions along the first and the second side. Rows of
+    points follow each other from the first side to the third; quadrilaterals are split by "/", by
+    the other diagonal, or by both with "x".
     """
     s, t = (np.linspace(0, 1, k + 1) for k in n)
     a, b = (x.ravel() for x in np.meshgrid(s, t))

@@ -134,14 +134,9 @@ class Bodies:
         return float(np.sqrt(self.size(x) * M) * near / M**3)
 
     def at_rest_as_a_whole(self, x: Array, v: Array) -> tuple[Array, Array]:
-        """Configuration and velocities of a system that rests as a whole, P = L = 0, with E = 0.
+        """(n, 3) positions, velocities [1] of a system that rests as a whole, P = L = 0, and E = 0.
 
-        Args:
-            x: (n, 3) configuration [1].
-            v: (n, 3) velocities [1], which are scaled.
-
-        Returns:
-            x and v (n, 3), (n, 3) about the mass centre [1].
+        They are about the mass centre, from x (n, 3) [1] and velocities v (n, 3) [1], to be scaled.
 
         Raises:
             ConfigError: for other bodies than these.
@@ -154,15 +149,9 @@ class Bodies:
         return x, matched.rest * np.sqrt(-self.potential(x) / matched.energy)
 
     def move(self, x: Array, v: Array, t: Array) -> tuple[Array, Array]:
-        """The motion of the bodies.
+        """(k, n, 3) positions and velocities [1] of the bodies at times t (k,) [1].
 
-        Args:
-            x: (n, 3) configuration at t[0] [1].
-            v: (n, 3) velocities there [1].
-            t: (k,) times [1].
-
-        Returns:
-            Positions and velocities (k, n, 3), (k, n, 3) [1].
+        At t[0] they are x (n, 3) [1] and v (n, 3) [1].
 
         Raises:
             ConfigError, ModelError: as `potential`.
@@ -223,14 +212,9 @@ class ShapeSphere:
         return np.array([w.real, w.imag, a - b]) / (a + b)
 
     def momentum(self, x: Array, v: Array) -> Array:
-        """(3,) momentum of the shape, I / 4 times its velocity; tangent to the sphere.
+        """(3,) momentum [1] of the shape, I / 4 times its velocity; tangent to the sphere.
 
-        Args:
-            x: (3, 3) configuration [1].
-            v: (3, 3) velocities [1].
-
-        Returns:
-            (3,) momentum [1].
+        By a configuration x (3, 3) [1] and velocities v (3, 3) [1].
         """
         (z1, z2), (w1, w2) = self._jacobi(x), self._jacobi(v)
         cross = 2 * (w1.conjugate() * z2 + z1.conjugate() * w2)
@@ -246,27 +230,18 @@ class ShapeSphere:
     def size(self, n: Array, p: Array, D: float) -> float:
         """sqrt(I) of a motion with energy zero [1].
 
-        Args:
-            n: (3,) shape [1].
-            p: (3,) momentum of the shape [1].
-            D: half the rate of I [1].
+        Of the shape n (3,) [1], its momentum p (3,) [1], and half the rate of I, D [1].
         """
         return (D**2 + 4 * float(np.square(p).sum())) / (2 * self.attraction(n))
 
     def move(self, n: Array, p: Array, D: Array) -> tuple[Array, Array]:
-        """Shapes and their momenta over D, which grows with time and takes its place.
+        """(k, 3) shapes and momenta [1] over D (k,) [1], which grows with time and takes its place.
 
         E = L = P = 0, and no size enters::
 
             H = ln(D^2 + 4 p^2) - ln(-V sqrt(I)),   n' = dH/dp,   p' = -dH/dn, on the sphere
 
-        Args:
-            n: (3,) shape at D[0] [1].
-            p: (3,) momentum there [1].
-            D: (k,) values [1].
-
-        Returns:
-            Shapes and momenta (k, 3), (k, 3) [1].
+        At D[0] they are n (3,) [1] and p (3,) [1].
 
         Raises:
             SolverError: if two bodies come too close.

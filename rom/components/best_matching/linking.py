@@ -65,28 +65,12 @@ Gauge = Callable[["Linking", Extended], tuple[float, float]]  # multipliers N an
 
 
 def newton_gauge(linking: "Linking", state: Extended) -> tuple[float, float]:
-    """N = 1 and l = 0, which keep phi and count Newton's time.
-
-    Args:
-        linking: the system.
-        state: a point of its phase space.
-
-    Returns:
-        N and l [1].
-    """
+    """N = 1 and l = 0 [1], which keep phi and count Newton's time."""
     return 1.0, 0.0
 
 
 def shape_gauge(linking: "Linking", state: Extended) -> tuple[float, float]:
-    """N and l of pi' = 1 and constant sum m x^2: pi is the clock, and x has no size.
-
-    Args:
-        linking: the system.
-        state: a point of its phase space.
-
-    Returns:
-        N and l [1].
-    """
+    """N and l [1] of pi' = 1 and constant sum m x^2: pi is the clock, and x has no size."""
     N = 1 / linking.rate_of_pi(state)
     size = linking.bodies.size(state.x)
     return N, N * float(np.exp(-2 * state.phi)) * float((state.x * state.p).sum()) / size
@@ -171,19 +155,14 @@ class Linking:
         return Extended(x, p, *Y[:, 2 * n :].T)
 
     def move_shapes(self, x: Array, p: Array, D: Array) -> tuple[Array, Array]:
-        """Shapes of size one over D, by a Hamiltonian that knows no scale.
+        """(k, n, 3) shapes, momenta [1] of size one over D, by a Hamiltonian that knows no scale.
 
         With K = sum p^2 / m, on sum m x^2 = 1 and sum x . p = 0::
 
             h = ln((D^2 + K) / (-2 V)) / (2 + k),   x' = dh/dp,   p' = -dh/dx, on the sphere
 
-        Args:
-            x: (n, 3) configuration of size one at D[0] [1].
-            p: (n, 3) momenta there without that of growth [1].
-            D: (k,) values of the clock [1].
-
-        Returns:
-            Configurations and momenta (k, n, 3), (k, n, 3) [1].
+        D (k,) are values of the clock [1]; at D[0] x (n, 3) is a configuration of size one [1], p
+        (n, 3) its momenta without that of growth [1].
 
         Raises:
             ConfigError, ModelError: as `Bodies.potential`; if size or growth are not one and zero.
@@ -199,14 +178,7 @@ class Linking:
         return Y[:, 0], Y[:, 1]
 
     def shapes(self, state: Extended) -> tuple[Array, Array]:
-        """Configurations of size one and their momenta without growth, of states in any gauge.
-
-        Args:
-            state: a point of the phase space, or k of them.
-
-        Returns:
-            (..., n, 3), (..., n, 3) [1].
-        """
+        """(..., n, 3) configurations of size one, momenta without growth [1], in any gauge."""
         m = self.bodies.mass[:, None]
         R = np.sqrt((m * state.x**2).sum(axis=(-2, -1)))[..., None, None]
         D = (state.x * state.p).sum(axis=(-2, -1))[..., None, None]
@@ -216,13 +188,8 @@ class Linking:
     def scale(self, x: Array, p: Array, D: float) -> float:
         """Logarithm of the scale of a shape: that of Newton's size, from H = 0.
 
-        Args:
-            x: (n, 3) configuration of size one [1].
-            p: (n, 3) its momenta [1].
-            D: the clock [1].
-
-        Returns:
-            ln((D^2 + K) / (-2 V)) / (2 + k) [1], which is also the Hamiltonian.
+        It is ln((D^2 + K) / (-2 V)) / (2 + k) [1], which is also the Hamiltonian, of a
+        configuration x (n, 3) of size one [1], its momenta p (n, 3) [1] and the clock D [1].
         """
         K = float((p**2 / self.bodies.mass[:, None]).sum())
         ratio = (D**2 + K) / (-2 * self.bodies.potential(x))

@@ -137,15 +137,11 @@ def _turn_in_plane(C: Array) -> Array:
 
 
 def stacked(mass: Array, X: Array, *, plane: bool = False) -> Array:
-    """Lay each picture of a film over its predecessor.
+    """(k, n, 3) pictures of a film [m], each laid over its predecessor.
 
-    Args:
-        mass: masses as in `frame`.
-        X: (k, n, 3) configurations, each in a frame of its own [m].
-        plane: turn about z only.
-
-    Returns:
-        (k, n, 3): the shortest motion through these shapes [m], whatever frames they were taken in.
+    It is the shortest motion through these shapes, whatever frames they were taken in. Masses are
+    as in `frame`, configurations X (k, n, 3) each in a frame of its own [m]; in a ``plane`` they
+    turn about z only.
 
     Raises:
         ConfigError: without a picture.
@@ -159,18 +155,12 @@ def stacked(mass: Array, X: Array, *, plane: bool = False) -> Array:
 
 
 def emergent_rate(mass: Array, x: Array, dx: Array, kinetic: float) -> float:
-    """Time that passes per unit of a parameter along a sequence of configurations.
+    """Time [s] that passes per unit of a parameter along a sequence of configurations.
 
     dt / d lambda = sqrt(T_bm(dx / d lambda) / (E - V)), however pictures were turned or numbered.
 
-    Args:
-        mass: (n,) masses [kg].
-        x: (n, 3) configuration [m].
-        dx: (n, 3) its derivative by the parameter [m].
-        kinetic: E - V(x) [J].
-
-    Returns:
-        Time per unit of the parameter [s].
+    Masses (n,) [kg] have the configuration x (n, 3) [m], its derivative dx (n, 3) by the parameter
+    [m], and E - V(x), which is ``kinetic`` [J].
 
     Raises:
         ModelError: if nothing is left to move with.

@@ -135,11 +135,8 @@ class RodBody:
 def body(rod: Rod, start: Shape | None = None) -> RodBody:
     """A rod as a body of a mechanism, with markers "start" and "end" at its plates.
 
-    A plate without inertia takes a quarter of that of the segment beside it; the sum stays.
-
-    Args:
-        rod: with mass and inertia.
-        start: shape in which the mechanism is put together; None for the one without stress.
+    A plate without inertia takes a quarter of that of the segment beside it; the sum stays. The
+    mechanism is put together in the shape ``start``; None for the one without stress.
 
     Raises:
         ModelError: if the rod has no mass or no inertia.
@@ -175,13 +172,7 @@ def _inertia(rod: Rod) -> Array:
 
 
 def shape_of(solution: Solution, name: str, k: int = -1) -> Shape:
-    """Shape of a rod of a mechanism at a saved instant, in the world.
-
-    Args:
-        solution: what `rom.simulate` returned.
-        name: of the rod in the mechanism.
-        k: instant.
-    """
+    """Shape of a rod of a mechanism at the saved instant k, in the world."""
     parts = solution.mechanism.nonlinear[name].parts
     B = solution.packed.system.bodies
     number = [solution.packed.names.index(part.name) for part in parts]

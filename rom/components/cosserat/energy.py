@@ -63,23 +63,16 @@ class Rod(NamedTuple):
 
 
 class Work(NamedTuple):
-    """Memory of the assembly.
+    """Memory of the assembly; all but the last two are of one element."""
 
-    Attributes:
-        R, D, H, a, f, e: rotation, gradient of the strain, matrix, strain, force, quaternion of an
-            element.
-        r: (n,) forces out of balance, n = 6 N + 9.
-        A: (n, BAND_WIDTH) band of the tangent, A[i, j - i + HALF_BANDWIDTH].
-    """
-
-    R: Array
-    D: Array
-    H: Array
-    a: Array
-    f: Array
-    e: Array
-    r: Array
-    A: Array
+    R: Array  # rotation
+    D: Array  # gradient of the strain
+    H: Array  # matrix
+    a: Array  # strain
+    f: Array  # force
+    e: Array  # quaternion
+    r: Array  # (n,) forces out of balance, n = 6 N + 9
+    A: Array  # (n, BAND_WIDTH) band of the tangent, A[i, j - i + HALF_BANDWIDTH]
 
 
 def work(rod: Rod) -> Work:

@@ -33,8 +33,7 @@ class HelicalSpring:
         coils: number of active coils [1].
         length: free length [m].
         E, nu: Young's modulus [Pa] and Poisson's ratio [1] of the wire.
-        total_coils: coils that lie on each other when the spring is solid [1]; None for the active
-            ones.
+        total_coils: coils that lie on each other in a solid spring [1]; None for the active ones.
 
     Raises:
         ModelError: if a size is not positive, or the coils touch already when it is free.
@@ -100,9 +99,7 @@ class HelicalSpring:
     def clearance(self, length: float, angle: float) -> float:
         """Way left on the inner side until coils touch [m].
 
-        Args:
-            length: of the centre line now [m].
-            angle: between the plates at both ends [rad].
+        The length is that of the centre line [m], the angle between the plates at both ends [rad].
         """
         return length - (self.diameter + self.wire) / 2 * abs(angle) - self.solid_length
 
@@ -126,13 +123,10 @@ class HelicalSpring:
         return C
 
     def lateral_stiffness(self, compression: npt.ArrayLike) -> Array:
-        """Sideways stiffness between parallel plates under compression, after Haringx.
+        """(k,) or scalar sideways stiffness [N/m] between parallel plates, after Haringx.
 
-        Args:
-            compression: (k,) share of the free length, 0 to below 1 [1]; or a scalar.
-
-        Returns:
-            (k,) or scalar stiffness [N/m]; negative beyond buckling.
+        Compression (k,), or a scalar, is the share of the free length, 0 to below 1 [1]; beyond
+        buckling the stiffness is negative.
         """
         share = np.asarray(compression, dtype=float)
         now = 1 - share
@@ -146,9 +140,8 @@ class HelicalSpring:
     def critical_compression(self, end: float = 0.5) -> float:
         """Share of the free length at which the spring buckles [1]; infinite if it never does.
 
-        Args:
-            end: effective length over length [1], 1/2 between fixed plates, 1 if one plate is free
-                to move sideways, 2 if it is also free to turn.
+        The end is effective length over length [1], 1/2 between fixed plates, 1 if one plate is
+        free to move sideways, 2 if it is also free to turn.
         """
         first = self.E / (2 * (self.E - self.G))
         second = 2 * np.pi**2 * (self.E - self.G) / (2 * self.G + self.E)
@@ -158,9 +151,7 @@ class HelicalSpring:
     def wire_stress(self, force: float, moment: float = 0.0) -> tuple[float, float]:
         """Shear stress, after Bergstraesser, and bending stress of the wire [Pa].
 
-        Args:
-            force: along the axis [N].
-            moment: across it [N m].
+        The force is along the axis [N], the moment across it [N m].
         """
         C = self.diameter / self.wire
         shear = (4 * C + 2) / (4 * C - 3) * 8 * force * self.diameter / (np.pi * self.wire**3)
@@ -198,9 +189,7 @@ def wire_rod(spring: HelicalSpring, per_coil: int = 40) -> Rod:
 def plate_compliance(rod: Rod, centre: npt.ArrayLike) -> Array:
     """(6, 6) motion of a plate at a rod's end per load at its centre [m/N, rad/N; m/N/m, rad/N/m].
 
-    Args:
-        rod: the rod, about its reference.
-        centre: (3,) where the load acts and the motion is measured [m].
+    About the reference of the rod; the centre (3,) is where the motion is measured, too [m].
     """
     free = clamped(rod)
     K = linearised(rod, reference(rod))[1][np.ix_(free, free)]

@@ -55,12 +55,7 @@ FINE_STEPS = 16  # of the curve per segment, to measure its length
 
 
 def rod_of(values: Values, place: Place) -> "Rod":
-    """The rod that an entry describes.
-
-    Raises:
-        ConfigError: for points or axes that are none, or a material that is missing or too many.
-        ModelError: for a curve that bends too much within a segment.
-    """
+    """The rod that an entry describes."""
     from rom.components.cosserat.shapes import rod
 
     rigidities = _rigidities(values, place)

@@ -20,11 +20,7 @@ INCREMENT_RTOL, MAX_ITERATIONS = 1e-12, 500
 
 
 def cut(whole: Rod, k: int) -> list[Rod]:
-    """K pieces of nearly as many segments each, with plates where they meet.
-
-    Raises:
-        ConfigError: if there are more pieces than segments.
-    """
+    """K pieces of nearly as many segments each, with plates where they meet."""
     n = whole.h.size
     if not 1 <= k <= n:
         raise ConfigError(f"{k} pieces of a rod of {n} segments.", hint="Take 1 to as many.")
@@ -40,15 +36,9 @@ def cut(whole: Rod, k: int) -> list[Rod]:
 
 
 def bend_in_pieces(whole: Rod, k: int, force: Array) -> Array:
-    """Shape of a clamped rod of k linear pieces under dead forces.
+    """(N + 1, 3) positions [m] of a clamped rod of k linear pieces under dead forces.
 
-    Args:
-        whole: the rod.
-        k: number of pieces.
-        force: (N + 1, 3) on the vertices [N].
-
-    Returns:
-        (N + 1, 3) positions of the vertices [m].
+    Forces (N + 1, 3) are on the vertices [N].
 
     Raises:
         ConfigError: if there are more pieces than segments.

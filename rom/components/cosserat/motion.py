@@ -105,8 +105,8 @@ def simulate(  # noqa: PLR0913  keywords of one run, all with defaults
         save_every: steps between instants that are kept.
 
     Raises:
-        ConfigError: for a step or an end that is not positive, damping outside 0 to 1, shapes of
-            arrays that differ from those of the rod, or a section of which two rotations are free.
+        ConfigError: for shapes of arrays that differ from those of the rod, or a section of which
+            two rotations are free.
         ModelError: if the rod has no mass at all.
         SolverError: if a step has no solution; its ``solution`` is what came before.
     """

@@ -57,14 +57,11 @@ def rod(  # noqa: PLR0913  one keyword per property of the rod
             and the segment beside it is that over half a segment.
         stretch: (N, 3) or (3,) rigidities GA1, GA2, EA of the segments [N].
         bend: (N + 1, 3) or (3,) rigidities EI1, EI2, GJ at the vertices [N m^2].
-        mass: (N,) or scalar, per length [kg/m].
+        mass: (N,) or scalar, per length [kg/m]; lumped, half of each segment at either vertex.
         inertia: (N, 3) or (3,), per length about the section axes [kg m].
         viscosity: (6,) or scalar, ratio of viscous to elastic rigidities, stretch before bend [s].
         bends: (N,) whether a segment shares in the bending [1]; one that does not is a rigid link
             as far as its stretch rigidity is high.
-
-    Returns:
-        Rod; its masses are lumped, half of each segment at either vertex.
 
     Raises:
         ModelError: naming the segment or vertex with coincident stations, a rigidity that is not
@@ -128,8 +125,7 @@ def straight(
         length: of the rod [m].
         n: number of segments.
         start: (3,) first vertex [m].
-        frame: (3, 3) section axes as columns [1], the third along the rod; without it the world
-            axes.
+        frame: (3, 3) section axes as columns [1], the third along the rod; None for the world's.
         section: rigidities, mass and more as for `rod`.
 
     Raises:
@@ -143,10 +139,9 @@ def straight(
 def along(place: Curve, stations: npt.ArrayLike, **section: npt.ArrayLike) -> Rod:
     """A rod along a curve.
 
-    Args:
-        place: position (3,) [m] and section axes (3, 3), columns, third tangent, at a station.
-        stations: (N + 1,) where the vertices are, in the units of the parameter of the curve.
-        section: rigidities, mass and more as for `rod`.
+    The place is position (3,) [m] and section axes (3, 3), columns, third tangent, at a station;
+    stations (N + 1,) of the vertices are in units of the parameter of the curve. Rigidities, mass
+    and more are as for `rod`.
 
     Raises:
         ModelError: as `rod`.

@@ -102,12 +102,8 @@ def newton(
 ) -> tuple[Shape, Array] | None:
     """The shape near one where corrections vanish, and further unknowns; None if not found.
 
-    Args:
-        rod: the rod.
-        shape: where the search starts.
-        correction: function of a shape and the further unknowns (k,) that gives increments (6 N + 9
-            + k,) in the order of `clamped`; None where its equations are singular.
-        more: (k,) further unknowns at the start.
+    The correction is a function of a shape and the further unknowns (k,) that gives increments (6 N
+    + 9 + k,) in the order of `clamped`; None where its equations are singular.
     """
     x, p, unknown = shape.x.copy(), shape.p.copy(), np.array(more, dtype=float)
     n, length = 6 * rod.h.size + 9, rod.h.sum()
@@ -142,7 +138,7 @@ def loads(
     force: npt.ArrayLike = 0.0,
     weight: npt.ArrayLike = 0.0,
 ) -> tuple[Array, Array]:
-    """Dead loads.
+    """Dead forces (N + 1, 3) on vertices [N], moments (N + 2, 3) on plate, segments, plate [N m].
 
     Args:
         rod: the rod.
@@ -150,9 +146,6 @@ def loads(
         tip_moment: (3,) moment on the plate at the end [N m].
         force: (N + 1, 3) forces on the vertices [N].
         weight: (3,) acceleration of gravity [m/s^2].
-
-    Returns:
-        (N + 1, 3) forces on vertices [N], (N + 2, 3) moments on plate, segments, plate [N m].
     """
     f, m = np.zeros_like(rod.x), np.zeros((rod.h.size + 2, 3))
     f += np.asarray(force, dtype=float) + np.outer(rod.mass, np.broadcast_to(weight, 3))
@@ -164,11 +157,7 @@ def loads(
 def fitting(
     rod: Rod, load: tuple[npt.ArrayLike, npt.ArrayLike], free: npt.ArrayLike | None
 ) -> tuple[tuple[Array, Array], Mask]:
-    """Loads, and which dofs are free, as arrays.
-
-    Raises:
-        ConfigError: if their shapes differ from those of the rod.
-    """
+    """Loads, and which dofs are free, as arrays."""
     free = clamped(rod) if free is None else np.asarray(free, dtype=bool)
     force, moment = (np.array(part, dtype=float) for part in load)
     found, needed = (force.shape, moment.shape), (rod.x.shape, (len(rod.p), 3))
@@ -245,19 +234,11 @@ def linearised(
     load: tuple[Array, Array] | None = None,
     spin: npt.ArrayLike = (0.0, 0.0, 0.0),
 ) -> tuple[Array, Array]:
-    """Forces out of balance and their tangent, unknowns in the order of `clamped`.
+    """(n,) forces out of balance [N, N m] and (n, n) tangent [N/m, N/rad, N m/rad].
 
-    Both count positions in world axes and rotations in section axes; the tangent is the exact
-    derivative, symmetric where moments are in balance.
-
-    Args:
-        rod: the rod.
-        shape: where it is.
-        load: dead loads, see `loads`.
-        spin: (3,) angular velocity of the axes about their origin [rad/s].
-
-    Returns:
-        (n,) forces and moments [N, N m] and (n, n) tangent [N/m, N/rad, N m/rad].
+    Unknowns are in the order of `clamped`. Both count positions in world axes and rotations in
+    section axes; the tangent is the exact derivative, symmetric where moments balance. The load is
+    as of `loads`, the spin the angular velocity (3,) of the axes about their origin [rad/s].
     """
     W = work(rod)
     given = loads(rod) if load is None else load

@@ -38,15 +38,7 @@ RIGID_RTOL = 1e-6  # distance of rigid motions from the basis that is still acce
 
 
 class AffineModel:
-    """A finite element model whose regions have factors of stiffness and density.
-
-    Args:
-        model: the model at factors of one.
-        parameters: by name.
-
-    Raises:
-        ParameterError: if a parameter names a region that the model does not know.
-    """
+    """A finite element model whose regions have factors of stiffness and density."""
 
     stretch: Stretch | None = None
 
@@ -132,13 +124,6 @@ class StretchedModel(AffineModel):
     """A model whose regions have factors of thickness besides those of the material.
 
     All its regions are terms, each with three parts of the stiffness, see `rom.model.Layered`.
-
-    Args:
-        model: the model at factors of one.
-        parameters: by name.
-
-    Raises:
-        ParameterError: if a region is unknown or no layer, or the model carries masses.
     """
 
     def __init__(self, model: FEModel, parameters: dict[str, Parameter]):

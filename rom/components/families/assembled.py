@@ -63,10 +63,7 @@ class FamilyAssembly:
         }
 
     def at(self, **values: float) -> Assembly:
-        """The assembly for some values of the parameters.
-
-        Args:
-            values: {"body.parameter": factor}; one for those not given.
+        """The assembly at values {"body.parameter": factor}; one for those not given.
 
         Raises:
             ParameterError: if a name is unknown, or a factor outside its range.

@@ -36,21 +36,13 @@ from rom.model import Array, Report
 
 @dataclass(frozen=True, slots=True)
 class Share:
-    """What one region gives to a body whose parameters are one.
+    """What one region gives to a body whose parameters are one."""
 
-    Attributes:
-        region: its name; None for all that no parameter names.
-        integrals: of its mass.
-        K: (r, r) its stiffness [N/m]; with layers (3, 6 + r, 6 + r), see `Stretch`.
-        stress: (6 p, r) stress that it carries [Pa], see `StressRecovery`; None without recovery.
-        fixed: True for masses that no parameter scales.
-    """
-
-    region: str | None
-    integrals: InertiaIntegrals
-    K: Array
-    stress: Array | None = None
-    fixed: bool = False
+    region: str | None  # its name; None for all that no parameter names
+    integrals: InertiaIntegrals  # of its mass
+    K: Array  # (r, r) its stiffness [N/m]; with layers (3, 6 + r, 6 + r), see `Stretch`
+    stress: Array | None = None  # (6 p, r) that it carries [Pa], see `StressRecovery`; None without
+    fixed: bool = False  # True for masses that no parameter scales
 
 
 @typed

@@ -29,19 +29,13 @@ ROUND_OFF = 1e-12  # of the largest distance from the origin: no length outside 
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """Layers along one axis.
+    """Layers along one axis."""
 
-    Attributes:
-        axis: 0, 1 or 2.
-        regions: regions whose thickness is a parameter.
-        layers: per region, (low, high) of its layers along the axis [m].
-        rigid: (2 + number of regions, 6 + r, 6) rigid motions of the fields in the coordinates of
-            the family, see `fields`; empty until they are known.
-    """
-
-    axis: int
-    regions: tuple[str, ...]
-    layers: tuple[tuple[tuple[float, float], ...], ...]
+    axis: int  # 0, 1 or 2
+    regions: tuple[str, ...]  # regions whose thickness is a parameter
+    layers: tuple[tuple[tuple[float, float], ...], ...]  # per region (low, high) [m]
+    # (2 + number of regions, 6 + r, 6) rigid motions of the fields in the coordinates of the
+    # family, see `fields`; empty until they are known
     rigid: Array = field(default_factory=lambda: np.zeros((0, 0, 6)))
 
     def fields(self, points: Array) -> Array:
@@ -88,13 +82,9 @@ def stretched_body(
 ) -> FlexibleBody:
     """The body at some factors, with rigid interfaces, seen from its mean axes.
 
-    Args:
-        body: nominal points, shapes at the centre of the ranges.
-        stretch: the layers.
-        terms: per region the integrals over [fields, rigid motions at the centre, shapes], and
-            the stiffness (3, 6 + r, 6 + r) of rigid motions and shapes.
-        factors: of stiffness, mass and thickness per region.
-        weights: of the fields at this point and at the centre.
+    Terms are per region the integrals over [fields, rigid motions at the centre, shapes], and the
+    stiffness (3, 6 + r, 6 + r) of rigid motions and shapes; factors are those of stiffness, mass
+    and thickness per region, weights those of the fields at this point and at the centre.
     """
     (integrals, stiffness), (k, m, t), (w, at_centre) = terms, factors, weights
     n = w.size

@@ -27,8 +27,7 @@ class Parameter:
 
     Attributes:
         region: name of the region; None for the whole body, masses carried by interfaces excluded.
-        low: smallest factor [1].
-        high: largest factor [1].
+        low, high: smallest and largest factor [1].
 
     Raises:
         ParameterError: unless 0 < low <= high.
@@ -68,11 +67,7 @@ class Parameter:
 class YoungsModulus(Parameter):
     """Factor of Young's modulus, Poisson's ratio kept; of all moduli of an orthotropic solid.
 
-    Attributes:
-        region, low, high: see `Parameter`.
-
-    Raises:
-        ParameterError: as `Parameter`.
+    Region, range and errors are as of `Parameter`.
 
     Example:
         >>> rom.YoungsModulus("web", low=0.5, high=2.0).high
@@ -83,14 +78,7 @@ class YoungsModulus(Parameter):
 
 
 class Density(Parameter):
-    """Factor of the density.
-
-    Attributes:
-        region, low, high: see `Parameter`.
-
-    Raises:
-        ParameterError: as `Parameter`.
-    """
+    """Factor of the density; region, range and errors are as of `Parameter`."""
 
     __slots__ = ()
 

@@ -63,19 +63,12 @@ HELD_OUT = 3  # points of the certificate
 
 @dataclass(kw_only=True)
 class FamilyDraft(Draft):
-    """The reduction of a family under way; its model is that at the centre of the ranges.
+    """The reduction of a family under way; its model is that at the centre of the ranges."""
 
-    Attributes:
-        affine: the model at all points.
-        tol: error of frequencies that is accepted [1].
-        samples: points whose bases have joined.
-        n_trials: number of points at which errors were estimated as the basis grew.
-    """
-
-    affine: AffineModel
-    tol: float
-    samples: list[Point]
-    n_trials: int = 0
+    affine: AffineModel  # the model at all points
+    tol: float  # error of frequencies that is accepted [1]
+    samples: list[Point]  # points whose bases have joined
+    n_trials: int = 0  # number of points at which errors were estimated as the basis grew
 
 
 @typed
@@ -111,9 +104,6 @@ def reduce_parametric(  # noqa: PLR0913  one keyword per choice
         tol: relative error of the first frequencies that is accepted [1]; where the method alone
             has nearly as much at the centre, more points are no cure.
         certify: compare with full models at points that were not sampled.
-
-    Returns:
-        BodyFamily; ``family.at(name=factor)`` is a `FlexibleBody`.
 
     Raises:
         ParameterError: for a wrong parameter or an unknown region.
@@ -222,22 +212,13 @@ def join_bases(draft: FamilyDraft) -> None:
 
 @dataclass(frozen=True, slots=True)
 class CommonBasis:
-    """A basis that grows by the bases of further points.
+    """A basis that grows by the bases of further points."""
 
-    Attributes:
-        ops: operators at the first point, in interface coordinates.
-        basis: interface columns first.
-        n_b: number of interface coordinates.
-        weight: factor of M in the inner product K + weight M [rad^2/s^2].
-        small: size of what is dropped, of the shape it belongs to; errors of frequencies are its
-            square.
-    """
-
-    ops: Operators
-    basis: Basis
-    n_b: int
-    weight: float
-    small: float
+    ops: Operators  # operators at the first point, in interface coordinates
+    basis: Basis  # interface columns first
+    n_b: int  # number of interface coordinates
+    weight: float  # factor of M in the inner product K + weight M [rad^2/s^2]
+    small: float  # size of what is dropped, of its shape; errors of frequencies are its square
 
     def joined(self, other: Basis, boundary: Index) -> "CommonBasis":
         """With what is new of a basis at another point; dofs (n_b,) of the interface coordinates.

@@ -82,11 +82,8 @@ def contact_compliance(
 ) -> float:
     """E times the approach of two teeth per force and width [1]; line contact after Weber.
 
-    Args:
-        radii: (2,) of curvature [m].
-        depths: (2,) from the flanks to the axes of the teeth [m].
-        force: per length of contact line [N/m].
-        E: Young's modulus of both [Pa]; nu is 0.3.
+    Radii of curvature and depths from the flanks to the axes of the teeth are (2,) [m], the force
+    is per length of contact line [N/m], E is that of both [Pa]; nu is 0.3.
     """
     rho, h, nu = np.asarray(radii, dtype=float), np.asarray(depths, dtype=float), 0.3
     a2 = 8 * force * (1 - nu**2) * rho.prod() / rho.sum() / (np.pi * E)
@@ -97,9 +94,6 @@ def normal_section(pair: GearPair) -> GearPair:
     """Spur gears with the teeth that a helical pair has in the section normal to them.
 
     They have z / (cos^2 beta_b cos beta) teeth, which need not be a whole number.
-
-    Raises:
-        ModelError: for racks and internal gears, whose teeth these formulas are not for.
 
     Source:
         ISO 6336-1 and ISO 21771: virtual spur gears.
@@ -179,9 +173,9 @@ def stiffness_table(
 def bending_table(
     pair: GearPair, *, n: int = 41, E: float = 206e9, nu: float = 0.3, body: Body = "weber"
 ) -> tuple[Array, Hertz]:
-    """Stiffness of one pair without its contact, and the contact, which follows the load.
+    """(n,) stiffness [N/m^2] of one pair without its contact, and the contact, by the load.
 
-    For `rom.Mechanism.gear_mesh`, as ``stiffness`` and ``hertz``.
+    For `rom.Mechanism.gear_mesh`, as ``stiffness`` per length of contact line and ``hertz``.
 
     Args:
         pair: spur or helical gears.
@@ -189,9 +183,6 @@ def bending_table(
         E: Young's modulus [Pa].
         nu: Poisson's ratio of the contact; bending has 0.3.
         body: see `tooth_compliance`.
-
-    Returns:
-        (n,) stiffness per length of contact line [N/m^2], and the contact.
 
     Raises:
         ModelError: as `pair_stiffness`.

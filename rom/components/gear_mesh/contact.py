@@ -74,10 +74,8 @@ class Mesh:
     """Two wheels in mesh.
 
     Attributes:
-        pair: geometry.
         stiffness: of one pair of teeth per length of contact line [N/m^2]: a number, or (n,) values
             from first to last contact.
-        correction: of the flanks.
         damping: force per rate over force per deflection of a slice [s].
         cells: slices across the face.
 
@@ -110,9 +108,7 @@ class Mesh:
     def pair_stiffness(self, s: Array, path: tuple[float, float]) -> Array:
         """(n,) stiffness per length of contact line [N/m^2].
 
-        Args:
-            s: (n,) places of the contact on its path [m].
-            path: first and last place of it [m].
+        Places s (n,) of the contact lie on its path, from first to last [m].
         """
         k = np.atleast_1d(np.asarray(self.stiffness, dtype=float))
         if k.size == 1:
@@ -124,10 +120,8 @@ class Mesh:
     ) -> MeshForce:
         """Forces of the teeth on both wheels.
 
-        Args:
-            q: (12,) motions of the wheels from the datum [m, rad].
-            theta: angle the pinion has turned [rad].
-            rate: (12,) of the motions [m/s, rad/s]; without it nothing is damped.
+        Motions q (12,) of the wheels count from the datum [m, rad], theta is the angle that the
+        pinion has turned [rad]; without their rate (12,) [m/s, rad/s] nothing is damped.
 
         Raises:
             ModelError: if the wheels came so close that they have no common tangent.
@@ -193,10 +187,7 @@ class Mesh:
 def transmission_error(mesh: Mesh, torque: float, theta: npt.ArrayLike) -> Array:
     """(n,) loaded error along the line of action when nothing but the teeth gives way [m].
 
-    Args:
-        mesh: of the wheels.
-        torque: on the pinion [N m].
-        theta: (n,) angles of the pinion [rad].
+    The torque is on the pinion [N m], which stands at the angles theta (n,) [rad].
 
     Raises:
         ModelError: without a torque that closes the working flanks.

@@ -39,11 +39,7 @@ CORRECTION = Declared(
 
 
 def gear_pair(name: str, pair: Values) -> "GearPair | RackPair":
-    """The wheels, or pinion and rack, of the gear mesh of that name.
-
-    Raises:
-        ConfigError: for a rack with a profile shift.
-    """
+    """The wheels, or pinion and rack, of the gear mesh of that name."""
     from rom.components.gear_mesh.gears.geometry import GearPair
     from rom.components.gear_mesh.gears.racks import RackPair
 

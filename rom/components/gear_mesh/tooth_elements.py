@@ -53,8 +53,7 @@ class ToothModel:
     def compliance(self, radius: float) -> float:
         """E times the deflection of the axis along the line of action per force and width [1].
 
-        Args:
-            radius: of the load on the involute [m].
+        The load is on the involute, at this radius [m].
 
         Raises:
             ModelError: if the flank has no such radius.
@@ -110,12 +109,8 @@ def element_table(
     Teeth and bodies of finite elements, contact between them in closed form; helical teeth bend as
     those of their normal section.
 
-    Args:
-        pair: spur or helical gears.
-        force: normal force per length of contact line [N/m].
-        bore: see `tooth_model`.
-        n: number of values.
-        E: Young's modulus [Pa].
+    The normal force is per length of contact line [N/m], E is Young's modulus [Pa], and the bore as
+    of `tooth_model`.
 
     Raises:
         ModelError: if the bore leaves no body.

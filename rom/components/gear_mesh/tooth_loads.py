@@ -48,10 +48,6 @@ class ToothLoads:
 def tooth_loads(solution: Solution, name: str) -> tuple[ToothLoads, ...]:
     """The teeth of a mesh at each instant of a motion; of an equilibrium after `rom.mbs.snapshot`.
 
-    Args:
-        solution: the motion.
-        name: of the mesh.
-
     Raises:
         ConfigError: if there is no such mesh.
     """

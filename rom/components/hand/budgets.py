@@ -19,9 +19,7 @@ BENDING_SHARE = 0.75  # of the tensile strength, for static bending of music wir
 def mass_budget(mechanism: Mechanism, *, most: float) -> Report:
     """Masses of the parts of a moving hand, by fingers.
 
-    Args:
-        mechanism: of `rom.components.hand.moving_hand`.
-        most: that all of it may weigh [kg].
+    All of the mechanism of `rom.components.hand.moving_hand` may weigh ``most`` [kg].
     """
     parts = mechanism.parts.values()
     names = [key.removesuffix(" joint 1") for key in mechanism.joints if key.endswith(" joint 1")]

@@ -75,32 +75,20 @@ class Tendon:
     def tensions(self, shape: Shape, way: float = 1.0) -> Array:
         """(k - 1,) tension of the pieces over that at the first hole [1].
 
-        Args:
-            shape: of the rod.
-            way: 1 when the cable is pulled in, -1 when it is let out, 0 without friction [1].
+        The way is 1 when the cable is pulled in, -1 when it is let out, 0 without friction [1].
         """
         return np.exp(-way * self.friction * np.cumsum(self.turns(shape)[:-1]))
 
     def actuator(self, tension: float, way: float = 1.0) -> float:
-        """Force at the other end of the conduit [N].
-
-        Args:
-            tension: at the first hole [N].
-            way: 1 when the cable is pulled in, -1 when it is let out, 0 without friction [1].
-        """
+        """Force behind the conduit by that at the first hole [N]; the way is as of `tensions`."""
         return tension * float(np.exp(way * self.friction * self.conduit))
 
     def forces(self, rod: Rod, shape: Shape, way: float = 1.0) -> tuple[Array, Array]:
         """What a tension of 1 N at the first hole adds to forces out of balance and tangent.
 
-        Args:
-            rod: the rod.
-            shape: of it.
-            way: 1 when the cable is pulled in, -1 when it is let out, 0 without friction [1].
-
-        Returns:
-            (n,) gradient [1, m] and (n, n) tangent [1/m, 1, m] per newton, in the order of
-            `cosserat.linearised`; the tangent leaves out that friction changes with the shape.
+        Gradient (n,) [1, m] and tangent (n, n) [1/m, 1, m] per newton are in the order of
+        `cosserat.linearised`; the tangent leaves out that friction changes with the shape. The way
+        is as of `tensions`.
         """
         n = 6 * rod.h.size + 9
         r, K = np.zeros(n), np.zeros((n, n))

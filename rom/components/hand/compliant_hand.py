@@ -283,9 +283,7 @@ def _balance(
 def hand(friction: float = 0.0, n: int = 8) -> dict[str, Finger]:
     """Five fingers of three joints each; phalanges scale with the length of the finger.
 
-    Args:
-        friction: of the cables where they turn [1].
-        n: segments of a spring.
+    Friction is that of the cables where they turn [1]; a spring has n segments.
 
     Raises:
         ModelError: for numbers that no finger has.
@@ -318,11 +316,7 @@ class Bar:
     stiffness: float = 3e3
 
     def places(self, finger: Finger) -> tuple[Array, Array, Array]:
-        """Watched places of the finger.
-
-        Returns:
-            (k,) vertex, (k,) share of the way to the next one [1], and (k, 2) shares of both [1].
-        """
+        """Watched: (k,) vertex, (k,) share of the way to the next, (k, 2) shares of both [1]."""
         n = finger.rod.h.size
         links = [top for (_, _, top, _) in finger.joints if top < n]
         vertex = np.concatenate(

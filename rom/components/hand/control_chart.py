@@ -53,9 +53,7 @@ class Chart:
     def group(self, x: npt.ArrayLike, y: npt.ArrayLike) -> Index:
         """(...,) group that points of the square belong to, `NO_GROUP` for none; no memory.
 
-        Args:
-            x: (...,) flexor, 0 to 1 [1].
-            y: (...,) extensor, 0 to 1 [1].
+        Flexor x and extensor y (...,) go from 0 to 1 [1].
         """
         x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
         sector = np.minimum((np.arctan2(y, x) / (np.pi / 2) * len(GROUPS)).astype(int), 4)
@@ -69,10 +67,7 @@ class Chart:
     def follow(self, x: npt.ArrayLike, y: npt.ArrayLike, dt: float) -> "Commands":
         """Commands over time.
 
-        Args:
-            x: (n,) flexor, 0 to 1 [1].
-            y: (n,) extensor, 0 to 1 [1].
-            dt: between samples [s].
+        Flexor x and extensor y (n,) go from 0 to 1 [1]; samples are dt apart [s].
 
         Raises:
             ConfigError: if the signals differ in length, or dt is not positive.
@@ -131,32 +126,20 @@ class Commands:
 
 
 def muscle(activation: npt.ArrayLike, dt: float, rng: np.random.Generator) -> Array:
-    """A raw signal of a muscle, noise as strong as its activation.
+    """(n,) raw signal [1] of a muscle, noise as strong as its activation (n,), 0 to 1 [1].
 
-    Args:
-        activation: (n,) 0 to 1 [1].
-        dt: between samples [s].
-        rng: source of random numbers.
-
-    Returns:
-        (n,) signal [1].
+    Samples are dt apart [s].
     """
     activation = np.asarray(activation, dtype=float)
     return activation * rng.normal(size=activation.shape)
 
 
 def envelope(raw: npt.ArrayLike, dt: float, *, tau: float = 0.15) -> Array:
-    """Effort from a raw signal, 1 for white noise of unit strength.
+    """(n,) effort [1] from a raw signal, 1 for white noise of unit strength.
 
-    A band from 20 to 450 Hz, rectified, smoothed; normalised by the mean of what passes the band.
-
-    Args:
-        raw: (n,) signal, in units of its strength.
-        dt: between samples [s].
-        tau: time constant of the smoothing [s].
-
-    Returns:
-        (n,) effort, 0 to 1 [1].
+    A band from 20 to 450 Hz, rectified, smoothed with the time constant tau [s]; normalised by the
+    mean of what passes the band. The raw signal (n,) is in units of its strength, its samples are
+    dt apart [s].
 
     Raises:
         ConfigError: if samples are too far apart for the band.

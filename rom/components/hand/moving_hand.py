@@ -303,11 +303,7 @@ def deflections(
 ) -> Array:
     """(n, 3) way of the tip under forces (n,) [N] along a direction, from where it is without [m].
 
-    Args:
-        finger: the finger.
-        direction: (3,) of the force, world [1].
-        forces: (n,) [N].
-        tension: of the cable, held [N].
+    The direction (3,) is in the world [1]; the tension of the cable is held [N].
 
     Source:
         In three directions as Potratz and others measured, J. Biomech. Eng. 127 (2005) 934.

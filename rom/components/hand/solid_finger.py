@@ -30,14 +30,8 @@ ENDS = ("proximal", "distal")
 def heavy_spring(spring: HelicalSpring, n: int = 16, density: float = STEEL_DENSITY) -> Rod:
     """The spring as a rod with the mass of its wire; statics as of `spring_rod`.
 
-    Args:
-        spring: the spring.
-        n: segments.
-        density: of the wire [kg/m^3].
-
-    Returns:
-        Rod of mass m per length, with the inertia of a thin tube of the helix: m D^2/8 about both
-        axes across, m D^2/4 along.
+    The density is that of the wire [kg/m^3]; a mass m per length has the inertia of a thin tube of
+    the helix: m D^2/8 about both axes across, m D^2/4 along.
     """
     wire = np.hypot(np.pi * spring.diameter * spring.coils, spring.length)
     m = density * np.pi / 4 * spring.wire**2 * wire / spring.length
@@ -91,12 +85,8 @@ def solid_finger(
 def tip_compliance(mechanism: Mechanism, marker: Marker, state: State | None = None) -> Array:
     """(6, 6) motion of a marker per load on it, world axes [m/N, rad/N m].
 
-    Displacements, then rotations; forces, then moments.
-
-    Args:
-        mechanism: such as `solid_finger`.
-        marker: where the load acts and the motion is measured.
-        state: at rest; None for the equilibrium of the mechanism.
+    Displacements, then rotations; forces, then moments. The state is at rest; None for the
+    equilibrium of the mechanism.
     """
     around = linearize(mechanism, equilibrium(mechanism) if state is None else state)
     J = around.motion(marker)
@@ -106,9 +96,7 @@ def tip_compliance(mechanism: Mechanism, marker: Marker, state: State | None = N
 def link_compliance(solid: FlexibleBody, ends: tuple[str, str] = ENDS) -> Array:
     """(6, 6) motion of one marker per load on it, the other held, body axes [m/N, rad/N, rad/N/m].
 
-    Args:
-        solid: a ``FlexibleBody``.
-        ends: the marker that is held and the one that is loaded.
+    The first of both ends is held, the second one loaded.
     """
     held, loaded = (np.hstack(marker_motion(solid.marker(name), solid.n_modes)) for name in ends)
     K = solid.full_matrices()[1]
@@ -126,21 +114,12 @@ def parts_of_compliance(
     orientation: npt.ArrayLike | None = None,
     n: int = 16,
 ) -> tuple[Array, Array]:
-    """What springs and phalanges add to the compliance of the tip of a straight finger.
+    """(6, 6) compliance [m/N, rad/N m] of springs, and of phalanges, at a straight finger's tip.
 
     The compliance of parts in series is their sum, each moved to the tip: C = sum_j X_j C_j X_j^T,
     X_j = [1, -skew(s_j); 0, 1] with the way s_j from the end of the part to the tip.
 
-    Args:
-        bodies: a ``FlexibleBody`` per phalanx, from the palm outward.
-        springs: as many.
-        ends: markers of a phalanx towards the palm and towards the tip.
-        orientation: (3, 3) axes of the bodies to those of the finger [1]; None for the same.
-        n: segments of a spring.
-
-    Returns:
-        (6, 6) of the springs and (6, 6) of the phalanges, world axes, as of `tip_compliance` [m/N,
-        rad/N m].
+    Arguments are as of `solid_finger`, world axes as of `tip_compliance`.
 
     Raises:
         ModelError: if bodies and springs do not match.

@@ -32,16 +32,10 @@ class Motor:
     lag: float = 0.02
 
     def follow(self, pulls: npt.ArrayLike, dt: float) -> Array:
-        """Pull that the winch reaches.
+        """(n, k) pull [m] that the winch reaches, at rest at the first command.
 
         The speed is that of a first-order lag, cut off at the rate: s' = (command - s) / lag.
-
-        Args:
-            pulls: (n, k) commands [m].
-            dt: between samples [s].
-
-        Returns:
-            (n, k) [m], at rest at the first command.
+        Commands are (n, k) pulls [m] that are dt apart [s].
 
         Raises:
             ConfigError: for numbers that no motor has.
@@ -110,21 +104,14 @@ def shaft(
 def shaft_moment(solution: Solution, radii: Mapping[str, float]) -> Array:
     """(n_t,) moment with which a motor holds the shaft of drums, sum of radius times tension [N m].
 
-    Args:
-        solution: motion of a moving hand with drives of `shaft`.
-        radii: as there.
+    The motion is that of a moving hand with drives of `shaft` of these radii [m].
     """
     none = np.zeros(solution.t.size)
     return sum((r * motor_force(solution, name) for name, r in radii.items()), none)
 
 
 def motor_force(solution: Solution, name: str) -> Array:
-    """(n_t,) tension of a cable at its first end, where the motor is [N].
-
-    Args:
-        solution: motion of a moving hand.
-        name: of the finger, or of the joint, whose cable it is.
-    """
+    """(n_t,) tension of the cable of a finger, or a joint, at its first end, at the motor [N]."""
     first: Array = solution.element(f"{name} cable").force[:, 0]
     return np.linalg.norm(first, axis=1)
 

@@ -53,13 +53,10 @@ def short_eccentricity(sommerfeld: float) -> float:
 
 
 def short_coefficients(eccentricity: float) -> tuple[Array, Array]:
-    """Stiffness times c/W and damping times c speed/W of a short bearing.
+    """Stiffness times c/W and damping times c speed/W of a short bearing, (2, 2) [1] each.
 
-    Args:
-        eccentricity: between 0 and 1, in clearances [1].
-
-    Returns:
-        (2, 2), (2, 2) [1]; x along the load, y from it by 90 degrees in the direction of rotation.
+    X is along the load, y from it by 90 degrees in the direction of rotation; the eccentricity is
+    in clearances, between 0 and 1 [1].
 
     Raises:
         ModelError: if the eccentricity is not between 0 and 1.
@@ -78,16 +75,10 @@ def short_coefficients(eccentricity: float) -> tuple[Array, Array]:
 
 
 def short_force(position: npt.ArrayLike, rate: npt.ArrayLike) -> Array:
-    """Force of a short film on a journal in any motion.
+    """(2,) force of a short film on a journal in any motion, in units of viscosity speed R L^3/c^2.
 
-    Pressure fills the half of the circumference where the film closes.
-
-    Args:
-        position: (2,) of the journal in clearances [1].
-        rate: (2,) in clearances per radian of rotation [1].
-
-    Returns:
-        (2,) in units of viscosity speed R L^3/c^2.
+    Pressure fills the half of the circumference where the film closes. The position (2,) is in
+    clearances [1], its rate (2,) in clearances per radian of rotation [1].
     """
     (x, y), (dx, dy) = np.asarray(position, dtype=float), np.asarray(rate, dtype=float)
     end = np.arctan2(y + 2 * dx, x - 2 * dy)
@@ -101,9 +92,8 @@ def short_force(position: npt.ArrayLike, rate: npt.ArrayLike) -> Array:
 def long_pressure(theta: npt.ArrayLike, eccentricity: float) -> Array:
     """(n,) pressure of a long film over viscosity speed (R/c)^2 [1], zero at its largest gap.
 
-    Args:
-        theta: (n,) from the largest gap in the direction of rotation [rad].
-        eccentricity: between 0 and 1, in clearances [1].
+    Theta (n,) is the angle from the largest gap in the direction of rotation [rad], the
+    eccentricity in clearances, between 0 and 1 [1].
 
     Raises:
         ModelError: if the eccentricity is not between 0 and 1.
@@ -113,13 +103,9 @@ def long_pressure(theta: npt.ArrayLike, eccentricity: float) -> Array:
 
 
 def long_force(eccentricity: float) -> Array:
-    """(2,) half of Sommerfeld's film: force against the eccentricity and across it.
+    """(2,) half of Sommerfeld's film per length: force against the eccentricity and across it.
 
-    Args:
-        eccentricity: between 0 and 1, in clearances [1].
-
-    Returns:
-        (2,) per length, in units of viscosity speed R (R/c)^2.
+    The force is in units of viscosity speed R (R/c)^2, the eccentricity in clearances, 0 to 1 [1].
 
     Raises:
         ModelError: if the eccentricity is not between 0 and 1.

@@ -74,7 +74,6 @@ class Film:
     """Pressure in a film and what it does.
 
     Attributes:
-        bearing: where.
         motion, rate: (4,) of the journal [m, rad; per second].
         speed, viscosity: [rad/s], [Pa s].
         P: (nt, nz) pressure in units of viscosity speed (R/c)^2.
@@ -149,11 +148,7 @@ class Film:
         return size * self._drag(self.fill)
 
     def friction(self, streamers: bool = True) -> float:
-        """Friction over load times R/c [1].
-
-        Args:
-            streamers: of oil that are sheared where it cavitates, too.
-        """
+        """Friction over load times R/c [1]; with streamers also of the oil where it cavitates."""
         return self._drag(1.0 if streamers else self.fill) / float(np.hypot(*self.F[:2]))
 
     @property

@@ -18,15 +18,10 @@ from rom.names import check_known
 
 @typed
 def film_pressures(solution: Solution, name: str) -> Array:
-    """The pressure in a film at each instant; of an equilibrium after `rom.mbs.snapshot`.
+    """(n_t, nt, nz) pressure in a film [Pa]; of an equilibrium after `rom.mbs.snapshot`.
 
-    Args:
-        solution: the motion.
-        name: of the journal bearing.
-
-    Returns:
-        (n_t, nt, nz) in nt columns around the bush, the first one in the direction from which
-        angles count, and nz cells along its axis; of an aligned film half the width [Pa].
+    Of nt columns around the bush the first one is in the direction from which angles count; nz
+    cells are along its axis, of an aligned film half the width.
 
     Raises:
         ConfigError: if there is no such bearing, or its film is read from a table.
@@ -45,27 +40,17 @@ def film_pressures(solution: Solution, name: str) -> Array:
 
 @dataclass(frozen=True)
 class BearingRecord:
-    """One journal bearing over time.
+    """One journal bearing over time."""
 
-    Attributes:
-        t: (n_t,) times [s].
-        motion: (n_t, 4) of the journal in the bush: ex, ey [m], and tilts about X, Y [rad].
-        thinnest: (n_t,) smallest film [m].
-        pressure: (n_t,) largest pressure [Pa].
-        temperature: (n_t,) of the film [degrees Celsius]; NaN where its viscosity stays.
-        power: (n_t,) that turns into heat [W].
-        side_flow: (n_t,) oil that leaves at both ends [m^3/s].
-        bore: (nt, nz, m) functions in the cells by which an elastic bush opens its film, and
-            (n_t, m) how far [m]; None of a rigid one.
-    """
-
-    t: Array
-    motion: Array
-    thinnest: Array
-    pressure: Array
-    temperature: Array
-    power: Array
-    side_flow: Array
+    t: Array  # (n_t,) times [s]
+    motion: Array  # (n_t, 4) of the journal in the bush: ex, ey [m], and tilts about X, Y [rad]
+    thinnest: Array  # (n_t,) smallest film [m]
+    pressure: Array  # (n_t,) largest pressure [Pa]
+    temperature: Array  # (n_t,) of the film [degrees Celsius]; NaN where its viscosity stays
+    power: Array  # (n_t,) that turns into heat [W]
+    side_flow: Array  # (n_t,) oil that leaves at both ends [m^3/s]
+    # (nt, nz, m) functions in the cells by which an elastic bush opens its film, and (n_t, m) how
+    # far [m]; None of a rigid one
     bore: tuple[Array, Array] | None = None
 
     @property

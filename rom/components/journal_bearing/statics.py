@@ -102,8 +102,7 @@ class Stability:
 
     Attributes:
         stiffness: that the whirl feels [N/m].
-        whirl_ratio: frequency of the whirl at the threshold over the speed [1]; 0 if it never
-            whirls.
+        whirl_ratio: frequency of the whirl at the threshold over the speed [1]; 0 if there is none.
         critical_mass: per bearing, from which on the rotor whirls [kg]; inf if it never does.
     """
 
@@ -115,10 +114,7 @@ class Stability:
 def stability(stiffness: npt.ArrayLike, damping: npt.ArrayLike, speed: float) -> Stability:
     """Stability of a rigid rotor from the coefficients of its bearings, by Routh and Hurwitz.
 
-    Args:
-        stiffness: (2, 2) of one bearing [N/m].
-        damping: (2, 2) of it [N s/m].
-        speed: [rad/s].
+    Stiffness [N/m] and damping [N s/m] are (2, 2) of one bearing, at a speed of rotation [rad/s].
 
     Raises:
         ModelError: if the damping does not damp, so that no threshold exists.
@@ -148,10 +144,9 @@ def threshold_speed(film: Film) -> float:
 
 
 def coefficients(film: Film) -> tuple[Array, Array]:
-    """Stiffness times c/W and damping times c speed/W, x along the load, y by 90 degrees from it.
+    """Stiffness times c/W and damping times c speed/W, (2, 2) [1] each.
 
-    Returns:
-        (2, 2), (2, 2) [1].
+    X is along the load, y by 90 degrees from it.
     """
     W = -film.force[:2]
     size = np.hypot(*W)
@@ -230,12 +225,8 @@ def warm_bearing(
 ) -> JournalBearing:
     """The bearing with the clearance it has when bush and shaft are warm.
 
-    Args:
-        bearing: cold.
-        bush: how much warmer it is [K].
-        shaft: how much warmer it is [K].
-        expansion: coefficients of bush and shaft [1/K].
-        free: share of its expansion that the fit lets the bush have [1].
+    Bush and shaft are so much warmer [K] and expand with these coefficients [1/K], the bush by the
+    share [1] of its expansion for which its fit leaves it free.
 
     Raises:
         ModelError: if no clearance is left.

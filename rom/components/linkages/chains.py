@@ -45,15 +45,10 @@ class Link:
 
 @dataclass
 class Motion:
-    """Kinetic energy of a chain and velocity of its last pin, per unit of all n rates.
+    """Kinetic energy of a chain and velocity of its last pin, per unit of all n rates."""
 
-    Attributes:
-        A: (N, n, n) inertia of the links added so far.
-        pin: (N, 2, n) velocity of the last pin.
-    """
-
-    A: Array
-    pin: Array
+    A: Array  # (N, n, n) inertia of the links added so far
+    pin: Array  # (N, 2, n) velocity of the last pin
 
     @classmethod
     def at_rest(cls, N: int, n: int) -> "Motion":
@@ -105,9 +100,6 @@ def as_elastic(links: tuple[Link, ...], elastic: Elastic) -> tuple[Link, ...]:
     """The links with their elastic coordinates, or without if these are held.
 
     At a frequency w elastic forces -K q = K q'' / w^2 are those of a mass -K / w^2.
-
-    Raises:
-        ConfigError: for another word than "held" or "free", or a frequency that is not positive.
     """
     if isinstance(elastic, int | float):
         positive("elastic [rad/s]", elastic)

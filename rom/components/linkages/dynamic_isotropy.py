@@ -7,8 +7,6 @@ the torus of both angles its level curves are closed, within strokes some go fro
 Around an isolated isotropic point the vector ((a11 - a22) / 2, a12) winds once, to the left or to
 the right, and on the torus these windings add up to zero.
 
-`rom.components.linkages.two_dof_linkages` has inertias to begin with.
-
 Source:
     After Di Gregorio, Cammarata and Sinatra on the dynamic isotropy of two-dof mechanisms; their
     index was not available, the one here has the same loci as the ratio of the eigenvalues.
@@ -78,12 +76,8 @@ def derivatives(function: Inertia, q: Array) -> Array:
 def angle_grid(n: Cells, ranges: Ranges = TURNS) -> tuple[Array, Array]:
     """(n, n), (n, n) coordinates of both drives [rad or m], the first along the rows.
 
-    Args:
-        n: of nodes along each; a turn ends one node before it repeats, a range at both its ends.
-        ranges: (low, high) of each coordinate [rad or m]; None for an angle that makes whole turns.
-
-    Raises:
-        ConfigError: for less than four nodes, or ranges that cannot be.
+    There are n nodes along each; a turn ends one node before it repeats, a range at both its ends.
+    Ranges are (low, high) of each coordinate [rad or m]; None for an angle that makes whole turns.
     """
     at = (
         2 * np.pi * np.arange(n) / n if r is None else np.linspace(*r, n) for r in checked(ranges)
@@ -138,8 +132,8 @@ def index_map(
             everywhere.
 
     Raises:
-        ConfigError, ModelError: for less than four nodes, or ranges and lengths that cannot be; if
-            it can be assembled nowhere, or the function returns no inertia.
+        ConfigError, ModelError: for ranges that cannot be; if it can be assembled nowhere, or the
+            function returns no inertia.
     """
     q1, q2 = angle_grid(n, ranges)
     there, index = _there(assembles, q1, q2, n), np.zeros((n, n))
@@ -174,8 +168,7 @@ def isotropic_configurations(
             the windings of a part need not add up to zero.
 
     Raises:
-        ConfigError, ModelError: for a grid of less than four cells; if the mechanism can be
-            assembled nowhere, or the function returns no inertia.
+        ModelError: if the mechanism can be assembled nowhere, or the function returns no inertia.
         SolverError: if the windings of isolated points do not add up to zero: some were missed.
     """
     q1, q2 = angle_grid(n)
@@ -287,16 +280,14 @@ def closed_loci(index: Array, level: float, ranges: Ranges = TURNS) -> list[Arra
     Args:
         index: (n, n) values on `angle_grid`, in units of the field.
         level: the value, in units of the field.
-        ranges: (low, high) of each coordinate, as of that grid [rad or m]; None for an angle that
-            makes whole turns.
+        ranges: (low, high) of each coordinate, as of that grid [rad or m]; None for whole turns.
 
     Returns:
         (k, 2) coordinates of each curve [rad or m], continuous; the last point of a closed one is
         the first one, moved by whole turns if the curve goes around the torus.
 
     Raises:
-        ConfigError: if the field is not that of a square grid, or has gaps; for ranges that cannot
-            be.
+        ConfigError: if the field is no square grid or has gaps; for ranges that cannot be.
     """
     square = np.ndim(index) == 2 and np.shape(index)[0] == np.shape(index)[1] > 1
     if not square or not np.isfinite(index).all():

@@ -40,7 +40,7 @@ class CrossSlides:
         motors: what rotors add to either coordinate, J / radius^2 [kg].
 
     Raises:
-        ModelError: for a mass that is negative, a second slide without mass, or parallel guides.
+        ModelError: for parallel guides.
     """
 
     masses: tuple[Mass, MovedMass]
@@ -75,9 +75,6 @@ class PolarArm:
         spin: inertia of the slide about its own mass centre [kg m^2].
         offset: distance of that centre from the line through the pivot along the guide [m].
         motor: what the rotor of the slide adds to its mass, if it does not turn with it [kg].
-
-    Raises:
-        ModelError: for a slide without mass, or a mass or inertia that is negative.
     """
 
     guide: Inertia
@@ -89,9 +86,7 @@ class PolarArm:
     def inertia(self, q1: npt.ArrayLike, q2: npt.ArrayLike) -> Array:
         """(..., 2, 2) generalised inertia [kg m^2, kg m, kg].
 
-        Args:
-            q1: (...,) angle of the guide [rad].
-            q2: (...,) displacement of the slide from the pivot [m].
+        Coordinates are the angle of the guide (...,) [rad] and the way of the slide (...,) [m].
         """
         _, s = both(q1, q2)
         A = np.empty((*s.shape, 2, 2))
@@ -123,9 +118,6 @@ class SlideArm(Linkage):
         slide: mass of the slide [kg].
         link: the link.
         payload: point mass at its end [kg].
-
-    Raises:
-        ModelError: for a mass that is negative.
     """
 
     slide: Mass
@@ -165,7 +157,7 @@ class SlideFiveBar(ClosedLinkage):
         side: 1 for the tip to the left of the line from the left to the right slide, -1 for right.
 
     Raises:
-        ModelError: for a mass that is negative, or an unknown side.
+        ModelError: for an unknown side.
     """
 
     rails: tuple[tuple[float, float, float], tuple[float, float, float]]

@@ -52,9 +52,6 @@ def rigid_link(mass: MovedMass, length: Size, centre: Centre, inertia: Inertia) 
         length: distance of the pins [m].
         centre: (2,) mass centre from the first pin, along and across [m].
         inertia: about the mass centre [kg m^2].
-
-    Raises:
-        ModelError: if a number is not that of a real link.
     """
     x, y = np.asarray(centre, dtype=float)
     J = inertia + mass * (x * x + y * y)
@@ -64,11 +61,7 @@ def rigid_link(mass: MovedMass, length: Size, centre: Centre, inertia: Inertia) 
 
 @typed
 def rod(mass: MovedMass, length: Size) -> Link:
-    """A uniform slender rod of that mass [kg] and length [m].
-
-    Raises:
-        ModelError: for a mass or a length that is not positive.
-    """
+    """A uniform slender rod of that mass [kg] and length [m]."""
     return rigid_link(mass, length, (length / 2, 0.0), mass * length**2 / 12)
 
 
@@ -116,9 +109,6 @@ class TwoLink(Linkage):
         payload: mass at the tip [kg].
         relative: the second coordinate is the angle of the second link against the first one
             (motor on the elbow) and not against the ground.
-
-    Raises:
-        ModelError: for a payload that is negative.
     """
 
     first: Link
@@ -158,7 +148,7 @@ class FiveBar(ClosedLinkage):
         side: 1 for the tip to the left of the line from the left to the right elbow, -1 for right.
 
     Raises:
-        ModelError: for a payload or a base that is negative, or an unknown side.
+        ModelError: for an unknown side.
     """
 
     base: Annotated[float, Quantity("m", low=0.0, ends="[)", error=ModelError)]
@@ -172,14 +162,9 @@ class FiveBar(ClosedLinkage):
         return self.cranks + self.couplers
 
     def posture(self, q1: npt.ArrayLike, q2: npt.ArrayLike) -> Array:
-        """Where the joints are at angles of the cranks.
+        """(..., 5, 2) left pivot, left elbow, tip, right elbow, right pivot [m].
 
-        Args:
-            q1: (...,) angle of the left crank against the base [rad].
-            q2: (...,) angle of the right one, of the same shape [rad].
-
-        Returns:
-            (..., 5, 2) left pivot, left elbow, tip, right elbow, right pivot [m].
+        Coordinates (...,) are angles of the left and the right crank against the base [rad].
 
         Raises:
             ModelError: if the couplers cannot reach each other at some angles.

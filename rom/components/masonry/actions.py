@@ -48,7 +48,6 @@ class PointLoad:
         at: (2,) point in or on it, where it lies at the start [m].
         force: (2,) [N].
         history: factor of the force.
-        name: for messages.
     """
 
     stone: int
@@ -82,7 +81,6 @@ class MovingLoad:
         force: (2,) [N].
         speed: along x [m/s].
         start: x at t = 0 [m].
-        name: for messages.
     """
 
     force: tuple[float, float]
@@ -127,7 +125,6 @@ class Wind:
     Attributes:
         pressure: [Pa], negative for suction.
         edges: stone, and number of the edge from that corner to the next; `facing` finds them.
-        name: for messages.
     """
 
     pressure: History
@@ -169,7 +166,6 @@ class SupportMotion:
         shift: (2,) in the end [m].
         turn: about their mass centres in the end [rad].
         history: share of both, which begins with 0.
-        name: for messages.
     """
 
     stones: tuple[int, ...]
@@ -207,7 +203,6 @@ class BaseMotion:
     Attributes:
         acceleration: [m/s^2], harmonic, a pulse or recorded.
         direction: (2,) that it is multiplied with [1].
-        name: for messages.
     """
 
     acceleration: History
@@ -230,13 +225,9 @@ Action = PointLoad | MovingLoad | Wind | SupportMotion | BaseMotion
 
 @typed
 def facing(masonry: Masonry, direction: tuple[float, float]) -> tuple[tuple[int, int], ...]:
-    """Edges of free stones that wind of a direction meets first.
+    """Edges of free stones that wind meets first which blows in a direction (2,) [1].
 
     An edge counts if it is turned against the wind and nothing lies before its middle.
-
-    Args:
-        masonry: the stones.
-        direction: (2,) the wind blows in [1].
 
     Raises:
         ConfigError: if the direction is none.
@@ -265,12 +256,7 @@ def facing(masonry: Masonry, direction: tuple[float, float]) -> tuple[tuple[int,
 
 
 def driver(masonry: Masonry, actions: Sequence[Action]) -> Callable[[Array], Drive]:
-    """What acts in the steps between times (n + 1,).
-
-    Raises:
-        ConfigError: if an action cannot be, or two move the same support; while it runs, if a
-            support jumps in one step.
-    """
+    """What acts in the steps between times (n + 1,); a support that jumps in one is refused."""
     moved = [s for a in actions if isinstance(a, SupportMotion) for s in a.stones]
     if twice := sorted({s for s in moved if moved.count(s) > 1}):
         raise ConfigError(f"supports {twice} are moved by two actions; only one may move each.")

@@ -19,43 +19,25 @@ EDGE_OVERHANG_RTOL = 1e-4
 
 
 class Blocks(NamedTuple):
-    """What does not change; R is the largest number of shapes.
+    """What does not change; R is the largest number of shapes."""
 
-    Attributes:
-        first: (B + 1,) first corner of each block.
-        corner: (V, 2) corners from the mass centre in body axes, counterclockwise [m].
-        shape: (V, 2, R) displacement of the corners per elastic coordinate, body axes.
-        size: (B,) number of coordinates, 3 + r.
-        equation: (B,) number of the first equation; -1 for a block that is held.
-        M: (B, 3 + R, 3 + R) mass.
-        K: (B, 3 + R, 3 + R) stiffness, zero for the frame.
-        load: (B, 3 + R) constant load [N].
-    """
-
-    first: Index
-    corner: Array
-    shape: Array
-    size: Index
-    equation: Index
-    M: Array
-    K: Array
-    load: Array
+    first: Index  # (B + 1,) first corner of each block
+    corner: Array  # (V, 2) corners from the mass centre in body axes, counterclockwise [m]
+    shape: Array  # (V, 2, R) displacement of the corners per elastic coordinate, body axes
+    size: Index  # (B,) number of coordinates, 3 + r
+    equation: Index  # (B,) number of the first equation; -1 for a block that is held
+    M: Array  # (B, 3 + R, 3 + R) mass
+    K: Array  # (B, 3 + R, 3 + R) stiffness, zero for the frame
+    load: Array  # (B, 3 + R) constant load [N]
 
 
 class Bonds(NamedTuple):
-    """Corners glued to edges.
+    """Corners glued to edges."""
 
-    Attributes:
-        who: (n, 5) as in `Contacts`.
-        pull: (n,) tension they bear [N].
-        cohesion: (n,) shear they bear without pressure [N].
-        intact: (n,) 1 until they break.
-    """
-
-    who: Index
-    pull: Array
-    cohesion: Array
-    intact: Index
+    who: Index  # (n, 5) as in `Contacts`
+    pull: Array  # (n,) tension they bear [N]
+    cohesion: Array  # (n,) shear they bear without pressure [N]
+    intact: Index  # (n,) 1 until they break
 
 
 class Law(NamedTuple):
@@ -74,39 +56,23 @@ class Law(NamedTuple):
 
 
 class Contacts(NamedTuple):
-    """Corners that are near edges, bonds first, then block by block; ``used[0]`` rows are in use.
+    """Corners that are near edges, bonds first, then block by block."""
 
-    Attributes:
-        used: (1,) how many.
-        who: (C, 5) block and corner, block and both corners of the edge.
-        state: (C,) OPEN, SLIDES or STICKS.
-        anchor: (C,) place on the edge, 0 to 1, that the corner sticks to.
-        way: (C,) direction of slip along the edge, -1 or 1.
-        gap, slip: (C,) distance from the edge, and from the anchor along it [m].
-        force: (C,) normal force [N].
-        friction: (C,) coefficient of friction.
-        bond: (C,) number of the bond; -1 for none.
-        along: (C, 4) place of the corner on the edge, 0 to 1, normal and length of the edge.
-        n, t: (C, 2, 3 + R) gap and slip per coordinate of both blocks.
-        first: (B + 1,) first contact, after the bonds, of the corners of each block.
-        box: (B, 2, 2) smallest and largest x and y of each block [m].
-    """
-
-    used: Index
-    who: Index
-    state: Index
-    anchor: Array
-    way: Array
-    gap: Array
-    slip: Array
-    force: Array
-    friction: Array
-    bond: Index
-    along: Array
-    n: Array
-    t: Array
-    first: Index
-    box: Array
+    used: Index  # (1,) how many rows are in use
+    who: Index  # (C, 5) block and corner, block and both corners of the edge
+    state: Index  # (C,) OPEN, SLIDES or STICKS
+    anchor: Array  # (C,) place on the edge, 0 to 1, that the corner sticks to
+    way: Array  # (C,) direction of slip along the edge, -1 or 1
+    gap: Array  # (C,) distance from the edge [m]
+    slip: Array  # (C,) distance from the anchor along the edge [m]
+    force: Array  # (C,) normal force [N]
+    friction: Array  # (C,) coefficient of friction
+    bond: Index  # (C,) number of the bond; -1 for none
+    along: Array  # (C, 4) place of the corner on the edge, 0 to 1, normal and length of the edge
+    n: Array  # (C, 2, 3 + R) gap per coordinate of both blocks
+    t: Array  # (C, 2, 3 + R) slip likewise
+    first: Index  # (B + 1,) first contact, after the bonds, of the corners of each block
+    box: Array  # (B, 2, 2) smallest and largest x and y of each block [m]
 
 
 def contacts(capacity: int, m: int, n_blocks: int) -> Contacts:

@@ -26,25 +26,15 @@ STEP_FACTOR, MIN_STEP_RATIO = 3.0, 3.0**-8
 
 
 class Drive(NamedTuple):
-    """What acts from outside in each of n steps, besides weight.
+    """What acts from outside in each of n steps, besides weight."""
 
-    Attributes:
-        block: (n, L) block each force acts on; -1 for none.
-        corner: (n, L, 3) corners of it that the point of action lies between.
-        share: (n, L, 3) their shares in it.
-        force: (n, L, 2) [N].
-        turns: (L,) 1 where the force turns with the block.
-        ground: (n, 2) acceleration of the frame of reference [m/s^2].
-        moved: (n, B, 3) by how much held blocks are moved [m, m, rad].
-    """
-
-    block: Index
-    corner: Index
-    share: Array
-    force: Array
-    turns: Index
-    ground: Array
-    moved: Array
+    block: Index  # (n, L) block each force acts on; -1 for none
+    corner: Index  # (n, L, 3) corners of it that the point of action lies between
+    share: Array  # (n, L, 3) their shares in it
+    force: Array  # (n, L, 2) [N]
+    turns: Index  # (L,) 1 where the force turns with the block
+    ground: Array  # (n, 2) acceleration of the frame of reference [m/s^2]
+    moved: Array  # (n, B, 3) by how much held blocks are moved [m, m, rad]
 
 
 class Work(NamedTuple):

@@ -38,9 +38,6 @@ class Joint:
         cohesion: shear stress borne without pressure, until it slips [Pa].
         tension: tensile strength, until it opens [Pa].
         between: pairs of stones; None for all joints.
-
-    Raises:
-        ConfigError: for numbers below zero.
     """
 
     friction: Annotated[float, NotNegative()]
@@ -109,11 +106,7 @@ def _count(value: object) -> int:
 
 
 def friction_of_pairs(joints: Sequence[Joint], friction: float, n: int) -> Array:
-    """(n, n) coefficients of friction of pairs of stones.
-
-    Raises:
-        ConfigError: if a law is for a stone that does not exist.
-    """
+    """(n, n) coefficients of friction of pairs of stones."""
     found = np.full((n, n), float(friction))
     for joint in joints:
         found[_pairs(joint, n)] = joint.friction
@@ -124,9 +117,6 @@ def bonds(joints: Sequence[Joint], C: Contacts, corners: Array, n: int, reach: f
     """What glues n stones that touch: strengths times the length that falls to each contact.
 
     The last law that fits a pair counts; corners (V, 2) are places that watch within reach [m].
-
-    Raises:
-        ConfigError: if a law glues stones that do not touch.
     """
     strength = np.zeros((n, n, 2))
     for joint in joints:

@@ -1,10 +1,8 @@
 """Could it stand? Arches and walls of rigid stones that take no tension, by statics alone.
 
 If any forces in the joints balance the weight, press and stay within friction, dry masonry stands
-(the lower bound theorem; with friction it is exact for joints that dilate as they slip).
-`arch` and `wall` lay the stones, `stands` looks for such forces by linear programming and
-`load_factor` for the largest load,
-`minimum_thickness` is the closed form for circular arches of infinitely many voussoirs.
+(the lower bound theorem; with friction it is exact for joints that dilate as they slip). Linear
+programming looks for them.
 
 Source:
     Heyman, The stone skeleton, Int. J. Solids Struct. 2 (1966) 249; by linear programming:
@@ -50,11 +48,9 @@ class Rock:
     contact: float = 20.0
 
     def stone(self, outline: Array, solid: Array | None = None) -> Stone:
-        """A stone of unit depth.
+        """A stone of unit depth within an outline (k, 2), counterclockwise [m].
 
-        Args:
-            outline: (k, 2) corners, counterclockwise [m].
-            solid: (m, 2) polygon the mass comes from [m], if finer than the outline.
+        Its mass comes from the polygon ``solid`` (m, 2) [m], if finer than the outline.
 
         Raises:
             MaterialError, ModelError: as `stone`.
@@ -178,10 +174,7 @@ def stands(masonry: Masonry, loads: Sequence[Load] = (), *, t: float = 0.0) -> b
     Normal forces at the corners press, or pull no more than glue bears, tangential ones stay within
     friction and cohesion, and every stone that is not held is in equilibrium.
 
-    Args:
-        masonry: the stones.
-        loads: what acts besides weight.
-        t: time of the loads [s].
+    Loads are what acts besides weight, at a time t [s].
 
     Raises:
         ConfigError: if a load cannot be.
@@ -195,15 +188,9 @@ def stands(masonry: Masonry, loads: Sequence[Load] = (), *, t: float = 0.0) -> b
 
 @typed
 def load_factor(masonry: Masonry, loads: Sequence[Load], *, t: float = 0.0) -> float:
-    """By how much loads may be multiplied until rigid stones, under their weight too, give way.
+    """Largest factor [1] of loads that rigid stones bear, under their weight too; infinite if any.
 
-    Args:
-        masonry: the stones.
-        loads: what is multiplied; of a motion of the ground, its inertia.
-        t: time of the loads [s].
-
-    Returns:
-        The largest factor [1]; infinite if the stones bear any.
+    Loads are taken at a time t [s]; of a motion of the ground its inertia is multiplied.
 
     Raises:
         ConfigError: if a load cannot be; if the stones do not even bear their weight.

@@ -1,9 +1,7 @@
 """Dry masonry: arches and walls of stones that press, rock and slip on each other.
 
 A stone is a polygon with a frame and elastic shapes: three uniform strains, as in discontinuous
-deformation analysis, or the modes of a reduced body. `rom.components.masonry.motion` moves an
-assembly of stones, `rom.components.masonry.limits` lays arches and walls, and asks statics what
-they could carry.
+deformation analysis, or the modes of a reduced body.
 
 Source:
     After Shi's discontinuous deformation analysis (1988) and its use for masonry by Bagi.
@@ -81,7 +79,6 @@ def stone(
         solid: (m, 2) polygon the mass comes from [m], if finer than the outline.
 
     Raises:
-        ConfigError, MaterialError: for an unknown state; if no stone has these numbers.
         ModelError: if the outline does not enclose an area counterclockwise.
     """
     corners = _corners(outline)
@@ -131,9 +128,8 @@ def polygon_moments(x: Array) -> tuple[float, Array, Array]:
 def reduced_stone(body: FlexibleBody, outline: npt.ArrayLike) -> Stone:
     """A reduced body as a stone in the plane of its x and y axes.
 
-    Args:
-        body: the body with its surface, symmetric about the plane.
-        outline: (k, 2) corners, counterclockwise, where its surface has nodes [m].
+    The body has its surface, symmetric about the plane, with nodes at the corners of the outline
+    (k, 2), counterclockwise [m].
 
     Raises:
         ModelError: if the outline is not one, or has a corner without a node.

@@ -41,20 +41,13 @@ NEAR_RTOL = 0.9  # least cosine between free motions of neighbours
 
 @dataclass(frozen=True)
 class Tangent:
-    """Derivatives of the coordinates of start and end by what was varied.
+    """Derivatives of the coordinates of start and end by what was varied."""
 
-    Attributes:
-        around: the motion.
-        B, E: (f, f) of starts and of ends.
-        own: whether they are those of this motion, not of others nearby.
-        carried: whether they came with the steps.
-    """
-
-    around: Return
-    B: Array
-    E: Array
-    own: bool = True
-    carried: bool = False
+    around: Return  # the motion
+    B: Array  # (f, f) of starts
+    E: Array  # (f, f) of ends
+    own: bool = True  # whether they are those of this motion, not of others nearby
+    carried: bool = False  # whether they came with the steps
 
     def of(self, found: Return) -> bool:
         """Whether they are those of this motion."""
@@ -128,20 +121,14 @@ class Tangent:
 
 @dataclass(frozen=True)
 class Derivatives:
-    """Those of a motion, with which motions nearby are looked for.
+    """Those of a motion, with which motions nearby are looked for."""
 
-    Attributes:
-        Zq, Zv: (n, f_q), (n, f_v) free motions and velocities.
-        B, E: (f, f) derivatives of starts and of ends.
-        ahead, later: (n,) as a `Start` has them.
-    """
-
-    Zq: Array
-    Zv: Array
-    B: Array
-    E: Array
-    ahead: Array
-    later: Array
+    Zq: Array  # (n, f_q) free motions
+    Zv: Array  # (n, f_v) free velocities
+    B: Array  # (f, f) derivatives of starts
+    E: Array  # (f, f) of ends
+    ahead: Array  # (n,) as a `Start` has it
+    later: Array  # (n,) likewise
 
     def ready(self, start: Start) -> Start:
         """A start with what the method had there."""
@@ -218,11 +205,7 @@ def varied(found: Return, y: Array, d: float) -> tuple[Array, Array]:
 
 
 def by_steps(found: Return) -> Tangent:
-    """All columns at once, by the tangents of the steps.
-
-    Raises:
-        SolverError: if a step fails.
-    """
+    """All columns at once, by the tangents of the steps."""
     chart, flow, columns, d = found.chart, found.flow, [], PROBE_RTOL
     for e in np.eye(chart.size):
         one, two = (chart.moved(x).state for x in (d * e, -d * e))

@@ -34,17 +34,11 @@ MAX_POINTS = 100_000
 
 @dataclass(frozen=True)
 class Critical:
-    """An equilibrium at which a stiffness vanishes.
+    """An equilibrium at which a stiffness vanishes."""
 
-    Attributes:
-        kind: "limit", where the parameter turns back; "bifurcation", where another path crosses.
-        state: the equilibrium, at its time.
-        motion: (n,) the motion without stiffness, counted as in `State.v`; its largest part is one.
-    """
-
-    kind: str
-    state: State
-    motion: Array
+    kind: str  # "limit", where the parameter turns back; "bifurcation", where another path crosses
+    state: State  # the equilibrium, at its time
+    motion: Array  # (n,) without stiffness, counted as in `State.v`; its largest part is one
 
 
 @typed
@@ -108,11 +102,8 @@ def continuation(
         state: where the first equilibrium is searched; with ``along`` the one the branch leaves.
         along: (n,) motion in which a branch leaves a bifurcation: ``path.critical[0].motion``, or
             the opposite.
-        n: largest number of points.
+        n: largest number of points; with so many the path may end inside the span.
         step: longest step, in lengths of the mechanism, rad, and spans.
-
-    Returns:
-        The path; with n points it may end inside the span.
 
     Raises:
         ConfigError: for a wrong argument.
@@ -154,17 +145,11 @@ def continuation(
 
 @dataclass(frozen=True)
 class _Equilibria:
-    """Balance of a mechanism at rest over time, as `arc_length` asks for it.
+    """Balance of a mechanism at rest over time, as `arc_length` asks for it."""
 
-    Attributes:
-        now: the mechanism.
-        weight: (n,) of the coordinates, one for a mechanism that moves by its length or by a rad.
-        span: time that counts like that [s].
-    """
-
-    now: Instant
-    weight: Array
-    span: float
+    now: Instant  # the mechanism
+    weight: Array  # (n,) of coordinates, one for a mechanism that moves by its length or by a rad
+    span: float  # time that counts like that [s]
 
     @classmethod
     def of(cls, now: Instant, span: float) -> "_Equilibria":
@@ -232,19 +217,12 @@ class _Equilibria:
 
 @dataclass(frozen=True)
 class _Curvatures:
-    """Stiffness of free motions.
+    """Stiffness of free motions."""
 
-    Attributes:
-        negative: number of motions that fall away.
-        below: number of motions of less stiffness than those known.
-        squares: (f,) stiffness [1/s^2], ascending.
-        motions: (n, f) of unit mass.
-    """
-
-    negative: int
-    below: int
-    squares: Array
-    motions: Array
+    negative: int  # number of motions that fall away
+    below: int  # number of motions of less stiffness than those known
+    squares: Array  # (f,) stiffness [1/s^2], ascending
+    motions: Array  # (n, f) of unit mass
 
     def of(self, k: int) -> float:
         """Stiffness of the motion that has k softer ones."""

@@ -42,31 +42,22 @@ class Family:
     """Motions over a parameter, as `arc_length` asks for them.
 
     Steps are motions and changes of velocities, in rad or lengths of the mechanism and per radian
-    of the period, and the relative change of the period.
-
-    Attributes:
-        build, period, turns, steps, rho_inf: as the user has them.
-        first: the first motion.
-        span: change of the parameter that counts as one.
-        scale: (n,) motion of each coordinate that counts as one.
-        advance: (n,) by how much bodies advance in a period.
-        unit: size of the motion, in which steps are measured.
-        tangent, by_p: derivatives of the last motion that was differentiated, by its coordinates
-            and by the parameter.
+    of the period, and the relative change of the period. Build, period, turns, steps and rho_inf
+    are as the user has them.
     """
 
     build: Callable[[float], Mechanism]
     period: Period
-    first: PeriodicMotion
+    first: PeriodicMotion  # the first motion
     turns: Mapping[str, float | None] | None
     steps: int
     rho_inf: float
-    span: float
-    scale: Array
-    advance: Array
-    unit: float = 1.0
-    tangent: Tangent | None = None
-    by_p: Array = field(default_factory=lambda: np.zeros(0))
+    span: float  # change of the parameter that counts as one
+    scale: Array  # (n,) motion of each coordinate that counts as one
+    advance: Array  # (n,) by how much bodies advance in a period
+    unit: float = 1.0  # size of the motion, in which steps are measured
+    tangent: Tangent | None = None  # derivatives of the last differentiated motion, by coordinates
+    by_p: Array = field(default_factory=lambda: np.zeros(0))  # and by the parameter
     gap: float = np.inf
     last: Return | None = None
     flows: dict[float, Flow] = field(default_factory=dict)

@@ -47,17 +47,11 @@ LAWS_OWNER = "laws"  # owner of the only numbers that elements remember and that
 
 @dataclass(frozen=True)
 class Start:
-    """A state with what the method has beside it after many steps.
+    """A state with what the method has beside it after many steps."""
 
-    Attributes:
-        state: coordinates, velocities and accelerations that belong together.
-        ahead: (n,) velocities of the method minus those that fit the constraints.
-        later: (n,) its acceleration-like variable minus the accelerations.
-    """
-
-    state: State
-    ahead: Array
-    later: Array
+    state: State  # coordinates, velocities and accelerations that belong together
+    ahead: Array  # (n,) velocities of the method minus those that fit the constraints
+    later: Array  # (n,) its acceleration-like variable minus the accelerations
 
 
 class Flow:
@@ -244,19 +238,13 @@ class Flow:
 
 @dataclass
 class Beside:
-    """Changes of the state of the method, columns.
+    """Changes of the state of the method, columns."""
 
-    Attributes:
-        now: the equations.
-        q, v, vd, a: (n, f) of positions, as motions of the bodies, of velocities, accelerations,
-            and the acceleration-like variable.
-    """
-
-    now: Instant
-    q: Array
-    v: Array
-    vd: Array
-    a: Array
+    now: Instant  # the equations
+    q: Array  # (n, f) of positions, as motions of the bodies
+    v: Array  # (n, f) of velocities
+    vd: Array  # (n, f) of accelerations
+    a: Array  # (n, f) of the acceleration-like variable
 
     def follow(self, step: Step, base: Array, signal: Array) -> None:
         """Go through a step that was taken, from what was remembered (c,) to drives at its end."""

@@ -52,24 +52,17 @@ Time = Annotated[float, Positive("s")]
 
 @dataclass(frozen=True)
 class Shooting:
-    """How a motion is looked for.
-
-    Attributes:
-        mechanism, turns, steps, rho_inf, tolerance, progress: as the user has them.
-        period: None where it is unknown.
-        t0: time of the start [s].
-        energy: that the motion shall have; None where it is not free [J].
-    """
+    """How a motion is looked for, much of it as the user has it."""
 
     mechanism: Mechanism
-    period: float | None
-    t0: float
+    period: float | None  # None where it is unknown
+    t0: float  # time of the start [s]
     steps: int
     rho_inf: float
     tolerance: float
     turns: Mapping[str, float | None] | None
     progress: bool = False
-    energy: float | None = None
+    energy: float | None = None  # that the motion shall have; None where it is not free [J]
 
     @property
     def stalled(self) -> float:
@@ -286,7 +279,7 @@ def periodic_motion(  # noqa: PLR0913  one keyword per choice, most have default
     Args:
         mechanism: bodies, joints, forces.
         period: of drives, loads and laws, or a multiple of it [s]; None for a motion that nothing
-            drives, as a limit cycle, whose period is looked for.
+            drives, as a limit cycle, whose period is looked for; it begins somewhere on the cycle.
         start: state, equilibrium or motion nearby from which it is looked for; None for where the
             bodies were added. A motion that nothing drives begins in a state that moves.
         turns: {joint or body: angle [rad]} by which it has advanced after the period when it looks
@@ -306,9 +299,6 @@ def periodic_motion(  # noqa: PLR0913  one keyword per choice, most have default
         tolerance: of the gap that may remain, in rad or lengths of the mechanism, of velocities
             per rad of the period.
         progress: report on stderr.
-
-    Returns:
-        The motion over one period. It begins somewhere on the cycle where nothing drives it.
 
     Raises:
         ConfigError: for a wrong argument, or a name that is neither a joint nor a body.

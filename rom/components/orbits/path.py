@@ -85,11 +85,7 @@ class PeriodicPath:
         return np.array([motion.period for motion in self.motions])
 
     def of(self, f: Callable[[Solution], npt.ArrayLike]) -> Array:
-        """(k, ...) a number or an array of every motion, as its amplitude.
-
-        Args:
-            f: function of a `Solution` over one period.
-        """
+        """(k, ...) a number or an array by f of the `Solution` of each motion, as its amplitude."""
         return np.array([f(motion.solution) for motion in self.motions])
 
 
@@ -126,12 +122,9 @@ def periodic_path(  # noqa: PLR0913  one keyword per choice, most have defaults
         rho_inf: its spectral radius at infinite frequency [1].
         guess: of the first period where it is unknown [s].
         settle: number of periods through which the first mechanism moves before.
-        n: largest number of motions.
+        n: largest number of motions; with so many the path may end inside the span.
         step: longest step, in sizes of the motion and spans.
         progress: report on stderr.
-
-    Returns:
-        The path; with n motions it may end inside the span.
 
     Raises:
         ConfigError: for a wrong argument, or mechanisms of different size.

@@ -35,24 +35,15 @@ FULL_TURN = 2 * np.pi
 
 @dataclass(frozen=True)
 class Turn:
-    """A body that advances about an axis of its own.
+    """A body that advances about an axis of its own."""
 
-    Attributes:
-        name: joint in which it turns, or the body where there is none.
-        body: its number.
-        axis: (3,) in its frame [1].
-        angle: by which it advances in a period about the axis [rad]; None for whatever it does.
-        prescribed: the same as the angle of the joint counts.
-        first, first_velocity: its places in q and v.
-    """
-
-    name: str
-    body: int
-    axis: Array
-    angle: float | None
-    prescribed: float | None
-    first: int
-    first_velocity: int
+    name: str  # joint in which it turns, or the body where there is none
+    body: int  # its number
+    axis: Array  # (3,) in its frame [1]
+    angle: float | None  # by which it advances in a period [rad]; None for whatever it does
+    prescribed: float | None  # the same as the angle of the joint counts
+    first: int  # its place in q
+    first_velocity: int  # its place in v
 
     def advanced(self, one: State, two: State) -> float:
         """Angle about the axis from one state to another [rad], within half a turn."""
@@ -205,21 +196,14 @@ def _refuse_unequal(name: str, part: Part, axis: Array, point: Array, angle: flo
 
 @dataclass(frozen=True)
 class Chart:
-    """Coordinates of the states around a start that the constraints allow.
-
-    Attributes:
-        at: the start.
-        Zq, Zv: (n, f_q), (n, f_v) free motions and velocities.
-        scale: (n,) motion of each coordinate that counts as one.
-        time: that in which velocities count as motions [s].
-    """
+    """Coordinates of the states around a start that the constraints allow."""
 
     flow: Flow
-    at: Start
-    Zq: Array
-    Zv: Array
-    scale: Array
-    time: float
+    at: Start  # the start
+    Zq: Array  # (n, f_q) free motions
+    Zv: Array  # (n, f_v) free velocities
+    scale: Array  # (n,) motion of each coordinate that counts as one
+    time: float  # that in which velocities count as motions [s]
 
     @classmethod
     def of(cls, flow: Flow, start: Start) -> "Chart":
@@ -265,23 +249,14 @@ def _rank(A: Array) -> int:
 
 @dataclass(frozen=True)
 class Return:
-    """A start and what came of it.
+    """A start and what came of it."""
 
-    Attributes:
-        flow: that moved it.
-        turns: what advances.
-        start: the start.
-        end: the state a period later.
-        turned: the same, turned back.
-        basis: chart whose coordinates count here too; None for one of its own.
-    """
-
-    flow: Flow
-    turns: Turns
+    flow: Flow  # that moved it
+    turns: Turns  # what advances
     start: Start
-    end: State
-    turned: State
-    basis: Chart | None = None
+    end: State  # the state a period later
+    turned: State  # the same, turned back
+    basis: Chart | None = None  # chart whose coordinates count here too; None for one of its own
 
     @classmethod
     def of(cls, flow: Flow, turns: Turns, start: Start, basis: Chart | None = None) -> "Return":

@@ -67,9 +67,6 @@ def design_check(
         g: the gallery; without a limit, a capacity in shear or one in bending its share is zero.
         ductility: deflection allowed, in multiples of that at yielding [1].
         depth: penetration allowed, as a share of the limit of the cushion [1].
-
-    Raises:
-        ConfigError: for an allowance that is not positive, or a depth beyond the cushion.
     """
     try:
         got = strike(replace(g, shear=replace(g.shear, capacity=np.inf)))
@@ -90,16 +87,11 @@ def design_check(
 def with_boulder(g: Gallery, boulder: Mass, height: float | None = None) -> Gallery:
     """The gallery under another boulder of the same shape and density.
 
-    Its radius goes by the cube root of the mass: that of a `Layer`, or, under its square root, the
-    stiffness of a `Cushion` after Hertz.
-
-    Args:
-        g: the gallery.
-        boulder: mass [kg].
-        height: of the fall [m]; None for that of g.
+    Its radius goes by the cube root of the mass [kg]: that of a `Layer`, or, under its square root,
+    the stiffness of a `Cushion` after Hertz. It falls from a height [m]; None for that of g.
 
     Raises:
-        ConfigError: for a mass or a height that is not positive.
+        ConfigError: for a height that is not positive.
     """
     ratio, c = (boulder / g.boulder) ** (1 / 3), g.cushion
     name, power = ("radius", 1.0) if isinstance(c, Layer) else ("stiffness", 0.5)
@@ -111,16 +103,7 @@ def with_boulder(g: Gallery, boulder: Mass, height: float | None = None) -> Gall
 def capacity_map(
     g: Gallery, boulders: Sequence[float], heights: Sequence[float], **allowed: float
 ) -> list[list[Verdict]]:
-    """Verdicts for boulders and heights.
-
-    Args:
-        g: the gallery.
-        boulders: (b,) masses [kg].
-        heights: (h,) of falls [m].
-        allowed: of `design_check`.
-
-    Returns:
-        (b, h) verdicts.
+    """(b, h) verdicts on boulders (b,) [kg] from heights (h,) [m]; allowed is as of `design_check`.
 
     Raises:
         ConfigError: for a mass or a height that is not positive.
@@ -131,10 +114,7 @@ def capacity_map(
 def capacity_heights(g: Gallery, boulders: Sequence[float], **allowed: float) -> Array:
     """(b,) heights [m] from which boulders [kg] take all that is allowed; inf beyond 300 m.
 
-    Args:
-        g: the gallery.
-        boulders: (b,) masses [kg].
-        allowed: of `design_check`.
+    Allowed is as of `design_check`.
 
     Raises:
         ConfigError: for a mass that is not positive, or a gallery that bears anything.

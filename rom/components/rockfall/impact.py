@@ -75,11 +75,7 @@ class Slab:
         stiffness: Annotated[float, Positive("N/m", error=ModelError)],
         **more: Any,
     ) -> "Slab":
-        """The last mass and spring of the three [kg, N/m].
-
-        Raises:
-            ModelError: if one is not positive.
-        """
+        """The last mass and spring of the three [kg, N/m]."""
         return cls(np.array([mass**-0.5]), np.array([np.sqrt(stiffness / mass)]), **more)
 
     @classmethod
@@ -126,9 +122,6 @@ class Gallery:
         height: of the fall [m].
         cushion, shear, slab: the three springs; the slab has the last mass in it.
         weight: whether gravity goes on pulling at the boulder during the impact.
-
-    Raises:
-        ConfigError: for a mass or a height that is not positive.
     """
 
     boulder: Mass
@@ -240,8 +233,7 @@ def strike(
         keep: about how many instants to keep.
 
     Raises:
-        ConfigError: for a duration, a step or a number of instants that is not positive, or a
-            cushion that cannot take up the energy of the fall.
+        ConfigError: if the cushion cannot take up the energy of the fall.
         SolverError: if the motion grows without bound because dt is too large, the boulder is
             through the cushion, or the impact does not end; ``error.solution`` is what was finite.
     """
@@ -315,15 +307,9 @@ Answer = Callable[[Gallery], float]
 
 
 def sensitivity(g: Gallery, answer: Answer, factors: tuple[float, ...]) -> dict[str, Array]:
-    """How an answer changes when one parameter is multiplied by a factor.
+    """{parameter: (f,) relative changes [1] of an answer} to factors (f,) [1] of the parameter.
 
-    Args:
-        g: the gallery.
-        answer: function of a `Gallery` that gives a number, e.g. a peak of `strike`.
-        factors: (f,) for example 0.8 and 1.25 [1].
-
-    Returns:
-        {parameter: (f,) relative changes of the answer [1]}.
+    The answer is a function of a `Gallery` that gives a number, e.g. a peak of `strike`.
     """
     first, names = answer(g), list(VARIED_NUMBERS)
     if isinstance(g.cushion, Layer) and g.cushion.strength < np.inf:
@@ -337,10 +323,8 @@ def sensitivity(g: Gallery, answer: Answer, factors: tuple[float, ...]) -> dict[
 def scaled(g: Gallery, factors: dict[str, float]) -> Gallery:
     """A gallery with some numbers multiplied by factors.
 
-    Args:
-        g: the gallery.
-        factors: {name: factor [1]}, names of `sensitivity`, "recovery of the cushion", and
-            "strength of the cushion" of a layer.
+    Factors are {name: factor [1]}, names those of `sensitivity`, "recovery of the cushion", and
+    "strength of the cushion" of a layer.
 
     Raises:
         ConfigError: for a name that is none of them.

@@ -110,9 +110,6 @@ class Cushion(Resistance):
             lame: Lame constant of the sand [Pa]; nu = 1/4, E = 2.5 lame.
             rock: density of the boulder [kg/m^3].
             more: further attributes.
-
-        Raises:
-            ConfigError: if a number is not positive.
         """
         return cls(4 / 3 * 2.5 * lame / (1 - 0.25**2) * np.sqrt(ball_radius(boulder, rock)), **more)
 

@@ -187,9 +187,6 @@ def bearing_pressure(
         radius: R of the disc [m].
         density: rho of the sand [kg/m^3].
 
-    Raises:
-        ConfigError: for an angle that is none of sand, or a size that is not positive.
-
     Source:
         Vesic, Analysis of ultimate loads of shallow foundations, J. Soil Mech. Found. Div. ASCE
         99 (1973) 45.
@@ -206,13 +203,9 @@ def _frustum(top: float, bottom: float, height: float) -> float:
 
 @typed
 def wave_delay(layer: Layer, d: float = 0.0) -> float:
-    """Time [s] that a wave takes through the sand left at a penetration.
+    """Time [s] that a wave takes through the sand left at a penetration d [m].
 
     The speed is the root of modulus over density, with the modulus of loading.
-
-    Args:
-        layer: the sand.
-        d: penetration [m].
 
     Raises:
         ConfigError: for a penetration that is negative or through the layer.
@@ -246,8 +239,7 @@ def arriving(
         reflection: r, 1 for a floor that does not give way, 0 for one like the sand [1].
 
     Raises:
-        ConfigError: for histories that do not fit, a delay that is not positive or far shorter than
-            the history, or a share that is none.
+        ConfigError: for histories that do not fit, or a delay far shorter than the history.
     """
     t, force = vector("t", t), vector("force", force)
     if t.shape != force.shape or t.size < 2 or not (np.diff(t) > 0).all():

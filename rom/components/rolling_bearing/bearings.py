@@ -1,6 +1,4 @@
-"""Rolling bearings as elements: what users describe, and their arrays.
-
-Forces of balls and rollers between two rings that move at will.
+"""Rolling bearings as elements: forces of balls and rollers between two rings that move at will.
 
 Axes are those of the outer ring: z along it, u_j to ball j and tau_j = z x u_j. The cage turns by a
 share g of the angle theta of the inner ring about z. With D from the centre of the outer ring to
@@ -41,34 +39,24 @@ STIFFNESS, EXPONENT, CURVATURE, RADIAL, AXIAL, RADIUS, CAGE, DAMPING, PHASE, SPI
 
 @table
 class Bearings(Table):
-    """All bearings.
+    """All bearings."""
 
-    Attributes:
-        i, j: (k,) markers of inner and outer ring.
-        axes: (k, 12) axis of the inner ring, a direction across it, the same of the outer one, in
-            the axes of their markers.
-        count: (k,) balls or rollers.
-        race: (k, 10) stiffness [N/m^n], exponent n, distance of the centres of the grooves [m], 0
-            of rollers, its radial and axial part in the middle of the play [m], radius of the inner
-            centres [m], share of the cage, damping [s/m], angle of the first ball [rad], speed at
-            which rings that spin in their frames turn the cage [rad/s].
-        clock: (1,) function that tells the time.
-        remembered: (k,) angle that is followed.
-        load: (k,) sum of all normal forces at the last residual [N].
-        gradient: (2, 12) of the depth of one ball along its normal, and across it.
-        tangent: (2, 12, 12) of one bearing, by motions and velocities.
-    """
-
-    i: Index1
-    j: Index1
+    i: Index1  # (k,) markers of the inner rings
+    j: Index1  # (k,) of the outer rings
+    # (k, 12) axis of the inner ring, a direction across it, the same of the outer one, in the axes
+    # of their markers
     axes: Array2
-    count: Index1
+    count: Index1  # (k,) balls or rollers
+    # (k, 10) stiffness [N/m^n], exponent n, distance of the centres of the grooves [m], 0 of
+    # rollers, its radial and axial part in the middle of the play [m], radius of the inner centres
+    # [m], share of the cage, damping [s/m], angle of the first ball [rad], speed at which rings
+    # that spin in their frames turn the cage [rad/s]
     race: Array2
-    clock: Index1
-    remembered: Index1
-    load: Scratch1
-    gradient: Scratch2
-    tangent: Scratch3
+    clock: Index1  # (1,) function that tells the time
+    remembered: Index1  # (k,) angle that is followed
+    load: Scratch1  # (k,) sum of all normal forces at the last residual [N]
+    gradient: Scratch2  # (2, 12) of the depth of one ball along its normal, and across it
+    tangent: Scratch3  # (2, 12, 12) of one bearing, by motions and velocities
 
 
 @inner

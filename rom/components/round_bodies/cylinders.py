@@ -38,26 +38,18 @@ MOST_HARMONICS, MOST_ORDER = 12, 8  # of a surface whose functions do not say ho
 
 @dataclass(frozen=True, slots=True)
 class Cylinder:
-    """Deformation of a surface about an axis, without the mean motion of its marker.
+    """Deformation of a surface about an axis, without the mean motion of its marker."""
 
-    Attributes:
-        harmonics: highest harmonic around the axis.
-        order: highest degree along it.
-        middle, half_length: of the surface along the axis, from the marker [m].
-        axes: (3, 3) rows: two directions across the axis, the axis itself; body frame.
-        shapes: (f, 3, r) displacement [m] in the body frame per elastic coordinate; f counts the
-            products of the constant, cosine and sine of each harmonic with each polynomial, the
-            harmonics of one polynomial together.
-        missed: largest share of the deformation of a shape that is in no function [1].
-    """
-
-    harmonics: int
-    order: int
-    middle: float
-    half_length: float
-    axes: Array
+    harmonics: int  # highest harmonic around the axis
+    order: int  # highest degree along it
+    middle: float  # of the surface along the axis, from the marker [m]
+    half_length: float  # of the surface along the axis [m]
+    axes: Array  # (3, 3) rows: two directions across the axis, the axis itself; body frame
+    # (f, 3, r) displacement [m] in the body frame per elastic coordinate; f counts the products of
+    # the constant, cosine and sine of each harmonic with each polynomial, the harmonics of one
+    # polynomial together
     shapes: Array
-    missed: float
+    missed: float  # largest share of the deformation of a shape that is in no function [1]
 
     def functions(self, theta: Array, z: Array) -> Array:
         """(k, f) values of the functions at angles (k,) [rad] and places (k,) [m] from the marker.
@@ -81,9 +73,6 @@ def cylinder_of(part: Part, marker: Marker, axis: Array, across: Array) -> Cylin
     """The deformation of the surface behind a marker; None of a rigid one.
 
     Its axis (3,) and a direction (3,) across are in the body frame.
-
-    Raises:
-        ConfigError: if the surface has no length along the axis.
 
     Warns:
         RomWarning: if harmonics and polynomials miss more than 2 % of the deformation of a shape.
@@ -140,32 +129,19 @@ def _share_missed(S: spmatrix, w: Array, left: Array) -> float:
 
 @table
 class Cylinders(Table):
-    """All surfaces of the elements of a family.
+    """All surfaces of the elements of a family."""
 
-    Attributes:
-        of: (k, 2) surface of each side of an element, -1 of rigid ones.
-        size: (c, 2) harmonics and order.
-        middle, half_length: (c,) along the axis, from the marker [m].
-        width: (c,) angle over which a force is spread around the axis [rad].
-        shapes: (c, F, 3, R) displacement in the body frame per elastic coordinate [m].
-        amplitude, rate: (c, 3 F) of the functions at the last residual, three directions each
-            [m, m/s].
-        load: (c, 3 F) sum of the forces times the functions [N].
-        basis: (m, 2, F) functions at places on either side.
-        gradient: (4, 6 + R) motion along one and along another direction per velocity of a body,
-            of both sides.
-    """
-
-    of: Index2
-    size: Index2
-    middle: Array1
-    half_length: Array1
-    width: Array1
-    shapes: Array4
-    amplitude: Scratch2
-    rate: Scratch2
-    load: Scratch2
-    basis: Scratch3
+    of: Index2  # (k, 2) surface of each side of an element, -1 of rigid ones
+    size: Index2  # (c, 2) harmonics and order
+    middle: Array1  # (c,) along the axis, from the marker [m]
+    half_length: Array1  # (c,) along the axis [m]
+    width: Array1  # (c,) angle over which a force is spread around the axis [rad]
+    shapes: Array4  # (c, F, 3, R) displacement in the body frame per elastic coordinate [m]
+    amplitude: Scratch2  # (c, 3 F) of functions at the last residual, three directions each [m]
+    rate: Scratch2  # (c, 3 F) of these amplitudes [m/s]
+    load: Scratch2  # (c, 3 F) sum of the forces times the functions [N]
+    basis: Scratch3  # (m, 2, F) functions at places on either side
+    # (4, 6 + R) motion along one and along another direction per velocity of a body, of both sides
     gradient: Scratch2
 
 

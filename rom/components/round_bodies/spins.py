@@ -1,7 +1,5 @@
 """Round bodies that turn in a frame which does not, as elements: their gyroscopic forces.
 
-Gyroscopic forces of a round body whose material turns through its frame.
-
 The frame follows the bending of a shaft, say, but does not turn with it. A displacement u of a body
 of revolution is a field in that frame, through which the material passes with the velocity
 W z x X. Its own velocity is W z x X + du/dt + W A u,
@@ -58,19 +56,10 @@ N_NEAREST = 12  # triangles whose middle is near a point: one of them holds it
 def spin_matrices(body: "FlexibleBody", axis: Array) -> tuple[Array, Array]:
     """Forces per speed of a body whose material turns through its frame.
 
-    The material feels its damping as it passes through a bent shape that stands: this feeds whirl
-    that is slower than the rotation.
-
-    Args:
-        body: a ``FlexibleBody`` with a surface, round about an axis through its mass centre.
-        axis: (3,) of it, body frame [1].
-
-    Returns:
-        (3 + r, 3 + r) on rotations and shapes per velocity of them, antisymmetric; (r, r) of
-        damping on shapes per elastic coordinate.
-
-    Raises:
-        ModelError: if the body is not round about that axis, or carries no surface.
+    Found are those on rotations and shapes per velocity of them, (3 + r, 3 + r) and antisymmetric,
+    and those of damping on shapes per elastic coordinate, (r, r). The body is round about an axis
+    (3,) through its mass centre, in its frame. The material feels its damping as it passes through
+    a bent shape that stands: this feeds whirl that is slower than the rotation.
     """
     check_round(body.name, body.mass, body.first_moment, body.inertia, axis)
     M, K = body.full_matrices()
@@ -81,11 +70,7 @@ def spin_matrices(body: "FlexibleBody", axis: Array) -> tuple[Array, Array]:
 
 
 def check_round(name: str, mass: float, first: Array, inertia: Array, axis: Array) -> None:
-    """Refuse a body whose material cannot turn through its frame.
-
-    Raises:
-        ModelError: naming what is not round.
-    """
+    """Refuse a body whose material cannot turn through its frame."""
     polar = axis @ inertia @ axis
     tilted = np.abs(inertia @ axis - polar * axis).max()
     flat = np.eye(3) - np.outer(axis, axis)
@@ -178,9 +163,7 @@ def _places(X: Array, triangles: Index, points: Array) -> tuple[Index, Array]:
 def directed_mass(body: "FlexibleBody", E: Array) -> Array:
     """(6 + r, 6 + r) integrals of rho phi_a . E phi_b, rigid motions first.
 
-    Args:
-        body: a ``FlexibleBody``.
-        E: (3, 3) in the body frame: z x of a spin, or z z^T for the mass of motions along z [1].
+    E (3, 3) in the body frame is z x of a spin, or z z^T for the mass of motions along z [1].
     """
     r, second = body.n_modes, 0.5 * np.trace(body.inertia) * np.eye(3) - body.inertia
     turns = np.array([skew(np.eye(3)[p]) for p in range(3)])  # rotation p moves X by turns[p] X
@@ -206,11 +189,7 @@ class Spin:
 
 
 def spin_of(part: Part) -> tuple[Spin, Family]:
-    """The gyroscopic forces of a body, and their family.
-
-    Raises:
-        ModelError: if it is not round about the axis of its spin.
-    """
+    """The gyroscopic forces of a body, and their family."""
     speed = float(np.linalg.norm(part.spin))
     axis = part.spin / speed
     if part.flexible is None:
@@ -224,17 +203,11 @@ def spin_of(part: Part) -> tuple[Spin, Family]:
 
 @table
 class Spins(Table):
-    """All bodies that turn.
+    """All bodies that turn."""
 
-    Attributes:
-        body: (k,) which.
-        gyroscopic: (k, 3 + R, 3 + R) forces on rotations and shapes per velocity of them.
-        circulatory: (k, R, R) of damping on shapes per elastic coordinate.
-    """
-
-    body: Index1
-    gyroscopic: Array3
-    circulatory: Array3
+    body: Index1  # (k,) which
+    gyroscopic: Array3  # (k, 3 + R, 3 + R) forces on rotations and shapes per velocity of them
+    circulatory: Array3  # (k, R, R) of damping on shapes per elastic coordinate
 
 
 def pack(spins: Mapping[str, Spin], places: Places) -> Spins:

@@ -15,41 +15,25 @@ ARC_POINTS = 25  # of a pulley in pictures
 
 
 class Place(NamedTuple):
-    """A place in the world.
+    """A place in the world."""
 
-    Attributes:
-        x: (3,) centre [m].
-        axes: (2, 3) axis of a pulley and a direction across it.
-        radius: [m], 0 for an eyelet.
-    """
-
-    x: Array
-    axes: Array
-    radius: float
+    x: Array  # (3,) centre [m]
+    axes: Array  # (2, 3) axis of a pulley and a direction across it
+    radius: float  # [m], 0 for an eyelet
 
 
 @dataclass(frozen=True)
 class Path:
-    """Straight pieces and arcs.
+    """Straight pieces and arcs."""
 
-    Attributes:
-        straight: (m - 1,) lengths of pieces [m].
-        arrival, departure: (m,) angles of the places at which it touches pulleys [rad].
-        wrap: (m,) angles between them, below one turn [rad].
-    """
-
-    straight: Array
-    arrival: Array
-    departure: Array
-    wrap: Array
+    straight: Array  # (m - 1,) lengths of pieces [m]
+    arrival: Array  # (m,) angle of the place at which it first touches a pulley [rad]
+    departure: Array  # (m,) and last [rad]
+    wrap: Array  # (m,) angles between them, below one turn [rad]
 
 
 def path_through(name: str, places: Sequence[Place]) -> Path:
-    """Where a cable runs, see `rom.components.tendons.routing`; the name is for errors.
-
-    Raises:
-        ConfigError: if it cannot run there.
-    """
+    """Where a cable runs, see `rom.components.tendons.routing`; the name is for errors."""
     straight, touched = np.zeros(len(places) - 1), np.zeros((len(places), 2))
     for k, (a, b) in enumerate(pairwise(places)):
         D, s = b.x - a.x, _sense(name, a, b)

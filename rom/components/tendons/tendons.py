@@ -178,11 +178,7 @@ def _station(mechanism: Whole, name: str, place: Marker | Pulley, friction: floa
 
 
 def _design_length(whole: Whole, name: str, stations: Sequence[Station]) -> float:
-    """Length of the path where the bodies were added.
-
-    Raises:
-        ConfigError: for a path that is none.
-    """
+    """Length of the path where the bodies were added."""
     if len(stations) < 2:
         raise ConfigError(f"tendon {name!r} needs at least two places, got {len(stations)}.")
     if stations[0].radius or stations[-1].radius:
@@ -205,57 +201,35 @@ class Tendons(Table):
     """All tendons; the p stations of one after those of the other.
 
     A piece has the number of the station before it, so that that of a last station is unused.
-
-    Attributes:
-        first: (k + 1,) first station of each tendon.
-        law: (k, 4) EA [N], damping [N s], free length [m] or tension [N] without a function,
-            transition speed [m/s].
-        signal: (k,) motion of the free length, or function of time of the tension; -1 for none.
-        pulled: (k,) 1 if its tension is given.
-        rated: (k,) 1 if its tension depends on velocities.
-        at: (p,) markers.
-        axes: (p, 6) axis of a pulley and a direction across it, in the axes of the marker.
-        radius: (p,) of the pulley [m], 0 for an eyelet.
-        friction: (p,) coefficient [1].
-        remembered: (p,) where the angle of wrap is kept, -1 for eyelets.
-        length, rate: (p,) of pieces, with half of the arcs at both ends [m, m/s].
-        gradient: (p, 12) of the length between points of both stations, by their motions.
-        pull: (p, 3) gradient of the straight length by the position of its second end.
-        wrap: (p,) angle by which it turns at a station [rad].
-        wrap_gradient: (p, 18) by the motions of the station before, its own, and that behind.
-        weight, flow, tension: (p,) of pieces, flow over the station [1, m/s, N].
-        rate_gradient: (p, 12) of the rate of the length of a piece, by motions.
-        bend: (p, 36) of the direction of a piece, by motions; (3, 12) row by row.
-        slope: (3, m, m) of the tensions of one tendon by lengths, rates and angles.
-        change: (2, 6 m) of one tension by motions and velocities of m stations.
-        stiffness, damping: (6 m, 6 m) of one tendon, by motions of its stations.
     """
 
-    first: Index1
+    first: Index1  # (k + 1,) first station of each tendon
+    # (k, 4) EA [N], damping [N s], free length [m] or tension [N] without a function, transition
+    # speed [m/s]
     law: Array2
-    signal: Index1
-    pulled: Index1
-    rated: Index1
-    at: Index1
-    axes: Array2
-    radius: Array1
-    friction: Array1
-    remembered: Index1
-    length: Scratch1
-    rate: Scratch1
-    gradient: Scratch2
-    pull: Scratch2
-    wrap: Scratch1
-    wrap_gradient: Scratch2
-    weight: Scratch1
-    flow: Scratch1
-    tension: Scratch1
-    rate_gradient: Scratch2
-    bend: Scratch2
-    slope: Scratch3
-    change: Scratch2
-    stiffness: Scratch2
-    damping: Scratch2
+    signal: Index1  # (k,) motion of free length, or function of time of tension; -1 for none
+    pulled: Index1  # (k,) 1 if its tension is given
+    rated: Index1  # (k,) 1 if its tension depends on velocities
+    at: Index1  # (p,) markers
+    axes: Array2  # (p, 6) axis of a pulley and a direction across it, in the axes of the marker
+    radius: Array1  # (p,) of the pulley [m], 0 for an eyelet
+    friction: Array1  # (p,) coefficient [1]
+    remembered: Index1  # (p,) where the angle of wrap is kept, -1 for eyelets
+    length: Scratch1  # (p,) of pieces, with half of the arcs at both ends [m]
+    rate: Scratch1  # (p,) of these lengths [m/s]
+    gradient: Scratch2  # (p, 12) of the length between points of both stations, by their motions
+    pull: Scratch2  # (p, 3) gradient of the straight length by the position of its second end
+    wrap: Scratch1  # (p,) angle by which it turns at a station [rad]
+    wrap_gradient: Scratch2  # (p, 18) by the motions of the station before, its own, that behind
+    weight: Scratch1  # (p,) of pieces [1]
+    flow: Scratch1  # (p,) over the station [m/s]
+    tension: Scratch1  # (p,) of pieces [N]
+    rate_gradient: Scratch2  # (p, 12) of the rate of the length of a piece, by motions
+    bend: Scratch2  # (p, 36) of the direction of a piece, by motions; (3, 12) row by row
+    slope: Scratch3  # (3, m, m) of the tensions of one tendon by lengths, rates and angles
+    change: Scratch2  # (2, 6 m) of one tension by motions and velocities of m stations
+    stiffness: Scratch2  # (6 m, 6 m) of one tendon, by motions of its stations
+    damping: Scratch2  # (6 m, 6 m) likewise
 
 
 def pack(tendons: Mapping[str, Tendon], places: Places) -> Tendons:

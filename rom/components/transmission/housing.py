@@ -92,9 +92,5 @@ class Housing:
 
 
 def motion_of(body: FlexibleBody, name: str) -> Array:
-    """(6, 6 + r) mean motion of an interface per rigid and elastic coordinate.
-
-    Raises:
-        InterfaceError: if the body has no such interface.
-    """
+    """(6, 6 + r) mean motion of an interface per rigid and elastic coordinate."""
     return np.hstack(marker_motion(body.marker(name), body.n_modes))

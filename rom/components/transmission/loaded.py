@@ -25,12 +25,8 @@ Axes = tuple[Array, Array, Array]  # (3,) along the line of centres, across it, 
 def toothed_shaft(mechanism: AnyMechanism, body: str) -> Mesh:
     """A shaft with the wheels of its gear meshes, where it was added: teeth stand in each other.
 
-    Teeth have the height of a standard profile, without shifts and thinning.
-
-    Args:
-        mechanism: a `Mechanism`.
-        body: that turns in journal bearings, which say how thick it is; its surface, or else its
-            markers, say how long.
+    Teeth have the height of a standard profile, without shifts and thinning. The body turns in
+    journal bearings, which say how thick it is; its surface, or else its markers, say how long.
 
     Returns:
         Points (n, 3) in the world [m] and triangles (m, 3).

@@ -53,11 +53,9 @@ class Whirl:
 
 
 def linearised(state: Rest) -> tuple[Array, Array, Array]:
-    """Matrices of small motions about an equilibrium.
+    """(n, n) mass [kg], damping with gyroscopic forces [N s/m], and stiffness [N/m].
 
-    Returns:
-        (n, n) mass [kg], damping with gyroscopic forces [N s/m], stiffness [N/m]; of rotations
-        alike.
+    They are of small motions about an equilibrium; of rotations alike.
     """
     M, K, G = state.unit.matrices
     C = state.unit.loss * K + G + state.forces.damping
@@ -138,13 +136,10 @@ class Run:
 
 
 def simulate(state: Rest, *, periods: float, steps: int = 100, whirling: bool = False) -> Run:
-    """Motion from an equilibrium through some mesh periods.
+    """Motion from an equilibrium without vibration through some mesh periods [1].
 
-    Args:
-        state: where it starts, without vibration.
-        periods: how many mesh periods [1].
-        steps: per mesh period.
-        whirling: go on although the equilibrium is not stable.
+    There are so many steps per mesh period; ``whirling`` goes on although the equilibrium is not
+    stable.
 
     Raises:
         ModelError: if the speed is above the threshold of whirl.
@@ -246,10 +241,8 @@ class Response:
 def mesh_response(state: Rest, *, harmonics: int = 6, positions: int = 96) -> Response:
     """Periodic response to the mesh.
 
-    Args:
-        state: equilibrium at any position of the teeth.
-        harmonics: of the mesh that are kept.
-        positions: of the teeth in a mesh period.
+    So many harmonics of the mesh are kept, of so many positions of the teeth in a mesh period; the
+    equilibrium is at any of them.
 
     Raises:
         ModelError: if the unit whirls at that speed.

@@ -42,12 +42,8 @@ class Disc:
     ) -> "Disc":
         """A ring on a shaft.
 
-        Args:
-            node: where it sits.
-            outer: diameter [m].
-            inner: diameter [m].
-            width: along the shaft [m].
-            rho: density [kg/m^3].
+        Outer [m] and inner [m] are diameters, the width [m] lies along the shaft, rho is the
+        density [kg/m^3].
         """
         m = rho * np.pi / 4 * (outer**2 - inner**2) * width
         squares = outer**2 + inner**2

@@ -128,11 +128,7 @@ class SolidShaft:
         return found[0], found[1], found[2]
 
     def _in_plane(self, omega: Array, V: Array, B: Array) -> Array:
-        """(6 + r, m) of each pair of bending modes the one that moves in X-Z.
-
-        Raises:
-            ModelError: if the first modes are no pair, so that the body is not round.
-        """
+        """(6 + r, m) of each pair of bending modes the one that moves in X-Z."""
         found = []
         for k in range(0, min(2 * MAX_MODES, omega.size - 1), 2):
             _, s, turn = np.linalg.svd(B[:, [1, 3], k : k + 2].reshape(-1, 2))

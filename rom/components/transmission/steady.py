@@ -82,9 +82,7 @@ class Steady:
 def steady(start: Rest | Steady, *, steps: int = 60) -> Steady:
     """The motion that repeats with the mesh, near an equilibrium or a motion nearby.
 
-    Args:
-        start: equilibrium, or a motion; its unit is what moves.
-        steps: per mesh period.
+    The unit of the start is what moves, in so many steps per mesh period.
 
     Raises:
         ModelError: if teeth differ, or a film conserves its oil and remembers it, so that nothing
@@ -115,12 +113,9 @@ def steady(start: Rest | Steady, *, steps: int = 60) -> Steady:
 def sweep(unit: Transmission, speeds: Iterable[float], *, steps: int = 60) -> list[Steady]:
     """Motion that repeats with the mesh at many speeds, each found from the one before.
 
-    Where two motions are possible, going up and going down may find different ones.
-
-    Args:
-        unit: the transmission; its own speed does not matter.
-        speeds: of the pinion, in the order in which they are run through [rad/s].
-        steps: per mesh period.
+    Where two motions are possible, going up and going down may find different ones. Speeds are
+    those of the pinion, in the order in which they are run through [rad/s], in so many steps per
+    mesh period; the unit's own speed does not matter.
 
     Raises:
         ModelError, SolverError: as `rest` and `steady`; ``error.solution`` holds the motions

@@ -76,11 +76,8 @@ def shaft_whirl(
 ) -> ShaftWhirl:
     """Whirl frequencies of a shaft on bearings.
 
-    Args:
-        shaft: with its discs.
-        supports: {node: bearing}.
-        speed: of rotation, from X to Y if positive [rad/s].
-        n: number of frequencies, lowest first; None for all.
+    Supports are {node: bearing}, the speed of rotation is positive from X to Y [rad/s]; the n
+    lowest frequencies are found, None for all.
 
     Raises:
         ModelError: if a bearing sits beyond the shaft, or the bearings leave a rigid motion free.
@@ -95,15 +92,11 @@ def shaft_whirl(
 
 
 def critical_speeds(shaft: Shaft, supports: Mapping[int, Support]) -> tuple[Array, Array]:
-    """Speeds at which a whirl is as fast as the rotation, damping left out.
+    """(m,) speeds [rad/s] at which a whirl is as fast as the rotation, and (m,) its directions.
 
-    Args:
-        shaft: with its discs.
-        supports: {node: bearing}, their stiffness symmetric.
-
-    Returns:
-        speeds (m,) [rad/s], ascending, and directions (m,) as in `ShaftWhirl`. A thin disc may
-        leave fewer forward speeds than backward ones: its own moment stiffens the shaft ever more.
+    Supports are {node: bearing}, their stiffness symmetric; damping is left out. Speeds ascend,
+    directions are as in `ShaftWhirl`. A thin disc may leave fewer forward speeds than backward
+    ones: its own moment stiffens the shaft ever more.
 
     Raises:
         ModelError: as in `shaft_whirl`, or if a stiffness is not symmetric.

@@ -212,10 +212,9 @@ class Transmission:
     ) -> Forces:
         """Forces of films and teeth at q (n,) [m, rad] with rates v (n,) [m/s, rad/s].
 
-        The drive is turned by ``theta`` [rad].
-
-        Films of a position nearby, ``warm``, save iterations; ``seen`` (bearings, 4) are motions of
-        the journals in their bushes [m, rad], None to the first order of turns.
+        The drive is turned by ``theta`` [rad]. Films of a position nearby, ``warm``, save
+        iterations; ``seen`` (bearings, 4) are motions of the journals in their bushes [m, rad],
+        None to the first order of turns.
 
         Raises:
             ModelError, SolverError: if a journal touches its bush, or a film is not found.

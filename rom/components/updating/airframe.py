@@ -26,19 +26,12 @@ KINDS = ("axial", "torsion", "bending", "sideways")  # bending: across the thin 
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """Beams of one rectangular section.
-
-    Attributes:
-        name: name of the part.
-        path: (k, 3) corners its neutral axis passes [m].
-        broad: unit vector along the broad side of the section.
-        size: broad and thin side [m].
-    """
+    """Beams of one rectangular section."""
 
     name: str
-    path: tuple[tuple[float, float, float], ...]
-    broad: tuple[float, float, float]
-    size: tuple[float, float]
+    path: tuple[tuple[float, float, float], ...]  # (k, 3) corners its neutral axis passes [m]
+    broad: tuple[float, float, float]  # unit vector along the broad side of the section
+    size: tuple[float, float]  # broad and thin side [m]
 
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
@@ -83,8 +76,7 @@ class Airframe:
         K: {(part, kind): (r, r)} stiffness [N/m, N m/rad] by part and kind of deformation; of the
             kind "joint" is what holds the part, if it gives way.
         M: {part: (r, r)} mass by part [kg, kg m^2].
-        T: (6 n, r) displacements and rotations of all nodes [m, rad] from the independent
-            coordinates.
+        T: (6 n, r) displacements and rotations of all nodes [m, rad] by independent coordinates.
     """
 
     points: Array
@@ -105,11 +97,7 @@ class Airframe:
         return int(far.argmin())
 
     def sensor(self, point: npt.ArrayLike, axis: int) -> Array:
-        """(r,) the row [1] that gives the displacement of a node along an axis 0, 1, 2.
-
-        Args:
-            point: (3,) where the node is [m].
-            axis: number of the axis.
+        """(r,) row [1] of the displacement of the node at a point (3,) [m] along an axis 0, 1, 2.
 
         Raises:
             ConfigError: if there is no node.
@@ -122,12 +110,8 @@ def airframe(
 ) -> Airframe:
     """The structure with beam elements no longer than ``size`` [m].
 
-    The section of a beam is rigid: no shear, no warping; masses are consistent.
-
-    Args:
-        size: longest element [m].
-        material: of all parts.
-        joints: stiffness of the five joints against rotation about each axis [N m/rad].
+    The section of a beam is rigid: no shear, no warping; masses are consistent. Each of the five
+    joints gives way to rotation about each axis by the same stiffness [N m/rad].
 
     Raises:
         ConfigError: for a size or a stiffness that is not positive.

@@ -92,8 +92,7 @@ def compare(
         common: arguments of `rom.update` that all sets share.
 
     Raises:
-        ConfigError: without sets, for more folds than lines, or as `rom.update`.
-        SolverError: as `rom.update`.
+        ConfigError, SolverError: as `rom.update`; also without sets, or for more folds than lines.
     """
     n_f = len(test.frequencies)
     whole("folds", folds, 2, n_f, reason="lines")

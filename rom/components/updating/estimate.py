@@ -83,8 +83,7 @@ def update(  # noqa: PLR0913  keywords of one call
     """Find the factors of a family, and damping ratios, that explain measured responses.
 
     The logarithm of each response is compared, weighted by its standard deviation. Damping ratios
-    of all modes up to one and a half times the highest line are unknowns
-    as well, and one for all others.
+    of all modes up to one and a half times the highest line are unknowns, and one for all others.
 
     Args:
         family: from `rom.reduce_parametric`, with moduli and densities; or several, as a
@@ -109,14 +108,10 @@ def update(  # noqa: PLR0913  keywords of one call
             which lines count less, where damping is hardly known or not that of modes; None to
             count all fully. Their errors are taken for larger, so that deviations are safe.
 
-    Returns:
-        `rom.updating.Updated`.
-
     Raises:
         ConfigError: for channels off the body, of another scale or sign, too few data, a
             damping that is none to start from, or a family in other units than SI.
-        ParameterError: for a name that is unknown.
-        InterfaceError: if an interface is unknown.
+        ParameterError, InterfaceError: for a name that is unknown.
         SolverError: if the search does not end though the model fits. Of a model that does not
             fit the verdict says that the search has not ended.
 

@@ -43,13 +43,9 @@ Factor = Annotated[float, Positive()]
 
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """The families of a structure, whose rigid and elastic coordinates stand one after another.
+    """The families of a structure, whose rigid and elastic coordinates stand one after another."""
 
-    Attributes:
-        bodies: {name: body} at the centre of the ranges; one alone has no name.
-    """
-
-    bodies: dict[str, FlexibleBody]
+    bodies: dict[str, FlexibleBody]  # at the centre of the ranges; one alone has no name
 
     @staticmethod
     def of(structure: "Structure | Parts") -> "Parts":
@@ -122,8 +118,7 @@ class UnknownPart(ABC):
     """What is attached to a structure, its stiffness or mass unknown by a factor.
 
     Attributes:
-        low: smallest factor [1].
-        high: largest factor [1].
+        low, high: smallest and largest factor [1].
 
     Raises:
         ConfigError: unless 0 < low <= high and the mass is positive.
@@ -181,8 +176,7 @@ class JointSpring(UnknownPart):
     It acts where the first one is; the second one reaches there by a rigid arm.
 
     Attributes:
-        one: (body, interface).
-        other: (body, interface).
+        one, other: (body, interface).
         stiffness: as of `GroundSpring` [N/m, N m/rad].
     """
 
@@ -240,35 +234,20 @@ Attached = Mapping[str, GroundSpring | JointSpring | AddedMass]
 
 @dataclass(frozen=True, slots=True)
 class FamilyModel:
-    """K = sum k_i(p) K_i, M = sum m_i(p) M_i of a family with what is attached to it.
+    """K = sum k_i(p) K_i, M = sum m_i(p) M_i of a family with what is attached to it."""
 
-    Attributes:
-        K: (n_t, n, n) terms of the stiffness at factors of one.
-        M: (n_t, n, n) terms of the mass.
-        k_powers: (n_t, n_p) one where a parameter multiplies a term of the stiffness.
-        m_powers: (n_t, n_p) likewise of the mass.
-        seen: (n_s, n) rows of the sensors.
-        driven: (n_e, n) rows of the inputs.
-        names: of the parameters.
-        low: (n_p,) smallest factors.
-        high: (n_p,) largest factors.
-        amount: (n_t,) one; zero for a candidate, which is not in the model but has derivatives.
-        n_rigid: number of motions that nothing holds.
-        motions: (n_q, n) rigid and elastic coordinates of all bodies per coordinate here.
-    """
-
-    K: Array
-    M: Array
-    k_powers: Array
-    m_powers: Array
-    seen: Array
-    driven: Array
-    names: tuple[str, ...]
-    low: Array
-    high: Array
-    amount: Array
-    n_rigid: int
-    motions: Array
+    K: Array  # (n_t, n, n) terms of the stiffness at factors of one
+    M: Array  # (n_t, n, n) terms of the mass
+    k_powers: Array  # (n_t, n_p) one where a parameter multiplies a term of the stiffness
+    m_powers: Array  # (n_t, n_p) likewise of the mass
+    seen: Array  # (n_s, n) rows of the sensors
+    driven: Array  # (n_e, n) rows of the inputs
+    names: tuple[str, ...]  # of the parameters
+    low: Array  # (n_p,) smallest factors
+    high: Array  # (n_p,) largest factors
+    amount: Array  # (n_t,) one; zero for a candidate, not in the model but with derivatives
+    n_rigid: int  # number of motions that nothing holds
+    motions: Array  # (n_q, n) rigid and elastic coordinates of all bodies per coordinate here
 
     @property
     def present(self) -> Mask:

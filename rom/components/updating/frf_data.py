@@ -34,15 +34,9 @@ COHERENCE_ATOL = 1e-6  # distance of the coherence from 0 and 1, which no measur
 
 
 def noisy(H: Complex, level: float, rng: np.random.Generator) -> Complex:
-    """H with complex Gaussian errors.
+    """H (...,), of any shape and in units of any kind, with complex Gaussian errors.
 
-    Args:
-        H: (...,) responses of any shape, in units of any kind.
-        level: relative standard deviation [1].
-        rng: source of random numbers.
-
-    Returns:
-        (...,) responses, in units of those given.
+    The level is their standard deviation over |H| [1].
 
     Raises:
         ConfigError: for a negative level.
@@ -57,7 +51,7 @@ def noisy(H: Complex, level: float, rng: np.random.Generator) -> Complex:
 def estimators(
     x: Complex, f: Complex, ratio: Annotated[float, NotNegative()] = 1.0
 ) -> tuple[Complex, Complex, Complex, Array]:
-    """H1, H2, Hv and the coherence of averaged spectra.
+    """H1, H2, Hv (...,) [m/N] and the coherence (...,) [1] of averaged spectra.
 
     Noise on the force makes H1 too small by signal / (signal + noise), noise on the response makes
     H2 too large likewise. Hv is total least squares scaled by the ratio of both: with the powers
@@ -70,12 +64,8 @@ def estimators(
         f: (n_a, ...) spectra of the force [N], the same shape.
         ratio: noise of responses over that of forces, each over its signal [1].
 
-    Returns:
-        H1, H2, Hv (...,) [m/N] and the coherence (...,) [1].
-
     Raises:
-        ConfigError: for fewer than two averages: coherence would be one whatever the noise; or a
-            negative ratio.
+        ConfigError: for fewer than two averages: coherence would be one whatever the noise.
 
     Source:
         Wicks and Vold, The Hs frequency response function estimator, IMAC IV (1986).
@@ -96,9 +86,6 @@ def estimators(
 def random_error(coherence: npt.ArrayLike, n_averages: Annotated[int, Count(1)]) -> Array:
     """(...,) relative standard deviation of |H1| under noise on the response [1].
 
-    Raises:
-        ConfigError: without averages.
-
     Source:
         Bendat and Piersol, Random data: sqrt((1 - g^2) / (2 n g^2)) with the coherence g^2.
     """
@@ -108,39 +95,23 @@ def random_error(coherence: npt.ArrayLike, n_averages: Annotated[int, Count(1)])
 
 @dataclass(frozen=True, slots=True)
 class Errors:
-    """Standard deviations of real and imaginary part of ln H.
+    """Standard deviations of real and imaginary part of ln H, and what is known of them [1]."""
 
-    Attributes:
-        own: (n_f, n_s, n_e) of the sensors; infinite where a value is not used [1].
-        common: (n_f, 1, n_e) what the sensors have in common [1].
-        varied: (n_f, n_s, n_e) or a zero: standard deviation of the square of the own one, over
-            it, where it is estimated [1].
-        known: chi-square of all residuals has so many degrees of freedom for each [1].
-        scale: variance of the squares of all own ones together, over these squares [1].
-    """
-
-    own: Array
-    common: Array
-    varied: Array
-    known: float
-    scale: float
+    own: Array  # (n_f, n_s, n_e) of the sensors; infinite where a value is not used
+    common: Array  # (n_f, 1, n_e) what the sensors have in common
+    varied: Array  # (n_f, n_s, n_e) or 0: deviation of the own one squared, over it, if estimated
+    known: float  # degrees of freedom of chi-square of all residuals, for each
+    scale: float  # variance of the squares of all own ones together, over these squares
 
 
 @dataclass(frozen=True, slots=True)
 class Noise:
-    """Powers of noise in a test.
+    """Powers of noise in a test."""
 
-    Attributes:
-        incoherent: (n_f, n_s, n_e) incoherent over coherent power, (1 - c) / c [1].
-        force: (n_f, 1, n_e) power of the noise of a force over that of the force [1].
-        averages: number of averages behind them.
-        estimated: whether the coherence is of the same records as the responses.
-    """
-
-    incoherent: Array
-    force: Array
-    averages: int
-    estimated: bool
+    incoherent: Array  # (n_f, n_s, n_e) incoherent over coherent power, (1 - c) / c [1]
+    force: Array  # (n_f, 1, n_e) power of the noise of a force over that of the force [1]
+    averages: int  # number of averages behind them
+    estimated: bool  # whether the coherence is of the same records as the responses
 
     @property
     def relative_error(self) -> Array:
@@ -164,10 +135,6 @@ class Noise:
 
         Those of H1, Hv and H2 exceed it by -ln (1 + v) and by none, half and all of -ln c, with
         the coherence c and the power v of the noise of a force over that of the force.
-
-        Raises:
-            ConfigError: if forces are noisy and the estimator is not named, or if they are noisier
-                than the coherence allows.
         """
         if self.force.any():
             self._check_forces(estimator)
@@ -247,14 +214,8 @@ def pooled(total: Array, used: Mask, n_averages: int) -> tuple[Array, Array, Arr
     spread as p and e do not explain, and so are the logarithms of p and e; lines far out in that
     distribution are left to themselves. The noise of the sensor is x p of that line.
 
-    Args:
-        total: (n_f, n_s, n_e) estimated powers (1 + x) p e [1].
-        used: (n_f, n_s, n_e) which count.
-        n_averages: number of them.
-
-    Returns:
-        (n_f, n_s, n_e) means of x p by what is measured, the variances of them that cost, and what
-        lines have of these in common [1].
+    Total are estimated (1 + x) p e (n_f, n_s, n_e) [1]. Found are, as large [1], means of x p
+    by what is measured, the variances of them that cost, and what lines have of these in common.
 
     Source:
         Efron and Morris, Stein's estimation rule and its competitors: an empirical Bayes approach,
@@ -340,11 +301,7 @@ def beside_poles(omega: Array, poles: npt.ArrayLike, zeta: npt.ArrayLike, width:
 
 
 def frac(H: Complex, G: Complex) -> Array:
-    """(n_s, n_e) frequency response assurance over all lines, from 0 to 1 [1].
-
-    Args:
-        H: (n_f, n_s, n_e) responses [m/N].
-        G: (n_f, n_s, n_e) responses to compare with [m/N].
+    """(n_s, n_e) frequency response assurance of H and G (n_f, n_s, n_e) [m/N], from 0 to 1 [1].
 
     Raises:
         ConfigError: if the shapes differ.
@@ -357,19 +314,12 @@ def frac(H: Complex, G: Complex) -> Array:
 def fdac(H: Complex, G: Complex) -> Array:
     """(n_f, n_g) frequency domain assurance, from 0 to 1 [1].
 
-    Args:
-        H: (n_f, n_s, n_e) responses [m/N].
-        G: (n_g, n_s, n_e) responses, each line of which is compared with each of H [m/N].
+    H (n_f, n_s, n_e) and G (n_g, n_s, n_e) are responses [m/N], compared line by line.
     """
     A, B = (X.reshape(len(X), -1) / np.linalg.norm(X, axis=(1, 2))[:, None] for X in (H, G))
     return np.abs(A.conj() @ B.T) ** 2
 
 
 def deviation(H: Complex, test: Complex) -> Array:
-    """(n_f,) norm(H - test) / norm(test) of each line [1].
-
-    Args:
-        H: (n_f, n_s, n_e) responses of the model [m/N].
-        test: (n_f, n_s, n_e) measured ones [m/N].
-    """
+    """(n_f,) norm(H - test) / norm(test) of each line [1], of responses (n_f, n_s, n_e) [m/N]."""
     return np.linalg.norm(H - test, axis=(1, 2)) / np.linalg.norm(test, axis=(1, 2))

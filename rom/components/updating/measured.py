@@ -43,8 +43,7 @@ class Channels:
             nearest one.
 
     Raises:
-        ConfigError: unless both are k rows of three numbers, all directions have a length, and as
-            many bodies are named.
+        ConfigError: if a direction has no length, or not as many bodies are named.
     """
 
     points: Annotated[npt.ArrayLike, Number("m", (3,), (None, 3))]
@@ -195,8 +194,7 @@ class Responses:
         coherence: (n_f, n_s, n_e) from 0 to 1, estimated with H; or one number, which is known; 0
             for a line not to be used [1].
         averages: number of averages behind H and the coherence.
-        quantity: "displacement", "velocity", "acceleration" or "strain" in the surface, of all
-            sensors or (n_s,) of each.
+        quantity: of all sensors or (n_s,) of each; "strain" is that in the surface.
         force_noise: noise on the signal of a force over the force itself, one number or (n_f, n_e)
             [1]. All sensors that were measured at the same time have the error in common that
             comes of it.
@@ -271,9 +269,7 @@ class Responses:
     ) -> tuple[Array, Array]:
         """(n_s, 6 + r) of sensors, displacement [1] or strain [1/m], and (n_e, 6 + r) of inputs.
 
-        Args:
-            bodies: see `Channels.rows`.
-            tolerance: see `Channels.rows` [m].
+        Bodies and the tolerance are as of `Channels.rows`.
 
         Raises:
             ConfigError, ModelError: see `Channels.rows`.
@@ -293,8 +289,8 @@ class Responses:
     def logarithm(self) -> Complex:
         """(n_f, n_s, n_e) ln of displacement [m/N] or strain [1/N]; zero where H is not used.
 
-        Raises:
-            ConfigError: see `Noise.bias`, which is taken off.
+        ConfigError: if forces are noisy and the estimator is not named, whose bias is taken
+            off, or if they are noisier than the coherence allows.
         """
         s, noise = 2j * np.pi * self.frequencies[:, None, None], self.noise
         orders = np.array([DERIVATIVES.get(quantity, 0) for quantity in self.quantities])

@@ -69,7 +69,7 @@ class Update:
 def responses(
     model: Model, p: ArrayLike, zeta: ArrayLike, omega: Array, inputs: tuple[int, ...]
 ) -> Complex:
-    """Receptances at the sensors.
+    """(n_f, n_s, n_e) receptances at the sensors [m/N].
 
     Args:
         model: with its sensors.
@@ -77,9 +77,6 @@ def responses(
         zeta: (m,) damping ratios of the lowest elastic modes [1].
         omega: (n_f,) circular frequencies [rad/s].
         inputs: sensors at which forces act.
-
-    Returns:
-        (n_f, n_s, n_e) [m/N].
 
     Raises:
         ConfigError: for an input that is no sensor, or a frequency that is not finite.
@@ -180,17 +177,9 @@ def _through(left: Complex, S: tuple[Array, ...], right: Complex, omega: Array) 
 def sensitivity(
     model: Model, p: ArrayLike, zeta: ArrayLike, omega: Array, inputs: tuple[int, ...]
 ) -> tuple[Complex, Complex]:
-    """Receptances, and their derivatives by p and ln zeta.
+    """Receptances (n_f, n_s, n_e) [m/N], and derivatives (..., n_p + m) by p and ln zeta.
 
-    Args:
-        model: with its sensors.
-        p: (n_p,) relative changes of stiffness and mass [1].
-        zeta: (m,) damping ratios of the lowest elastic modes [1].
-        omega: (n_f,) circular frequencies [rad/s].
-        inputs: sensors at which forces act.
-
-    Returns:
-        (n_f, n_s, n_e) and (n_f, n_s, n_e, n_p + m) [m/N].
+    Arguments are as of `responses`.
 
     Raises:
         ConfigError, ModelError: as `responses`.
@@ -206,11 +195,7 @@ def update_by_output(model: Model, test: Measurement, p: ArrayLike, zeta: ArrayL
     Each value counts by its relative error, so that antiresonances weigh as much as resonances. The
     ``verdict`` says whether what is left has the size of one noise at all sensors and in all bands.
 
-    Args:
-        model: with its sensors.
-        test: what was measured.
-        p: (n_p,) relative changes to start from [1].
-        zeta: (m,) damping ratios to start from [1].
+    The search begins at relative changes p (n_p,) and damping ratios zeta (m,) [1].
 
     Raises:
         ConfigError: if the test does not fit the model.
@@ -280,17 +265,12 @@ def solved(
 ) -> Update:
     """Least squares that are linear in p and ln zeta in each step, none longer than 0.2.
 
-    Args:
-        triangle: the function of p and zeta that gives the triangle, see `folded`, of derivatives
-            and residual, n + 1 columns; or of n instruments before them, which noise of the
-            derivatives leaves alone: the residual is made normal to these, and they take the place
-            of the derivatives as soon as a step is not half as long as the one before.
-        start: p (n_p,) and zeta (m,).
-        n_values: number of residuals.
-        limits: of p.
-        prior: (n_p,) standard deviation of p about zero before the test, against what is left.
-        prior_damping: ratio before the test and standard deviation of its logarithm.
-        enough: length of a step in standard deviations that is the last one.
+    The triangle of p (n_p,) and zeta (m,), see `folded`, is that of derivatives and residual, n + 1
+    columns; or of n instruments before them, which noise of the derivatives leaves alone: the
+    residual is made normal to these, and they take the place of the derivatives as soon as a step
+    is not half as long as the one before. A step of less than enough standard deviations is the
+    last. The prior is the standard deviation (n_p,) of p about zero before the test, against what
+    is left; that of damping is a ratio and the deviation of its logarithm.
     """
     (x, ratios), path = start, []
     before = np.r_[np.zeros(x.size), np.full(ratios.size, np.log(prior_damping[0]))]
@@ -350,15 +330,11 @@ def response_function_method(
     Exact in one step when every dof is measured without noise. Else unmeasured rows of H_test
     follow the measured ones as the model at the last p says. Sensors are dofs.
 
-    Args:
-        model: with its sensors.
-        test: what was measured.
-        p: (n_p,) relative changes to start from [1].
-        C: (n, n) damping, which is known [N s/m].
-        steps: number of them; of several none changes a parameter by more than 0.2.
+    The search begins at relative changes p (n_p,) [1], none of which one of several steps changes
+    by more than 0.2. The damping C (n, n) is known [N s/m].
 
     Raises:
-        ConfigError: if damping or sensors do not fit the model, or without a step.
+        ConfigError: if damping or sensors do not fit the model.
 
     Source:
         Lin and Ewins, Analytical model improvement using frequency response functions, Mech. Syst.
@@ -387,12 +363,9 @@ def response_function_method(
 
 
 def common_basis(test: Complex, model: Complex, rank: int) -> Array:
-    """(n_s, rank) orthonormal directions of test and model responses, each of norm one [1].
+    """(n_s, rank) orthonormal directions [1] of responses (n_f, n_s, n_e) [m/N] of test and model.
 
-    Args:
-        test: (n_f, n_s, n_e) measured responses [m/N].
-        model: (n_f, n_s, n_e) those of the model [m/N].
-        rank: number of directions.
+    Each response to an input at a line counts by the norm one.
     """
     R = np.zeros((0, test.shape[1]))
     for H in (A[block] for block in blocks(len(test)) for A in (test, model)):

@@ -247,13 +247,10 @@ def parametric_basis(
 ) -> Array:
     """(n, r) basis [1] for a range of p: Craig-Bampton at samples, held at the sensors.
 
-    Args:
-        model: with its sensors.
-        n_modes: number of modes at each sample.
-        samples: (k, n_p) relative changes [1].
+    Each of the samples (k, n_p), relative changes [1], gives n_modes.
 
     Raises:
-        ConfigError: without a mode, or if sensors are no dofs.
+        ConfigError: if sensors are no dofs.
     """
     s = sensor_dofs(model)
     at = [model.at(p) for p in np.atleast_2d(np.asarray(samples, dtype=float))]

@@ -42,24 +42,11 @@ COLLOCATED_RTOL = 1e-8  # of the row of a sensor that measures what an input dri
 
 @dataclass(frozen=True, slots=True)
 class Data:
-    """Logarithms of responses and what they are worth.
+    """Logarithms of responses and what they are worth; the last four as of `Errors`."""
 
-    Attributes:
-        omega: (n_f,) lines [rad/s].
-        logarithm: (n_f, n_s, n_e) ln of displacement per force.
-        weight: (n_f, n_s, n_e) one over the standard deviation of both its parts; 0 for values
-            that are not used.
-        common: (n_f, 1, n_e) or one standard deviation of the error that all sensors of a line and
-            an input share.
-        varied: (n_f, n_s, n_e) or one standard deviation of the squared errors of sensors over
-            themselves, where they are estimated.
-        known: degrees of freedom of chi-square for each residual.
-        scale: relative variance of all squared errors of sensors together.
-    """
-
-    omega: Array
-    logarithm: Complex
-    weight: Array
+    omega: Array  # (n_f,) lines [rad/s]
+    logarithm: Complex  # (n_f, n_s, n_e) ln of displacement per force
+    weight: Array  # (n_f, n_s, n_e) one over the standard deviation of both parts; 0 if not used
     common: Array | float = 0.0
     varied: Array | float = 0.0
     known: float = 1.0
@@ -90,19 +77,12 @@ class Data:
 
 @dataclass(frozen=True, slots=True)
 class Sums:
-    """Sums over all lines.
+    """Sums over all lines; `varied` is what the information is worth less by estimated weights."""
 
-    Attributes:
-        normal: (n_q, n_q) J^T J.
-        gradient: (n_q,) J^T r.
-        squares: (n_f, n_s, n_e) squared residuals, of real and imaginary part together.
-        varied: (n_q, n_q) what the information is worth less as weights are estimated.
-    """
-
-    normal: Array
-    gradient: Array
-    squares: Array
-    varied: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    normal: Array  # (n_q, n_q) J^T J
+    gradient: Array  # (n_q,) J^T r
+    squares: Array  # (n_f, n_s, n_e) squared residuals, of real and imaginary part together
+    varied: Array = field(default_factory=lambda: np.zeros((0, 0)))  # (n_q, n_q)
 
     @property
     def chi_square(self) -> float:

@@ -17,12 +17,7 @@ PIN_SLENDERNESS = 12.0  # of a pin; its ball is three times as thick
 
 
 def match(family: Family, test: Responses, path: Path) -> None:
-    """Draw where the points of a test are, also of one that does not belong to the body.
-
-    Raises:
-        ConfigError: for a picture of another kind.
-        ModelError: if the body carries no surface.
-    """
+    """Draw where the points of a test are, also of one that does not belong to the body."""
     check_ending(path, "a picture", ".png")
     points = np.vstack([test.sensors.points, test.inputs.points])
     far = cKDTree(_surface(family)[0]).query(points)[0]
@@ -56,10 +51,6 @@ def drawn(
 
 
 def _surface(family: Family) -> tuple[Array, Index]:
-    """Points (n, 3) [m] and triangles of all bodies together.
-
-    Raises:
-        ModelError: if a body carries no surface.
-    """
+    """Points (n, 3) [m] and triangles of all bodies together."""
     surfaces = [surface_of(body) for body in Parts.of(family).bodies.values()]
     return view.joined([(surface.points, surface.triangles) for surface in surfaces])

@@ -55,10 +55,8 @@ class Plan:
     """Where to measure and to shake, and what the test will tell.
 
     Attributes:
-        sensors: the chosen ones.
-        inputs: the chosen ones.
-        sensor_numbers: (n_s,) their numbers among the candidates.
-        input_numbers: (n_e,) likewise.
+        sensors, inputs: the chosen ones.
+        sensor_numbers, input_numbers: (n_s,) and (n_e,) among the candidates.
         names: (n,) of the unknowns, damping ratios last.
         covariance: (n, n) that the logarithms of the unknowns will have [1].
         unseen: directions, {name: share [1]} in the parameters, that the data will not see.
@@ -108,7 +106,7 @@ class Plan:
 
 @typed
 def candidates(body: FlexibleBody | Family, n: int, *, fixed: Held = ()) -> Channels:
-    """Points spread over the surface of a body, each with the three axes as directions.
+    """Channels along three axes at each of n points spread over the surface of a body.
 
     Each next point is the one farthest from those before. Points that supports hold are left out.
 
@@ -116,9 +114,6 @@ def candidates(body: FlexibleBody | Family, n: int, *, fixed: Held = ()) -> Chan
         body: with its outer surface; a family of bodies, or several in an assembly: all surfaces.
         n: number of points.
         fixed: what is held in the test, see `FlexibleBody.frequencies`.
-
-    Returns:
-        3 n channels.
 
     Raises:
         ConfigError: if the surface has fewer points that move.
@@ -220,7 +215,7 @@ def place(  # noqa: PLR0913  keywords of one call
         floor: the same where there is no response, per unit force [unit of the quantity per N];
             None for a thousandth of the largest response: 60 dB below it cables and analysers see
             themselves. Without a floor antiresonances tell more than they can.
-        quantity: "displacement", "velocity" or "acceleration".
+        quantity: of all sensors.
         fixed: what will be held, see `FlexibleBody.frequencies`.
         attached: {name: `GroundSpring`, `AddedMass` or `JointSpring`} with unknown factors.
         damping: expected ratio of all modes [1].

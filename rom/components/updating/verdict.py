@@ -1,7 +1,5 @@
 """What the data say: the record of an update, channels that cannot be right, and the verdict.
 
-It says whether noise explains what is left, and where it does not.
-
 Source:
     Score test: Rao, Large sample tests of statistical hypotheses, Proc. Cambridge Philos. Soc. 44
     (1948) 50.
@@ -153,20 +151,13 @@ class Updated:
         n: int,
         seed: int = 0,
     ) -> Complex:
-        """Responses, also where nothing was measured, at factors that the test leaves possible.
+        """(n, n_f, n_s, n_e) displacement per force [m/N] at factors that the test leaves possible.
 
         Logarithms of the unknowns are normal about what was found, with its covariance. The spread
         of the responses is what is not known of them if the model is right.
 
-        Args:
-            frequencies: (n_f,) lines [Hz].
-            sensors: anywhere on the body.
-            inputs: likewise.
-            n: number of draws.
-            seed: of the random numbers.
-
-        Returns:
-            (n, n_f, n_s, n_e) displacement per force [m/N].
+        Sensors and inputs may be anywhere on the body, also where nothing was measured, at lines
+        (n_f,) [Hz]; n draws are made.
 
         Raises:
             ConfigError: for lines that are not finite, channels off the body, or no draw.

@@ -18,23 +18,14 @@ N_NEIGHBOURS = 15  # nodes that a node between them follows
 
 @dataclass(frozen=True, slots=True)
 class Pairing:
-    """How the dofs of one cyclic face follow from those of the other.
+    """How the dofs of one cyclic face follow from those of the other."""
 
-    Attributes:
-        n_sectors: number N of sectors of the wheel.
-        step: +1 if the slave turns into its master by one sector backwards, -1 by one forwards.
-        slave: the face that follows; the finer one if the nodes differ.
-        master: the face that leads.
-        weights: (k_slave, k_master) values at the nodes of the slave from those of the master.
-        matching: True when each node has a partner.
-    """
-
-    n_sectors: int
-    step: int
-    slave: Interface
-    master: Interface
-    weights: csr_matrix
-    matching: bool
+    n_sectors: int  # number N of sectors of the wheel
+    step: int  # +1 if the slave turns into its master by one sector backwards, -1 by one forwards
+    slave: Interface  # the face that follows; the finer one if the nodes differ
+    master: Interface  # the face that leads
+    weights: csr_matrix  # (k_slave, k_master) values at the nodes of the slave from the master's
+    matching: bool  # True when each node has a partner
 
 
 def turned(axis: Array, angle: float) -> Array:
@@ -45,12 +36,7 @@ def turned(axis: Array, angle: float) -> Array:
 
 
 def paired(low: Interface, high: Interface, axis: Array, at: Array) -> Pairing:
-    """Pair two faces, in any order, that one sector turns into each other about a unit vector.
-
-    Raises:
-        InterfaceError: if the angle between them does not divide the circle, a face touches the
-            axis, or they are no images of each other.
-    """
+    """Pair two faces, in any order, that one sector turns into each other about a unit vector."""
     N, forward = _sectors(low, high, axis, at)
     finer = low.nodes.size > high.nodes.size
     slave, master = (low, high) if finer else (high, low)
@@ -68,11 +54,7 @@ def paired(low: Interface, high: Interface, axis: Array, at: Array) -> Pairing:
 
 
 def refuse_all_around(points: Array, axis: Array, at: Array) -> None:
-    """Faces may also be images of each other about an axis that runs through the sector.
-
-    Raises:
-        InterfaceError: if the nodes of the sector lie evenly all around the axis.
-    """
+    """Refuse nodes all around the axis: faces may also be images about one inside the sector."""
     x = points - at
     across = x - np.outer(x @ axis, axis)
     spread = np.sqrt((across**2).sum(axis=1).mean())

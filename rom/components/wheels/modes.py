@@ -100,7 +100,7 @@ def cyclic_modes(sector: CyclicSector, diameter: int, n: int, *, speed: float = 
 def wheel_modes(
     sector: CyclicSector, n: int, *, diameters: Sequence[int] | None = None, speed: float = 0.0
 ) -> tuple[CyclicModes, ...]:
-    """Lowest modes of a wheel with each number of nodal diameters.
+    """Lowest modes of a wheel with each number of nodal diameters, in the order given.
 
     Under mpirun the numbers are shared among the ranks, each of which finds the modes of its own;
     all ranks must call, and all get all modes.
@@ -111,14 +111,8 @@ def wheel_modes(
         diameters: numbers of nodal diameters; all the wheel can have, 0 to N / 2, unless given.
         speed: angular speed [rad/s], see `cyclic_modes`.
 
-    Returns:
-        CyclicModes for each number, in the order given.
-
     Raises:
         ConfigError, ModelError, ModesMissedError: on all ranks, see `cyclic_modes`.
-
-    Source:
-        Thomas, Dynamics of rotationally periodic structures, Int. J. Numer. Meth. Engng. 14 (1979).
 
     Example:
         >>> K, M = csr_matrix([[2.0, -1.0], [-1.0, 2.0]]), csr_matrix(np.eye(2) / 2)

@@ -69,8 +69,8 @@ def reduce_sector(
 
     The faces follow u_master = (Q (x) I) a and u_slave = C (Q (x) I) b with functions Q that are
     chosen before anything is solved; both faces take the same, so that sectors stay joined exactly
-    and a and b are again dofs of a sector whose faces match. Frequencies are never below those of
-    the full sector.
+    and a and b are again dofs of a sector whose faces match: `cyclic_modes` and the others take it
+    like any sector. Frequencies are never below those of the full sector.
 
     Args:
         sector: the full sector, made by `CyclicSector.from_model`.
@@ -79,9 +79,6 @@ def reduce_sector(
             held they fall to zero, see `fading`. Order 7 with 60 modes brings the ten lowest
             frequencies of each nodal diameter of a bladed disk within 0.1 %.
         method: ``CraigBampton(n_modes)`` instead of the number.
-
-    Returns:
-        ReducedSector; `cyclic_modes` and the other functions take it like any sector.
 
     Raises:
         ConfigError: if the sector has no geometry of its faces, or cannot have so many modes.
@@ -105,21 +102,13 @@ def reduce_sector(
 
 @dataclass(kw_only=True)
 class SectorDraft(Draft):
-    """The reduction of a sector under way, whose faces, and where it is cut, follow functions.
+    """The reduction of a sector under way, whose faces, and where it is cut, follow functions."""
 
-    Attributes:
-        root: (3 k,) dofs of a further cut, and (k, m) functions on it.
-        parts: (held dofs, number of modes) of each part; one with all cuts held if missing.
-        moved: (n, c) unit motions of the cuts, zero on all other dofs.
-        held: dofs of the cuts, and those that do not move at all.
-        q: number of coordinates of either face.
-    """
-
-    root: tuple[Index, Array] | None = None
-    parts: tuple[tuple[Index, int], ...] = ()
-    moved: Array = field(init=False)
-    held: Index = field(init=False)
-    q: int = field(init=False)
+    root: tuple[Index, Array] | None = None  # (3 k,) dofs of a further cut, (k, m) functions on it
+    parts: tuple[tuple[Index, int], ...] = ()  # (held dofs, number of modes) of each; one if empty
+    moved: Array = field(init=False)  # (n, c) unit motions of the cuts, zero on all other dofs
+    held: Index = field(init=False)  # dofs of the cuts, and those that do not move at all
+    q: int = field(init=False)  # number of coordinates of either face
 
 
 def connect_faces(draft: SectorDraft) -> None:
@@ -196,11 +185,7 @@ def projected(sector: CyclicSector, Psi: Array, q: int, omega: Array) -> Reduced
 
 
 def face_functions(sector: CyclicSector, functions: Functions) -> Array:
-    """(k, m) functions on the leading face, orthonormal over its area, zero where it is held.
-
-    Raises:
-        InterfaceError: if all of the face is held.
-    """
+    """(k, m) functions on the leading face, orthonormal over its area, zero where it is held."""
     face: Interface = sector.face
     V, S = functions.functions(face), face.surface_mass
     at_rest = np.isin(face.dofs[::3], sector.held)

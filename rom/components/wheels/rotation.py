@@ -35,12 +35,8 @@ NONE_POSITIVE = 1e-4  # of the largest size: round-off of solutions with slender
 def rotating_sector(sector: CyclicSector, model: FEModel) -> CyclicSector:
     """The sector with the matrices of its rotation, for all speeds.
 
-    The wheel turns about the axis of the sector; its centrifugal stress is that of the linear
-    solid, and grows with the square of the speed.
-
-    Args:
-        sector: made from the model by `CyclicSector.from_model`.
-        model: the finite elements.
+    The wheel turns about the axis of the sector, made from the model by `CyclicSector.from_model`;
+    its centrifugal stress is that of the linear solid, and grows with the square of the speed.
 
     Raises:
         ConfigError: if the model has no finite elements, or carries attachments.
@@ -69,9 +65,8 @@ def refuse_attachments(model: FEModel) -> None:
 def rotation_matrices(M: Matrix, axis: Array) -> tuple[csr_matrix, csr_matrix]:
     """Coriolis matrix per rad/s and softening M (I (x) P) per (rad/s)^2, (n, n) each [kg].
 
-    Args:
-        M: (n, n) mass of a solid, the same for all directions [kg].
-        axis: (3,) unit vector [1].
+    M (n, n) is the mass of a solid, the same for all directions [kg], the axis (3,) a unit vector
+    [1].
 
     Source:
         See docs/theory/rotating_solids.md for G and the softening.
@@ -114,11 +109,8 @@ def axial_pins(sector: CyclicSector) -> Index:
 def divergence_speed(sector: CyclicSector, diameter: int) -> float:
     """Speed [rad/s] at which rotation has used up the stiffness; infinite if it never does.
 
-    The smallest Omega with a singular K + Omega^2 C, Coriolis forces left out.
-
-    Args:
-        sector: a supported sector with matrices of rotation.
-        diameter: number of nodal diameters.
+    The smallest Omega with a singular K + Omega^2 C at this number of nodal diameters, Coriolis
+    forces left out, of a supported sector with matrices of rotation.
 
     Raises:
         ModelError: if nothing holds the wheel even at rest.
@@ -135,12 +127,7 @@ def divergence_speed(sector: CyclicSector, diameter: int) -> float:
 def largest_ratio(C: csr_matrix, K: csr_matrix) -> float:
     """Largest eigenvalue mu of C x = mu K x, zero if none is positive.
 
-    Args:
-        C: (n, n) symmetric or Hermitian.
-        K: (n, n) the same, positive definite.
-
-    Raises:
-        ModelError: if K is not.
+    C (n, n) is symmetric or Hermitian, and so is K, which must be positive definite.
     """
     if K.shape[0] <= MAX_DENSE_DOFS:
         return max(_largest(C.toarray(), K.toarray()), 0.0)

@@ -242,13 +242,9 @@ class CyclicSector:
         return np.array(columns, dtype=complex).reshape(-1, self.n).T
 
     def wheel(self, *others: Matrix) -> tuple[csr_matrix, ...]:
-        """Matrices of the whole wheel, dofs of sector j in its own turned axes.
+        """K, M and others of the whole wheel, (N f, N f): block j is sector j in its turned axes.
 
-        Args:
-            others: further matrices, each (n, n) for all sectors alike or a list of N of them.
-
-        Returns:
-            K, M and the others, (N f, N f) each; block j belongs to sector j.
+        Others are (n, n) for all sectors alike or lists of N of them.
         """
         own, following = self.parts()
         N = self.n_sectors
@@ -262,17 +258,15 @@ class CyclicSector:
         return tuple(assembled(A) for A in (self.K, self.M, *others))
 
     def on_wheel(self, shapes: Complex, diameter: int, phase: float = 0.0) -> Array:
-        """Real displacements of all sectors, in the axes of the wheel where there are points.
+        """(N, n, m) real displacements of all sectors, in axes of the wheel where there are points.
 
-        Mass-normalised shapes of a sector become mass-normalised shapes of the wheel.
+        Mass-normalised shapes of a sector become mass-normalised shapes of the wheel, in units of
+        them.
 
         Args:
             shapes: (n, m) complex displacements of sector 0, in units of any kind.
             diameter: number of nodal diameters.
             phase: turns the wave [rad]; a quarter of 2 pi gives its partner.
-
-        Returns:
-            (N, n, m), in units of the shapes.
         """
         j = np.arange(self.n_sectors)
         wave = np.exp(1j * (diameter * self.angle * j - phase))
@@ -291,9 +285,6 @@ def each_diameter(
     """Values of a function of each number of nodal diameters, or those given, shared by all ranks.
 
     The function must not wait for other ranks.
-
-    Raises:
-        ConfigError: if the wheel cannot have one of them.
     """
     every = [sector.checked(n) for n in (sector.diameters if diameters is None else diameters)]
     costs = [1.0 if sector.standing(n) else PAIR_COST for n in every]
@@ -301,11 +292,7 @@ def each_diameter(
 
 
 def region(model: FEModel, name: str) -> tuple[csr_matrix, csr_matrix]:
-    """(n, n) stiffness [N/m] and mass [kg] of one region, on every rank.
-
-    Raises:
-        ConfigError: if it is unknown.
-    """
+    """(n, n) stiffness [N/m] and mass [kg] of one region, on every rank."""
     check_known(name, model.regions, f"the sector has no region {name!r}; it has")
     share = model.regions[name]
     return all_rows(model, share.K), all_rows(model, share.M)

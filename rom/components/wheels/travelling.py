@@ -221,8 +221,7 @@ class WheelCampbell(Waves):
         speeds: (s,) [rad/s].
         diameter: number of nodal diameters.
         omega: (s, n) circular frequencies seen from the wheel [rad/s]; a column may cross others.
-        direction: (n,) [1] +1 for waves that run ahead with the rotation, -1 against it, 0
-            standing.
+        direction: (n,) [1] as of `TravellingModes`.
         mac: (s, n) likeness [1], 0 to 1, of each shape to that at the speed before; where it is
             near one half two waves change their shapes, and the speeds are too far apart.
     """

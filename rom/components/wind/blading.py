@@ -195,9 +195,7 @@ class RotorLoad(NamedTuple):
 def blading(tilt: float = SHAFT_TILT, cone: float = CONE_ANGLE) -> Blading:
     """The blades of the NREL 5 MW turbine, in seventeen strips.
 
-    Args:
-        tilt: of the shaft, nose up [rad].
-        cone: of the blades, upwind [rad].
+    The shaft is tilted nose up, the blades are coned upwind [rad].
 
     Raises:
         ConfigError: for angles beyond the model.
@@ -284,10 +282,6 @@ def rotor_load(  # noqa: PLR0913  one keyword per choice, all with defaults
         skew: whether the wake leans as the wind does on a disc that is tilted or yawed.
         tower: whether the tower of the turbine dams the wind.
         n_azimuths: places of a blade in a turn.
-
-    Raises:
-        ConfigError: for a wind or a speed below zero or not finite, a pitch of more than a turn,
-            a yaw beyond the model, or no azimuths.
     """
     out = np.zeros((n_azimuths, len(blades.profile), 6))
     shape, tube = (blades.twist, blades.radius), TOWER_TUBE if tower else NO_TOWER

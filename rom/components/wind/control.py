@@ -92,14 +92,9 @@ def controller_step(state, speed, dt):
 
 @typed
 def generator_torque(speed: float, pitch: float = 0.0) -> float:
-    """Torque of the generator at its speed [rad/s], on the fast shaft [N m].
+    """Torque of the generator at its speed [rad/s] and a pitch [rad], on the fast shaft [N m].
 
-    Args:
-        speed: of the generator [rad/s].
-        pitch: of the blades [rad]; from one degree on the power is held at any speed.
-
-    Raises:
-        ConfigError: for a speed or a pitch that is not finite.
+    From a pitch of one degree on the power is held at any speed.
     """
     return float(asked_torque.py_func(speed, pitch))
 
@@ -143,11 +138,7 @@ class Controller:
 
 
 def check_rotor(blades: Blading) -> None:
-    """Refuse a rotor that the controller is not made for.
-
-    Raises:
-        ConfigError: for blades of another length or number.
-    """
+    """Refuse a rotor that the controller is not made for, of other blades."""
     ratio = blades.rotor_radius / ROTOR_RADIUS
     if abs(ratio - 1.0) > MAX_RADIUS_CHANGE or blades.n_blades != N_BLADES:
         raise ConfigError(
@@ -181,8 +172,7 @@ def steady(
             control: that of another turbine.
 
     Raises:
-        ConfigError: for a wind in which the turbine is parked, or blades of another one that are
-            not held.
+        ConfigError: for a wind in which the turbine is parked, or other blades that are not held.
     """
     if held is not None:
         return rotor_load(blading() if blades is None else blades, wind, *held(wind), tower=tower)
@@ -214,11 +204,7 @@ def power_curve(
 ) -> dict[str, Array]:
     """The turbine over steady winds.
 
-    Args:
-        winds: (k,) speeds [m/s].
-        blades: those of the turbine, changed at most; None: as published.
-        tower: whether the tower dams the wind.
-        held: see `steady`.
+    Winds (k,) are speeds [m/s]; other arguments are as of `steady`.
 
     Returns:
         {name: (k,)} of ``wind`` [m/s], ``speed`` of the rotor [rad/s], ``pitch`` [rad], ``power``
@@ -226,8 +212,7 @@ def power_curve(
         the coefficients ``power_coefficient`` and ``thrust_coefficient`` of the rotor [1].
 
     Raises:
-        ConfigError: for winds that are no list, or in which the turbine is parked, or blades of
-            another one.
+        ConfigError: for winds that are no list, or as of `steady`.
     """
     winds = vector("winds", winds)
     points = [steady(float(wind), blades, tower=tower, held=held) for wind in winds]

@@ -82,8 +82,7 @@ def operate(
 ) -> Operation:
     """Let the controlled turbine work in a wind over time, from its steady state in the first.
 
-    The rotor is rigid; a tilted one meets the wind by the cosine of its tilt, the same at all
-    azimuths.
+    The rotor is rigid; a tilted one meets the wind by the cosine of its tilt at all azimuths.
 
     Args:
         wind: its speed [m/s] over time [s]; `rom.components.histories.read_record` reads a
@@ -96,9 +95,8 @@ def operate(
             then the generator takes what the wind gives.
 
     Raises:
-        ConfigError: for a step or an end that cannot be, or a wind in which the turbine is parked,
-            with its time, or a speed or a pitch to hold that is none, or blades of another turbine
-            that are not held.
+        ConfigError: for a wind in which the turbine is parked, with its time, a speed or a pitch to
+            hold that is none, or blades of another turbine that are not held.
     """
     blades = blading() if blades is None else blades
     t = dt * np.arange(round(t_end / dt) + 1)

@@ -70,11 +70,9 @@ class Profile:
         """The profile on a blade that turns, whose stall is late where the blade is wide.
 
         Above zero lift a share 3 (c / r)^2 of what lacks to potential flow comes back, at most all,
-        up to 30 degrees; it fades to none at 50, and drag stays. What has no lift stays as it is.
-        Profiles of the 5 MW turbine have such a delay already.
-
-        Args:
-            chord_over_radius: chord of a strip over its distance from the axis [1].
+        up to 30 degrees, with the ratio c / r of the chord to the distance from the axis [1]; it
+        fades to none at 50, and drag stays. What has no lift stays as it is. Profiles of the 5 MW
+        turbine have such a delay already.
 
         Raises:
             ConfigError: for a ratio that is negative or not finite.

@@ -146,19 +146,12 @@ def in_late_wind(
     Each vertex gets a law "<blade> strip <number>", which remembers the wake. Equilibria take the
     steady one, as does the first instant of a motion.
 
-    Args:
-        mechanism: that has the blade.
-        blade: a rod of `rom.Mechanism.add_nonlinear` from ``cosserat.body(blade(...))``.
-        wind: its speed [m/s], or (k, 2) instants [s] and speeds [m/s]: straight between them,
-            constant beyond.
-        axis: (3,) of the shaft, downwind, world [1].
-        cone: of the blades, upwind [rad].
-        tower: whether the tower on the origin of the world dams the wind.
-        density: of the air [kg/m^3].
+    The wind is a speed [m/s], or (k, 2) instants [s] and speeds [m/s]: straight between them,
+    constant beyond. The blade is a rod of `rom.Mechanism.add_nonlinear` from
+    ``cosserat.body(blade(...))``. Other arguments are as of `in_wind`.
 
     Raises:
-        ConfigError: for a wind that is no speed over time or comes from behind, or a density that
-            cannot be.
+        ConfigError: for a wind that is no speed over time or comes from behind, or a wrong density.
     """
     winds = over_time(wind)
     far = far_away((1.0, 0.0, 0.0), axis, tower=tower, density=density)
@@ -174,11 +167,7 @@ def in_late_wind(
 
 
 def over_time(wind: npt.ArrayLike) -> Array:
-    """(k, 2) instants [s] and speeds [m/s] of a wind, see `in_late_wind`.
-
-    Raises:
-        ConfigError: if it is no speed over time, or comes from behind.
-    """
+    """(k, 2) instants [s] and speeds [m/s] of a wind, see `in_late_wind`."""
     given = finite("wind", wind, None)
     winds = np.array([[0.0, given]]) if given.ndim == 0 else given
     if winds.ndim != 2 or winds.shape[1:] != (2,) or not len(winds):

@@ -181,8 +181,8 @@ def turbine(  # noqa: PLR0913  one keyword per choice, all with defaults
         torsion: factor of this rigidity likewise; some programs know no twist.
 
     Raises:
-        ConfigError: for less than one segment of a blade, a pitch of more than a turn, a solid that
-            is no hub, a wind that changes without a late wake, or one in which no controller works.
+        ConfigError: for a solid that is no hub, a wind that changes without a late wake, or one in
+            which no controller works.
         ModelError: if a rod is none, see `cosserat.rod`.
     """
     if controlled and wind is not None and (most := over_time(wind)[:, 1].max()) > CUT_OUT_WIND:

@@ -99,11 +99,8 @@ def blade(
 def tower(n: int = 40, *, top: float = 0.0, shear: float = 1.0, torsion: float = 1.0) -> Rod:
     """The tower, a conical tube along the third axis.
 
-    Args:
-        n: number of segments, of equal length.
-        top: a mass on its top [kg].
-        shear: factor of the shear rigidity [1], see `blade`.
-        torsion: factor of the torsional rigidity [1].
+    It has n segments of equal length and a mass on its top [kg]; factors of its rigidities for
+    shear and torsion [1] are as of `blade`.
     """
     s, middles, cells = _places(n)
 
@@ -255,9 +252,7 @@ class Rotor:
 def rotor(n: int = 24, *, blade_rod: Rod | None = None) -> Rotor:
     """The rotor of the NREL 5 MW turbine.
 
-    Args:
-        n: segments of the blade.
-        blade_rod: another blade, upright, whose root is on the hub.
+    Its blade has n segments, or is another one, upright, whose root is on the hub.
 
     Raises:
         ModelError: as `cosserat.rod`.

@@ -61,9 +61,6 @@ def flank_map(path: str | Path) -> Array:
     A line has the places along the lead at one place of the profile, from the root to the tip;
     empty lines are between teeth. A file without them is one map for all teeth.
 
-    Args:
-        path: of the file.
-
     Raises:
         ModelError: for what is no number, and teeth that are not of one size.
     """
@@ -78,11 +75,7 @@ def flank_map(path: str | Path) -> Array:
 
 
 def checked_map(given: npt.ArrayLike | None, teeth: int, what: str) -> Array:
-    """(teeth or 1, n_profile, n_lead) map, empty for none [m], of what a user gave for a wheel.
-
-    Raises:
-        ModelError: for another shape, and numbers that are none.
-    """
+    """(teeth or 1, n_profile, n_lead) map, empty for none [m], of what a user gave for a wheel."""
     if given is None:
         return np.zeros((0, 0, 0))
     found, wheel = np.asarray(given, dtype=float), abs(teeth)

@@ -271,15 +271,10 @@ def path_of_contact(pair: GearPair, alpha: float) -> tuple[float, float]:
 
 
 def line_length(pair: GearPair, tau: npt.ArrayLike, terms: int = 4000) -> Array:
-    """Total length of the contact lines over width / cos(base helix) [1], as a Fourier series.
+    """(n,) total length of contact lines over width / cos(base helix) [1], as a Fourier series.
 
-    Args:
-        pair: the gears.
-        tau: (n,) time in mesh periods since a pair began to touch on the first end of the face [1].
-        terms: of the series.
-
-    Returns:
-        (n,) lengths [1].
+    Tau (n,) is the time in mesh periods since a pair began to touch on the first end of the face
+    [1].
 
     Source:
         Maatar and Velex, J. Mech. Des. 118 (1996).

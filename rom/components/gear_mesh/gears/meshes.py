@@ -184,11 +184,7 @@ def gear_mesh(  # noqa: PLR0913  one keyword per property
 
 
 def phase_from(name: str, mesh: GearMesh, others: Iterable[tuple[str, GearMesh]]) -> float:
-    """Phase of a new `GearMesh` from others that its wheels have, 0 if they have none [rad].
-
-    Raises:
-        ModelError: if the teeth of both wheels do not fit: a planet that cannot be put in.
-    """
+    """Phase of a new `GearMesh` from others that its wheels have, 0 if they have none [rad]."""
     pair, found = mesh.pair, dict[int, tuple[float, str]]()
     for other, known in others:
         for side in (0, 1) if pair.teeth[1] else (0,):

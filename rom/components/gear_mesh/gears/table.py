@@ -47,82 +47,56 @@ SLICE_COLUMNS = FIRST_GRADIENT + COORDINATES
 
 @table
 class Meshes(Table):
-    """All meshes.
+    """All meshes."""
 
-    Attributes:
-        i, j: (k,) markers of pinion and gear.
-        axes: (k, 12) axis of the pinion, a direction across it, the same of the gear, in the axes
-            of their markers.
-        size: (k, 15) base radii, tip radii [m], base helix [rad], base pitch, thickness of the
-            pinion's teeth on the base circle, backlash [m], working pressure angle at the datum
-            [rad], width, offset of the faces [m], angle of the pinion at the datum [rad], length
-            of entry [m]; distance of a rack, 0 for gears, and height of its teeth [m].
-        flank: (k, 13) tip relief of pinion and gear, their extents [m], power, crowning, slope,
-            eccentricities of the wheels [m], their directions [rad], least gaps of working and
-            back flanks [m].
-        law: (k, 6) damping [s], coefficient of friction, transition speed [m/s], whether forces
-            follow the energy along the path, length over which slices carry each other [m],
-            compliance of the contact [m^2/N].
-        spin: (k, 2) of both wheels in the frames of their bodies, about the axis of the pinion
-            [rad/s]; clock: (1,) function that tells the time.
-        cells: (k,) slices across the face.
-        stiffness_at, stiffness: (k + 1,) where the tables begin [N/m^2].
-        constant_at, constant: (k + 1,) where those of the contact begin [1].
-        pitch_at, pitch: (2 k + 1,) where the pitch errors of wheels begin [m].
-        map_at, maps: (4 k + 1,) where the maps of the working flanks of both wheels and of their
-            back flanks begin [m].
-        map_shape: (4 k, 3) teeth, places along profile and lead.
-        remembered: (k,) first of two angles that are followed.
-        start: (k, 2) these angles at the datum [rad].
-        load: (k,) sum of the normal forces at the last residual; NaN without a common tangent [N].
-        approach: (k,) of the flanks that are deepest in each other, of wheels that are rigid [m].
-        slices: (k, m, 5) of all that bear at the last residual: side, place on the path of
-            contact, height over the middle of the face, length of the line [m], force [N].
-        n_slices: (k,) how many.
-        rims: how the rims of flexible wheels deform.
-        factor: (2,) of stiffness and damping in the tangents.
-        line: (c, 40) slices of one line, with the columns above.
-        gradient: (6,) of the energy, and of the power lost to damping, by the coordinates of the
-            wheels and their rates `speed` (6,).
-        hessian: (2, 6, 6) how it follows the coordinates and their rates.
-        rates: (6, 12) of the coordinates by the motions of both markers.
-        lever: (2, 12) what the motions do across a slice, and how they close it.
-        tangent: (2, 12, 12) of one mesh, by motions and velocities.
-    """
-
-    i: Index1
-    j: Index1
+    i: Index1  # (k,) markers of the pinions
+    j: Index1  # (k,) of the gears
+    # (k, 12) axis of the pinion, a direction across it, the same of the gear, in axes of their
+    # markers
     axes: Array2
+    # (k, 15) base radii, tip radii [m], base helix [rad], base pitch, thickness of the pinion's
+    # teeth on the base circle, backlash [m], working pressure angle at the datum [rad], width,
+    # offset of the faces [m], angle of the pinion at the datum [rad], length of entry [m]; distance
+    # of a rack, 0 for gears, and height of its teeth [m]
     size: Array2
+    # (k, 13) tip relief of pinion and gear, their extents [m], power, crowning, slope,
+    # eccentricities of the wheels [m], their directions [rad], least gaps of working and back
+    # flanks [m]
     flank: Array2
+    # (k, 6) damping [s], coefficient of friction, transition speed [m/s], whether forces follow the
+    # energy along the path, length over which slices carry each other [m], compliance of the
+    # contact [m^2/N]
     law: Array2
+    # (k, 2) of both wheels in the frames of their bodies, about the axis of the pinion [rad/s]
     spin: Array2
-    clock: Index1
-    cells: Index1
-    stiffness_at: Index1
-    stiffness: Array1
-    constant_at: Index1
-    constant: Array1
-    pitch_at: Index1
-    pitch: Array1
-    map_at: Index1
-    maps: Array1
-    map_shape: Index2
-    remembered: Index1
-    start: Array2
-    load: Scratch1
-    approach: Scratch1
+    clock: Index1  # (1,) function that tells the time
+    cells: Index1  # (k,) slices across the face
+    stiffness_at: Index1  # (k + 1,) where the tables begin
+    stiffness: Array1  # [N/m^2]
+    constant_at: Index1  # (k + 1,) where those of the contact begin
+    constant: Array1  # [1]
+    pitch_at: Index1  # (2 k + 1,) where the pitch errors of wheels begin
+    pitch: Array1  # [m]
+    map_at: Index1  # (4 k + 1,) where maps of working flanks, then of back flanks, begin
+    maps: Array1  # [m]
+    map_shape: Index2  # (4 k, 3) teeth, places along profile and lead
+    remembered: Index1  # (k,) first of two angles that are followed
+    start: Array2  # (k, 2) these angles at the datum [rad]
+    load: Scratch1  # (k,) sum of normal forces at the last residual; NaN: no common tangent [N]
+    approach: Scratch1  # (k,) of the flanks deepest in each other, of wheels that are rigid [m]
+    # (k, m, 5) of all that bear at the last residual: side, place on the path of contact, height
+    # over the middle of the face, length of the line [m], force [N]
     slices: Scratch3
-    n_slices: Scratch1
-    rims: Cylinders
-    factor: Scratch1
-    line: Scratch2
-    gradient: Scratch1
-    speed: Scratch1
-    hessian: Scratch3
-    rates: Scratch2
-    lever: Scratch2
-    tangent: Scratch3
+    n_slices: Scratch1  # (k,) how many
+    rims: Cylinders  # how the rims of flexible wheels deform
+    factor: Scratch1  # (2,) of stiffness and damping in the tangents
+    line: Scratch2  # (c, 40) slices of one line, with the columns above
+    gradient: Scratch1  # (6,) of the energy and power lost, by coordinates of the wheels and rates
+    speed: Scratch1  # (6,) these rates
+    hessian: Scratch3  # (2, 6, 6) how the gradient follows the coordinates and their rates
+    rates: Scratch2  # (6, 12) of the coordinates by the motions of both markers
+    lever: Scratch2  # (2, 12) what the motions do across a slice, and how they close it
+    tangent: Scratch3  # (2, 12, 12) of one mesh, by motions and velocities
 
 
 @inner

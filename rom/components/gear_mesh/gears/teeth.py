@@ -45,10 +45,7 @@ from rom.mbs.kernels.element_calls import energy, residuals, tangents
 
 @inner
 def add_lines(s, W, meshes, k, what):
-    """Go over the contact lines of both flanks of mesh k; what they store.
-
-    What is asked for is FORCES, TANGENTS or ENERGY.
-    """
+    """Go over the contact lines of both flanks for FORCES, TANGENTS or ENERGY; what they store."""
     state, total = set_frame(s, W, meshes, k), 0.0
     path = path_of_contact(meshes.size[k], state[1], state[4][0])
     if what == col.FORCES:  # not a number without a common tangent, which ends the motion

@@ -22,27 +22,16 @@ LAWS = {"none": FULL, "reynolds": REYNOLDS, "jfo": JFO}
 
 
 class Grid(NamedTuple):
-    """Cells of an unwrapped bearing; column i is centred at angle i dtheta.
+    """Cells of an unwrapped bearing; column i is centred at angle i dtheta."""
 
-    Attributes:
-        angle: (2, nt, 2) cosine and sine at the centres [0] and behind them at the faces [1].
-        bore: (2, nt) film of the centred journal there, in clearances.
-        Z: (nz,) centres of the cells along the width.
-        Z_face: (nz + 1,) their faces.
-        fixed: (nt, nz) 1 where the pressure is that of the inlet.
-        inlet: (nt, nz) pressure there [Pa].
-        slender: (R/L)^2.
-        half: 1.0 if the cells cover half the width, the other half being its image; else 0.0.
-    """
-
-    angle: Array
-    bore: Array
-    Z: Array
-    Z_face: Array
-    fixed: Index
-    inlet: Array
-    slender: float
-    half: float
+    angle: Array  # (2, nt, 2) cosine and sine at the centres [0] and behind them at the faces [1]
+    bore: Array  # (2, nt) film of the centred journal there, in clearances
+    Z: Array  # (nz,) centres of the cells along the width
+    Z_face: Array  # (nz + 1,) their faces
+    fixed: Index  # (nt, nz) 1 where the pressure is that of the inlet
+    inlet: Array  # (nt, nz) pressure there [Pa]
+    slender: float  # (R/L)^2
+    half: float  # 1.0 if the cells cover half the width, the other half being its image; else 0.0
 
 
 @typed
@@ -143,11 +132,7 @@ class JournalBearing:
         return grooved, replace(grooved, grooves=())
 
     def thinnest(self, motion: npt.ArrayLike) -> float:
-        """Smallest film of the cells [m] when the journal is there.
-
-        Args:
-            motion: (2,) or (4,) ex, ey, phi_x, phi_y of the journal in the bush [m, rad].
-        """
+        """Smallest film of the cells [m] at a motion (2,) or (4,) of the journal [m, rad]."""
         m = four(motion) / self.scale
         edges = np.zeros(1) if self.aligned else np.array([-0.5, 0.5])
         return self.clearance * float(np.min(thickness(self.grid, m, edges)))
@@ -156,10 +141,7 @@ class JournalBearing:
 def multilobe(lobes: int, preload: float, *, first: float = 0.0) -> Callable[[Array], Array]:
     """A bore of several equal arcs, each moved towards the middle along its own middle.
 
-    Args:
-        lobes: number of arcs.
-        preload: clearances by which they are moved [1].
-        first: angle of the middle of one of them [rad].
+    The preload is in clearances [1], the angle ``first`` that of the middle of an arc [rad].
 
     Raises:
         ModelError: for no arcs, or a preload that leaves no room.

@@ -40,9 +40,6 @@ def bore_of(
 
     Amplitudes are per elastic coordinate of the part; the axes (2, 3) are that of the bush, and the
     direction from which angles count, in the frame of the part.
-
-    Raises:
-        ConfigError: for a bush that has no such functions, or is not the bore of this bearing.
     """
     where = f"the bush of bearing {name!r}, {bush.place!r} of body {bush.body!r},"
     (axis, across), found = axes, deformable(part, bush)

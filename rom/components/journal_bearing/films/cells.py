@@ -39,68 +39,45 @@ class Cells(Table):
 
     Unwrapped, film in clearances c, pressure in viscosity times (R/c)^2 over seconds, width in
     lengths L of the bearing. Rows are padded to those of the largest film.
-
-    Attributes:
-        shape: (k, 2) nt, nz.
-        law: (k,) FULL, REYNOLDS or JFO.
-        size: (k, 6) R, L, c [m], (R/L)^2, 2 if the cells cover half the width and the other half is
-            their image, else 1; where the cells begin along the width.
-        circle: (k, nt, 6) cosine, sine, bore at the centres of columns and at the faces behind.
-        fixed: (k, n) 1 where a groove holds the pressure.
-        inlet: (k, n) pressure there [Pa].
-        n_functions: (k,) number of functions by which a bore that deforms opens the film;
-            functions: (k, n, m) their values at the centres [1].
-        state: (k, 11) motion (4,) and its rate [1/s], spin of the journal [rad/s], time that has
-            passed since the filling was known [s], whether it is remembered.
-        opening, opening_rate: (k, n) by which the bush gives way, in clearances; per second.
-        supply: (k, n) pressure of the grooves in units of the film.
-        behind, side, middle: (k, n), (k, nt (nz + 1)), (k, n) film at the faces behind, at the
-            faces across, at the centres.
-        conducts, leaks: (k, n), (k, nt (nz + 1)) conductance of these faces.
-        store, gain: (k, n) oil that a cell takes up when full, and has had to give.
-        content: (k, n) film times filling at the last accepted instant.
-        active: (k, n) 1 where the film carries pressure: a guess, and what came out.
-        place: (k, nt) order of the columns.
-        band: (k, n, 4 nz + 1) factors of the balances.
-        unknown, P, fill: (k, n) of the balances; pressure; filling [1].
-        answer: (k, 5 + m) forces that work on the motions, friction torque, forces that work on
-            the functions.
-        weight: (k, n, 5 + m) of the balances in each answer.
-        change: (k, 9 + 2 m) derivatives of the balance of one cell by motions, rates, spin,
-            openings and their rates.
-        slope: (k, 5 + m, 9 + 2 m) the same of the answers.
     """
 
-    shape: Index2
-    law: Index1
+    shape: Index2  # (k, 2) nt, nz
+    law: Index1  # (k,) FULL, REYNOLDS or JFO
+    # (k, 6) R, L, c [m], (R/L)^2, 2 if the cells cover half the width and the other half is their
+    # image, else 1; where the cells begin along the width
     size: Array2
-    circle: Array3
-    fixed: Index2
-    inlet: Array2
-    n_functions: Index1
-    functions: Array3
+    circle: Array3  # (k, nt, 6) cosine, sine, bore at centres of columns and at the faces behind
+    fixed: Index2  # (k, n) 1 where a groove holds the pressure
+    inlet: Array2  # (k, n) pressure there [Pa]
+    n_functions: Index1  # (k,) of functions by which a bore that deforms opens the film
+    functions: Array3  # (k, n, m) their values at the centres [1]
+    # (k, 11) motion (4,) and its rate [1/s], spin of the journal [rad/s], time that has passed
+    # since the filling was known [s], whether it is remembered
     state: Scratch2
-    opening: Scratch2
-    opening_rate: Scratch2
-    supply: Scratch2
-    behind: Scratch2
-    side: Scratch2
-    middle: Scratch2
-    conducts: Scratch2
-    leaks: Scratch2
-    store: Scratch2
-    gain: Scratch2
-    content: Scratch2
-    active: Address2
-    place: Address2
-    band: Scratch3
-    unknown: Scratch2
-    P: Scratch2
-    fill: Scratch2
+    opening: Scratch2  # (k, n) by which the bush gives way, in clearances
+    opening_rate: Scratch2  # (k, n) per second
+    supply: Scratch2  # (k, n) pressure of the grooves in units of the film
+    behind: Scratch2  # (k, n) film at the faces behind
+    side: Scratch2  # (k, nt (nz + 1)) at the faces across
+    middle: Scratch2  # (k, n) at the centres
+    conducts: Scratch2  # (k, n) conductance of the faces behind
+    leaks: Scratch2  # (k, nt (nz + 1)) of the faces across
+    store: Scratch2  # (k, n) oil that a cell takes up when full
+    gain: Scratch2  # (k, n) oil that a cell has had to give
+    content: Scratch2  # (k, n) film times filling at the last accepted instant
+    active: Address2  # (k, n) 1 where the film carries pressure: a guess, and what came out
+    place: Address2  # (k, nt) order of the columns
+    band: Scratch3  # (k, n, 4 nz + 1) factors of the balances
+    unknown: Scratch2  # (k, n) unknowns of the balances
+    P: Scratch2  # (k, n) pressure
+    fill: Scratch2  # (k, n) filling [1]
+    # (k, 5 + m) forces that work on the motions, friction torque, forces that work on the functions
     answer: Scratch2
-    weight: Scratch3
+    weight: Scratch3  # (k, n, 5 + m) of the balances in each answer
+    # (k, 9 + 2 m) derivatives of the balance of one cell by motions, rates, spin, openings and
+    # their rates
     change: Scratch2
-    slope: Scratch3
+    slope: Scratch3  # (k, 5 + m, 9 + 2 m) the same of the answers
 
 
 def cells_of(
@@ -108,10 +85,7 @@ def cells_of(
 ) -> Cells:
     """The cells of some bearings.
 
-    Args:
-        bearings: k of them.
-        functions: (n, m) by which the bore of each opens the film in its cells; None of a rigid
-            one.
+    Functions (n, m) are those by which each bore opens the film in its cells, None of a rigid one.
     """
     k, grids = len(bearings), [one.grid for one in bearings]
     shapes = np.array([grid.fixed.shape for grid in grids], dtype=np.int64).reshape(-1, 2)

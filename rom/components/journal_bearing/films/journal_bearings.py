@@ -100,8 +100,8 @@ def journal_bearing(  # noqa: PLR0913  one keyword per property
 
     Raises:
         ConfigError: for a name in use, unknown markers, a journal that touches its bush at the
-            start, numbers no film has, an elastic bush without functions of this bore, or a film
-            that is more than a table.
+            start, an elastic bush without functions of this bore, or a film that is more than a
+            table.
     """
     self.check_apart(name, journal, bush)
     z, x = _directions(name, axis, reference)

@@ -60,55 +60,36 @@ LEAST_RENEWED = 1e-2
 
 @table
 class Journals(Table):
-    """All films between journals and bushes.
+    """All films between journals and bushes."""
 
-    Attributes:
-        i, j: (k,) markers of journal and bush.
-        axes: (k, 3, 3) axis of the journal in the axes of its marker; axis of the bush and the
-            direction from which angles count, in those of the other.
-        oil: (k, 9) viscosity if it is constant, else 0 [Pa s]; A, B of Walther's law; density
-            [kg/m^3]; specific heat [J/(kg K)]; inlet temperature [degrees Celsius]; share of the
-            heat that the temperature of the film feels; lag of it [s]; height of roughness [m].
-        clock: (1,) function that tells the time.
-        remembered: (k,) first of the numbers that each remembers.
-        films: their cells.
-        scale: (k, 4) motions that change the film by a clearance [m, rad].
-        turning: (k,) spin of the journal against the bush of bodies that spin in their frames
-            [rad/s].
-        largest: (k,) pressure [Pa], not finite where there is no film.
-        thinnest: (k,) film [m], which is below zero where the journal is beyond the bush.
-        viscosity: (k,) at the last residual [Pa s].
-        bores: (k, m, R) amplitudes by which bushes open their films per elastic coordinate [m].
-        amplitude: (k, 2 m) of the functions, and their rates, in clearances.
-        pressed: (m, 12) changes of the forces on a bore by motions, or velocities, of both markers.
-        change: (5 + m,) imaginary steps of the answers.
-        number: (k,) of the table that the film is read from; -1 of one that is solved.
-        nodes: (n_tables, n, 12) of the tables.
-        read: (4, 12) what was read last, and its derivatives.
-        flow, peak: (k,) oil that leaves and largest pressure, in units of the film.
-    """
-
-    i: Index1
-    j: Index1
+    i: Index1  # (k,) markers of the journals
+    j: Index1  # (k,) of the bushes
+    # (k, 3, 3) axis of the journal in the axes of its marker; axis of the bush and the direction
+    # from which angles count, in those of the other
     axes: Array3
+    # (k, 9) viscosity if it is constant, else 0 [Pa s]; A, B of Walther's law; density [kg/m^3];
+    # specific heat [J/(kg K)]; inlet temperature [degrees Celsius]; share of the heat that the
+    # temperature of the film feels; lag of it [s]; height of roughness [m]
     oil: Array2
-    clock: Index1
-    remembered: Index1
-    films: Cells
-    scale: Array2
+    clock: Index1  # (1,) function that tells the time
+    remembered: Index1  # (k,) first of the numbers that each remembers
+    films: Cells  # their cells
+    scale: Array2  # (k, 4) motions that change the film by a clearance [m, rad]
+    # (k,) spin of the journal against the bush of bodies that spin in their frames [rad/s]
     turning: Array1
-    largest: Scratch1
-    thinnest: Scratch1
-    viscosity: Scratch1
-    bores: Array3
-    amplitude: Scratch2
+    largest: Scratch1  # (k,) pressure [Pa], not finite where there is no film
+    thinnest: Scratch1  # (k,) film [m], which is below zero where the journal is beyond the bush
+    viscosity: Scratch1  # (k,) at the last residual [Pa s]
+    bores: Array3  # (k, m, R) amplitudes by which bushes open films per elastic coordinate [m]
+    amplitude: Scratch2  # (k, 2 m) of the functions, and their rates, in clearances
+    # (m, 12) changes of the forces on a bore by motions, or velocities, of both markers
     pressed: Scratch2
-    change: Scratch1
-    number: Index1
-    nodes: Array3
-    read: Scratch2
-    flow: Scratch1
-    peak: Scratch1
+    change: Scratch1  # (5 + m,) imaginary steps of the answers
+    number: Index1  # (k,) of the table that the film is read from; -1 of one that is solved
+    nodes: Array3  # (n_tables, n, 12) of the tables
+    read: Scratch2  # (4, 12) what was read last, and its derivatives
+    flow: Scratch1  # (k,) oil that leaves, in units of the film
+    peak: Scratch1  # (k,) largest pressure, in units of the film
 
 
 @inner

@@ -129,9 +129,8 @@ def carried(films, k, west, east):
 def balance_slopes(films, k, i, j):
     """Changes of the balance of a cell.
 
-    Returns:
-        By the film at the faces behind and before it, at its centre, at its two sides; by the rate
-        of the film; by the spin.
+    These are by the film at the faces behind and before it, at its centre, at its two sides; by the
+    rate of the film; by the spin.
     """
     nt, nz = films.shape[k]
     dtheta, dZ = cell_size(films, k)
@@ -203,8 +202,7 @@ def add_change(films, k, row):
 def solve_film(films, k, viscosity):
     """Pressure, answers and slopes of film k at its state.
 
-    Returns:
-        How often the cavitated region was solved for; -1 if it would not settle.
+    Returned is how often the cavitated region was solved for; -1 if it would not settle.
     """
     set_heights(films, k)
     set_supply(films, k, viscosity)

@@ -48,11 +48,7 @@ SMALL_ECCENTRICITY = 1e-2  # below which artanh is a series
 
 
 def table_of(name: str, bearing: JournalBearing) -> Array:
-    """Spline coefficients (places^2 directions, values) of a bearing, solved once for its shape.
-
-    Raises:
-        ConfigError: for bores and oil whose films have more to remember than a place.
-    """
+    """Spline coefficients (places^2 directions, values) of a bearing, solved once for its shape."""
     reasons = {
         "conserves its oil, which it remembers": bearing.cavitation == "jfo",
         "has a bore that is not round": bool((bearing.grid.bore != 1.0).any()),

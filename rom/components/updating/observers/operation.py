@@ -56,9 +56,6 @@ class Sensors:
         quantity: "displacement", "velocity", "acceleration", or along the direction the normal
             "strain", in the surface and constant over a triangle of it, or the normal "stress".
         noise: standard deviation of a sample [unit of the quantity]; not used where it is wanted.
-
-    Raises:
-        ConfigError: for another quantity, or noise that is negative or not finite.
     """
 
     channels: Channels
@@ -74,59 +71,34 @@ class Sensors:
 
 @dataclass(frozen=True, slots=True)
 class Rows:
-    """What sensors see of m modes; n_t terms have factors.
+    """What sensors see of m modes; n_t terms have factors."""
 
-    Attributes:
-        displacement: (k, m) of y [unit of a sensor / (m kg^(1/2))].
-        carried: (n_t, k, m) of y, times the factor of a term of the stiffness.
-        velocity: (k, m) of y'.
-        acceleration: (k, m) of y''.
-    """
-
-    displacement: Array
-    carried: Array
-    velocity: Array
-    acceleration: Array
+    displacement: Array  # (k, m) of y [unit of a sensor / (m kg^(1/2))]
+    carried: Array  # (n_t, k, m) of y, times the factor of a term of the stiffness
+    velocity: Array  # (k, m) of y'
+    acceleration: Array  # (k, m) of y''
 
 
 @dataclass(frozen=True, slots=True)
 class Linear:
-    """The equations at one point of the parameters, with their derivatives there.
+    """The equations at one point of the parameters, with their derivatives there."""
 
-    Attributes:
-        A: (n, n) rates of the state [1/s].
-        dA: (n_p, n, n) by the logarithms of factors.
-        C: (n_y, n) what sensors see [unit of a sensor / unit of a state].
-        dC: (n_p, n_y, n) likewise.
-        W: (n_v, n) what is wanted.
-        dW: (n_p, n_v, n) likewise.
-    """
-
-    A: Array
-    dA: Array
-    C: Array
-    dC: Array
-    W: Array
-    dW: Array
+    A: Array  # (n, n) rates of the state [1/s]
+    dA: Array  # (n_p, n, n) by the logarithms of factors
+    C: Array  # (n_y, n) what sensors see [unit of a sensor / unit of a state]
+    dC: Array  # (n_p, n_y, n) likewise
+    W: Array  # (n_v, n) what is wanted
+    dW: Array  # (n_p, n_v, n) likewise
 
 
 @dataclass(frozen=True, slots=True)
 class Operation:
-    """Modes of a body, forces on them, and what is seen.
+    """Modes of a body, forces on them, and what is seen."""
 
-    Attributes:
-        model: in its modes at factors of one, of the parameters that change.
-        omega: (m,) frequencies of these modes [rad/s].
-        XI: (m, m) damping [1/s].
-        driven: (m, n_e) forces of the modes per force.
-        seen: rows of the sensors.
-        wanted: rows of what is wanted.
-    """
-
-    model: FamilyModel
-    omega: Array
-    XI: Array
-    driven: Array
+    model: FamilyModel  # in its modes at factors of one, of the parameters that change
+    omega: Array  # (m,) frequencies of these modes [rad/s]
+    XI: Array  # (m, m) damping [1/s]
+    driven: Array  # (m, n_e) forces of the modes per force
     seen: Rows
     wanted: Rows
 

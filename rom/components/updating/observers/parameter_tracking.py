@@ -58,9 +58,6 @@ class Drift:
     Attributes:
         first: its relative standard deviation about one before the first sample [1].
         walk: relative standard deviation after a second, as a random walk [1/s^(1/2)].
-
-    Raises:
-        ConfigError: if the first is not positive, or the walk negative.
     """
 
     first: Annotated[float, Positive()]
@@ -72,12 +69,7 @@ class ParameterTracker:
     """A family with sensors and unknown forces, and parameters that change.
 
     Attributes:
-        operation: its equations.
-        assumed: of steps and forces.
-        drifts: of the parameters, by name.
         R: (n_y,) variances of samples [unit of a sensor, squared].
-        sensors: what is measured.
-        wanted: what is to be estimated.
     """
 
     operation: Operation
@@ -95,9 +87,7 @@ class ParameterTracker:
     def run(self, samples: npt.ArrayLike, times: npt.ArrayLike | None = None) -> Track:
         """Filter a record that begins at rest.
 
-        Args:
-            samples: (n_t, n_y), in the order of the sensors; NaN where one is missing.
-            times: (n_t,) of the samples, to see that their steps are dt [s]; None to trust.
+        Samples and times are as of `Tracker.run`.
 
         Raises:
             ConfigError: for another number of sensors, infinite samples, or unequal steps.
@@ -163,20 +153,9 @@ def parameter_tracker(  # noqa: PLR0913  keywords of one call
 ) -> ParameterTracker:
     """A filter that also follows parameters: a joint that loosens, a mass that grows.
 
-    Args:
-        family: from `rom.reduce_parametric`, with moduli and densities, in SI units; or several, as
-            a `rom.parametric.FamilyAssembly`, whose parameters are called "body.parameter".
-        sensors: see `tracker`.
-        forces: see `tracker`.
-        wanted: see `tracker`.
-        parameters: {name: `Drift`} of the family or of what is attached; others stay at one.
-        dt: see `tracker` [s].
-        walk: see `tracker` [N/s^(1/2)].
-        damping: ratio of all modes at factors of one [1].
-        attached: {name: `GroundSpring`, `AddedMass` or `JointSpring`}.
-        fixed: see `tracker`.
-        unmodelled: see `tracker` [m kg^(1/2)/s^(3/2)].
-        first: see `tracker` [N].
+    Parameters are {name: `Drift`} of the family or of what is attached, {name: `GroundSpring`,
+    `AddedMass` or `JointSpring`}; others stay at one. The family is as of `rom.update`, in SI
+    units, the damping that of all modes at factors of one [1]. The rest is as of `tracker`.
 
     Raises:
         ConfigError: as `tracker`, or for an unknown parameter or none.

@@ -208,17 +208,12 @@ Points = Callable[[Array], tuple[Array, Linear, Array]]
 def recorded(
     y: Array, P: Array, R: Array, n_forces: int, n_p: int, points: Points, reach: float = np.inf
 ) -> Track:
-    """Filter samples y (n_t, n_y) of a record that begins at rest.
+    """Filter samples y (n_t, n_y), NaN where one is missing, of a record that begins at rest.
 
-    Args:
-        y: NaN where a sample is missing.
-        P: (N, N) covariance before the first one; parameters are the last n_p states.
-        R: (n_y,) variances of samples.
-        n_forces: number of states before the parameters that are forces.
-        n_p: number of parameters.
-        points: of logarithms of factors (n_p,) the point about which to linearise, the equations
-            there, A being the transition, and the covariance (N, N) of what a step adds.
-        reach: distance of a logarithm from the point after which another one is taken.
+    P (N, N) is the covariance before the first one, with forces and parameters as the last states;
+    R (n_y,) are variances of samples. Points give, of logarithms of factors (n_p,), the point about
+    which to linearise, the equations there, A being the transition, and the covariance (N, N) of
+    what a step adds; beyond the reach of a logarithm from it another point is taken.
     """
     N, n = len(P), len(P) - n_p
     z, P, k = np.zeros(N), P.copy(), 0
@@ -270,20 +265,12 @@ def checked_record(
 
 @dataclass(frozen=True, slots=True)
 class Assumed:
-    """What a filter assumes of its time steps and forces.
+    """What a filter assumes of its time steps and forces."""
 
-    Attributes:
-        dt: step between samples [s].
-        walk: standard deviation of a force after a second [N/s^(1/2)].
-        unmodelled: intensity of white accelerations of each mode [m kg^(1/2)/s^(3/2)].
-        first: standard deviation of the forces before the first sample [N]; None for a second of
-            their walk.
-    """
-
-    dt: float
-    walk: float
-    unmodelled: float = 0.0
-    first: float | None = None
+    dt: float  # step between samples [s]
+    walk: float  # standard deviation of a force after a second [N/s^(1/2)]
+    unmodelled: float = 0.0  # intensity of white accelerations of each mode [m kg^(1/2)/s^(3/2)]
+    first: float | None = None  # deviation of forces before the first sample [N]; None: of a second
 
     def white(self, operation: Operation) -> Array:
         """(n, n) intensity of the noise of the state."""

@@ -67,14 +67,11 @@ def side_by_side(
 class Bodies:
     """To which bodies of an assembly nodes belong.
 
-    Attributes:
-        of_nodes: {node: body}.
-        names: of all bodies, to which entities in universal files belong by their first ten
-            characters, where one of them does.
+    Entities in universal files belong to a body by the first ten characters of its name.
     """
 
-    of_nodes: Mapping[int, str]
-    names: Collection[str] = ()
+    of_nodes: Mapping[int, str]  # {node: body}
+    names: Collection[str] = ()  # of all bodies; empty where no entity is one
 
     def of(self, functions: tuple[Function, ...]) -> "Bodies":
         """Without the names where the entities of no function are bodies."""

@@ -127,11 +127,7 @@ def read_modes(path: str | Path, *, points: str | Path | None = None) -> Measure
 
 @typed
 def write_responses(test: Responses, path: str | Path) -> Path:
-    """Write measured responses as HDF5, whole or not at all.
-
-    Args:
-        test: what to write.
-        path: file name, ending in .h5.
+    """Write measured responses as HDF5, to a file that ends in .h5, whole or not at all.
 
     Raises:
         ConfigError: for another ending, or if the folder is missing or not writable.

@@ -31,11 +31,7 @@ def plain(text: str) -> str:
 
 
 def in_si(text: str, quantity: str) -> float:
-    """Metres, newtons or hertz of a unit of "length", "force" or "frequency".
-
-    Raises:
-        ConfigError: for another word, as V, of a sensor that is not calibrated.
-    """
+    """Metres, newtons or hertz of a unit of "length", "force" or "frequency"."""
     units = QUANTITIES[quantity]
     if plain(text) not in units:
         hint = f"Known are {', '.join(units)}{'; calibrate volts' * (quantity == 'force')}."
@@ -44,11 +40,7 @@ def in_si(text: str, quantity: str) -> float:
 
 
 def motion_of_unit(text: str) -> tuple[int, float]:
-    """Type of ordinate (8 displacement, 11 velocity, 12 acceleration) and factor to SI units.
-
-    Raises:
-        ConfigError: for another word, as V, of a sensor that is not calibrated.
-    """
+    """Type of ordinate (8 displacement, 11 velocity, 12 acceleration) and factor to SI units."""
     unit = plain(text)
     if unit in IN_G:
         return 12, STANDARD_GRAVITY
@@ -62,11 +54,7 @@ def motion_of_unit(text: str) -> tuple[int, float]:
 
 
 def motion_per_force(text: str) -> tuple[int, float]:
-    """Type of ordinate and factor to SI units of a ratio, as (m/s^2)/N.
-
-    Raises:
-        ConfigError: for another word.
-    """
+    """Type of ordinate and factor to SI units of a ratio, as (m/s^2)/N."""
     motion, slash, force = plain(text).rpartition("/")
     if not slash:
         raise ConfigError(f"the unit {text!r} must be one of a motion per force, as m/s^2/N.")

@@ -56,11 +56,7 @@ class GyroscopicModes:
     shapes: Complex
 
     def waves(self) -> tuple[Array, Complex]:
-        """The motions that turn with exp(i w t), w > 0.
-
-        Returns:
-            w (n,) [rad/s], ascending, and shapes (n, n) of length 1 [1].
-        """
+        """Ascending w (n,) > 0 [rad/s], shapes (n, n) of length 1 [1] of the motions exp(i w t)."""
         n = len(self.shapes)
         q = self.shapes[:, n:]
         return self.w[n:], q / np.linalg.norm(q, axis=0)
@@ -71,8 +67,7 @@ class GyroscopicModes:
         Args:
             p: (n,) forces on mass-normalised modes [N kg^-1/2].
             sweep: (w,) circular frequencies omega [rad/s].
-            damping: a motion decays at this share zeta [1] of its w, as exp(i w sqrt(1 - zeta^2)
-                t).
+            damping: a motion decays at this share zeta [1] of its w, exp(i w sqrt(1 - zeta^2) t).
         """
         slower = np.sqrt(1.0 - damping**2)
         met = self.velocities.conj().T @ p
@@ -83,9 +78,7 @@ class GyroscopicModes:
 def gyroscopic_modes(omega: Array, g: Array) -> GyroscopicModes:
     """Motions of q'' + g q' + omega^2 q = 0.
 
-    Args:
-        omega: (n,) circular frequencies without g, positive [rad/s].
-        g: (n, n) skew-symmetric [rad/s].
+    Frequencies omega (n,) without g are positive, g (n, n) is skew-symmetric [rad/s].
 
     Source:
         Meirovitch, A new method of solution of the eigenvalue problem for gyroscopic systems,
@@ -107,8 +100,7 @@ class BladedWheel:
             mass-normalised waves with all roots held.
         M: (d, d) its mass [kg; 1].
         roots: (N, r, c) how the roots of the blades move by these coordinates, in units of them.
-        rigid: (c, k) rigid motions of a free wheel, in units of the coordinates; k = 0 if it is
-            held.
+        rigid: (c, k) rigid motions of a free wheel, in units of the coordinates; k = 0 if held.
         coriolis: (d, d) Coriolis matrix of the disk per rad/s [kg], or None.
         centrifugal: (d, d) change of K per (rad/s)^2 [kg]; None at rest.
     """
@@ -130,14 +122,9 @@ class BladedWheel:
     def matrices(
         self, blades: Sequence[ReducedBlade], *, speed: float = 0.0
     ) -> tuple[Array, Array]:
-        """Stiffness and mass of the wheel: disk, then the cantilever modes of all blades.
+        """Stiffness [N/m; 1/s^2] and mass [kg; 1], (n, n): disk, then cantilever modes of blades.
 
-        Args:
-            blades: N of them, in the order of the sectors.
-            speed: angular speed that stiffens and softens [rad/s].
-
-        Returns:
-            (n, n), (n, n) stiffness [N/m; 1/s^2] and mass [kg; 1].
+        Blades stand in the order of the N sectors; the speed stiffens and softens them [rad/s].
 
         Raises:
             ConfigError: if there is not one blade for each sector, one has another root, or the
@@ -180,14 +167,9 @@ class BladedWheel:
         return A
 
     def of_blades(self, blades: Sequence[ReducedBlade], Phi: Array) -> list[Array]:
-        """Root and cantilever coordinates of every blade in k motions of the wheel.
+        """(r + m, k) root and cantilever coordinates of every blade in k motions of the wheel.
 
-        Args:
-            blades: N of them, in the order of the sectors.
-            Phi: (n, k) motions, in units of the coordinates.
-
-        Returns:
-            (r + m, k) per blade, in units of Phi.
+        They are in units of the motions Phi (n, k); blades stand in the order of the N sectors.
 
         Raises:
             ConfigError: if Phi or the blades do not fit the wheel.
@@ -204,16 +186,10 @@ class BladedWheel:
     def modes(
         self, blades: Sequence[ReducedBlade], n: int | None = None, *, speed: float = 0.0
     ) -> Modes:
-        """Circular frequencies [rad/s] and mass-normalised modes of the wheel with these blades.
+        """Circular frequencies [rad/s] and mass-normalised modes, the n lowest; None for all.
 
-        Args:
-            blades: N of them, in the order of the sectors.
-            n: number of modes, lowest first; None for all.
-            speed: angular speed [rad/s]; Coriolis forces are left out, see `waves`.
-
-        Returns:
-            omega (n,), ascending, rigid motions of a free wheel exactly zero, and Phi with n
-            columns in the coordinates of `matrices`.
+        Frequencies (n,) ascend, rigid motions of a free wheel exactly zero; Phi is in coordinates
+        of `matrices`. Coriolis forces of the speed [rad/s] are left out, see `waves`.
 
         Raises:
             ConfigError: see `matrices`; for a free wheel at speed.
@@ -237,13 +213,8 @@ class BladedWheel:
     def waves(self, blades: Sequence[ReducedBlade], *, speed: float) -> Modes:
         """Circular frequencies [rad/s], seen from the wheel, and shapes with Coriolis forces.
 
-        Args:
-            blades: N of them, in the order of the sectors.
-            speed: angular speed [rad/s]; its sign is that of the axis.
-
-        Returns:
-            omega (n,), ascending, and complex Phi (n, n) in the coordinates of `matrices`, which
-            turn with exp(i omega t); of unit modal mass.
+        Omega (n,) ascends; complex Phi (n, n), in the coordinates of `matrices` and of unit modal
+        mass, turn with exp(i omega t). The sign of the speed [rad/s] is that of the axis.
 
         Raises:
             ConfigError, ModelError: see `modes`.
@@ -283,11 +254,11 @@ class BladedWheel:
         at: PerBlade,
         speed: float = 0.0,
     ) -> Complex:
-        """Answer of all blades to forces that travel around the wheel.
+        """(w, N, p) complex displacements [m] of all blades under forces that run around the wheel.
 
         Blade j feels force * exp(i E j alpha) * exp(i omega t) with the engine order E: for E > 0
         the wave runs against the rotation, as that of a wheel past struts at rest does. Every mode
-        of the wheel has the same share of critical damping.
+        has the same share of critical damping; displacements are in the axes of each sector.
 
         Args:
             blades: N of them, in the order of the sectors.
@@ -300,11 +271,8 @@ class BladedWheel:
                 or a list of N of them.
             speed: angular speed [rad/s], with Coriolis forces.
 
-        Returns:
-            (w, N, p) complex displacements [m], in the axes of each sector.
-
         Raises:
-            ConfigError: for damping not between 0 and 1, or a force or place off the blades.
+            ConfigError: for a force or a place off the blades.
             ModelError: if a motion has no stiffness.
         """
         check_damping_ratio(damping, "the wheel")
@@ -337,8 +305,7 @@ class BladedWheel:
             blades: see `response`.
             force: see `response`; on the tuned wheel the first of a list acts everywhere.
             at: the amplitude is the norm of these displacements; of a list, as with the force.
-            sweep: engine_order, omega, damping and speed of `response`; the tuned peak is found in
-                the same sweep.
+            sweep: engine_order, omega, damping and speed of `response`, also of the tuned peak.
 
         Raises:
             ConfigError: as `response`, or if the force does not move the tuned wheel there.
@@ -354,11 +321,7 @@ class BladedWheel:
 
 
 def _each(what: PerBlade, N: int) -> PerBlade:
-    """One for each blade: a list of arrays, or the same for all.
-
-    Raises:
-        ConfigError: if a list has another length.
-    """
+    """One for each blade: a list of arrays, or the same for all."""
     if not isinstance(what, list) or not what or np.ndim(what[0]) == 0:
         return [what] * N
     one_each("forces or places", len(what), "blades", N)

@@ -10,12 +10,6 @@ normalised on the wheel::
 so that a new set of blades costs a Fourier transform and an eigenvalue problem of the size of the
 frequency band, whatever the mesh. Modes of a wheel whose blades are all a little stiffer join the
 basis; they show how shapes change with a blade, so that errors are of second order in delta.
-
-Source:
-    Lim, Bladh, Castanier and Pierre, Compact, generalized component mode mistuning representation
-    for modeling bladed disk vibration, AIAA J. 45 (2007) 2285.
-    Whitehead, The maximum factor by which forced vibration of blades can increase due to mistuning,
-    J. Eng. Gas Turbines Power 120 (1998) 115.
 """
 
 from dataclasses import dataclass, replace
@@ -68,10 +62,7 @@ class MistunedWheel:
 
     @cached_property
     def certificate(self) -> Report:
-        """Wheels with all blades a little stiffer, or softer, against the sector.
-
-        The sector is that of the wheel, which may be reduced: then it has a certificate too.
-        """
+        """Wheels with all blades a little stiffer or softer against the sector, full or reduced."""
         rows: list[Row] = []
         for change in (STIFFER_BLADES, -STIFFER_BLADES):
             exact = replace(self.sector, K=self.sector.K + change * self.blade_stiffness)
@@ -82,8 +73,7 @@ class MistunedWheel:
     def stiffness(self, deviations: npt.ArrayLike) -> Complex:
         """(..., r, r) Hermitian stiffness in mass-normalised waves [1/s^2].
 
-        Args:
-            deviations: (..., N) relative deviations of the stiffness of the blades [1].
+        Deviations (..., N) are those of the stiffness of the blades, relative [1].
 
         Raises:
             ConfigError: if there is not one number above -1 for each blade.
@@ -124,7 +114,7 @@ class MistunedWheel:
         damping: Damping,
         at: npt.ArrayLike,
     ) -> Complex:
-        """Answer of all blades to forces that travel around the wheel.
+        """(w, N, p) complex displacements [m] of all blades under forces that run around the wheel.
 
         Sector j feels force * exp(i E j alpha) * exp(i omega t) with the engine order E; every
         mode of the mistuned wheel has the same share of critical damping.
@@ -137,9 +127,6 @@ class MistunedWheel:
             omega: (w,) circular frequencies [rad/s].
             damping: share of critical damping of each mode [1].
             at: (p,) dof numbers of a sector, or (p, n) rows [1], whose displacements are wanted.
-
-        Returns:
-            (w, N, p) complex displacements [m].
 
         Raises:
             ConfigError: for wrong deviations, or damping that is not positive.
@@ -160,19 +147,11 @@ class MistunedWheel:
         damping: Damping,
         at: npt.ArrayLike,
     ) -> Array:
-        """Largest amplitude of any blade of mistuned wheels, as a multiple of the tuned one.
+        """(s,) largest amplitudes of any blade of mistuned wheels, over that of the tuned one [1].
 
-        Args:
-            deviations: (s, N) one row per wheel; see `response` for the others.
-            force: (n,) see `response`.
-            engine_order: see `response`.
-            omega: (w,) sweep over the resonances [rad/s]; the tuned peak is found in the same
-                sweep.
-            damping: see `response`.
-            at: see `response`; the amplitude of a blade is the norm of these displacements.
-
-        Returns:
-            (s,) amplification factors [1].
+        Deviations (s, N) have one row per wheel; in the sweep omega (w,) over the resonances
+        [rad/s] the tuned peak is found too; the amplitude of a blade is the norm of the
+        displacements ``at``. Otherwise arguments are as of `response`.
 
         Raises:
             ConfigError: as `response`, or if the force does not move the tuned wheel there.

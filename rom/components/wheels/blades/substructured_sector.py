@@ -219,11 +219,7 @@ def turning(
 
 
 def stresses_of(model: FEModel, blade: str | None) -> Stresses:
-    """Stress that the elements of a blade carry.
-
-    Raises:
-        ConfigError: if there are none.
-    """
+    """Stress that the elements of a blade carry."""
     found = (model if blade is None else model.regions[blade]).stresses
     if found is None:
         raise ConfigError("the blade has no finite elements; make it with rom.fe.model.")
@@ -231,11 +227,7 @@ def stresses_of(model: FEModel, blade: str | None) -> Stresses:
 
 
 def cut(K: csr_matrix, K_blade: csr_matrix, name: str) -> tuple[Index, Index]:
-    """Inner dofs of a blade, and nodes of its root: those it shares with the rest.
-
-    Raises:
-        InterfaceError: if it shares none.
-    """
+    """Inner dofs of a blade, and nodes of its root: those it shares with the rest."""
     total, mine = K.diagonal(), K_blade.diagonal()
     shared = (mine > 0.0) & (total - mine > SHARED_STIFFNESS_RTOL * total)
     nodes = np.flatnonzero(shared.reshape(-1, 3).any(axis=1))
@@ -254,11 +246,7 @@ def root_of(model: FEModel, nodes: Index) -> Interface:
 
 
 def _same_surface(sector: SubstructuredSector, points: Array) -> csr_matrix:
-    """(k, m) values at nodes of the root of another blade from those at the root of a sector.
-
-    Raises:
-        InterfaceError: if the nodes cover another surface.
-    """
+    """(k, m) values at nodes of the root of another blade from those at the root of a sector."""
     own = sector.root_points
     size = np.ptp(own, axis=0).max()
     boxes = [np.array([p.min(axis=0), p.max(axis=0)]) for p in (own, points)]

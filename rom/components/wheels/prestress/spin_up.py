@@ -271,8 +271,7 @@ def spin_up(
         heat: a change of temperature, applied at rest.
 
     Raises:
-        ConfigError: if the model has no finite elements or carries attachments, or for a wrong
-            speed or number of states.
+        ConfigError: if the model has no finite elements or carries attachments.
         ModelError: if the solid passes an instability on its way; the message says where, and
             ``error.solution`` holds the states below.
 

@@ -92,16 +92,13 @@ class SteadyRotation:
     def follow(
         self, a: Array, start: float, end: float, load: Callable[[float], None]
     ) -> tuple[Array, float]:
-        """The equilibrium at the end of a stretch of load, or the last that is stable.
+        """Equilibrium (f,) [m] at the end of a stretch, or the last stable one, and its load.
 
         Args:
             a: (f,) equilibrium at the start [m].
             start: first value of the load [1 or (rad/s)^2].
             end: last value [1 or (rad/s)^2].
             load: sets the load.
-
-        Returns:
-            The equilibrium (f,) [m] and its load, which falls short of the end where the path does.
         """
 
         def ahead(

@@ -100,13 +100,8 @@ LARGEST_STRAIN = 0.5  # of heat, far beyond what a linear solid can say
 def heated(model: FEModel, heat: Heat, *, fixed: Fixed = ()) -> FEModel:
     """The model with the stiffness of its thermal stress, for `rom.modes` and `rom.reduce`.
 
-    Good as long as the supports are those under which it was heated; a body heated without
-    supports may move as it likes.
-
-    Args:
-        model: finite elements.
-        heat: expansion and temperature.
-        fixed: names of the interfaces that are held while it is heated; none for a free body.
+    Good as long as the supports are those under which it was heated, the interfaces ``fixed``; a
+    body heated without supports may move as it likes.
 
     Raises:
         ConfigError: if the model has no finite elements, or a region is unknown.
@@ -138,11 +133,8 @@ def heated(model: FEModel, heat: Heat, *, fixed: Fixed = ()) -> FEModel:
 def heated_sector(sector: CyclicSector, model: FEModel, heat: Heat) -> CyclicSector:
     """The sector with the stiffness of thermal stress, the same in all sectors.
 
-    Args:
-        sector: made from the model by `rom.CyclicSector.from_model`, with or without matrices of
-            rotation.
-        model: the finite elements.
-        heat: expansion and temperature of each sector.
+    The sector is made from the model by `rom.CyclicSector.from_model`, with or without matrices of
+    rotation.
 
     Raises:
         ConfigError: if the model has no finite elements, or a region is unknown.
@@ -162,13 +154,8 @@ def heated_sector(sector: CyclicSector, model: FEModel, heat: Heat) -> CyclicSec
 def thermal_buckling(model: FEModel, heat: Heat, *, fixed: Fixed = ()) -> float:
     """Factor [1] on the temperature at which the solid buckles; infinite if it never does.
 
-    The smallest positive tau with a singular K + tau K_geo; cooling has another one. Where only
-    strains beyond Hooke's law would make it singular, it never buckles.
-
-    Args:
-        model: finite elements.
-        heat: expansion and temperature.
-        fixed: names of the interfaces that are held.
+    The smallest positive tau with a singular K + tau K_geo, interfaces ``fixed`` held; cooling has
+    another one. Where only strains beyond Hooke's law would make it singular, it never buckles.
 
     Raises:
         ConfigError, InterfaceError: see `heated`.
@@ -183,11 +170,7 @@ def thermal_buckling(model: FEModel, heat: Heat, *, fixed: Fixed = ()) -> float:
 
 
 def finite_solid(model: FEModel, heat: Heat | None = None) -> Solid:
-    """The solid in large motion, heated, see `rom.fe.forms.large_strain.FiniteStrain`.
-
-    Raises:
-        ConfigError: if the model has no finite elements.
-    """
+    """The solid in large motion, heated, see `rom.fe.forms.large_strain.FiniteStrain`."""
     if model.stresses is None:
         raise ConfigError("the model has no finite elements; make it with rom.fe.model.")
     solid = model.stresses.finite_strain()
@@ -199,9 +182,7 @@ def finite_solid(model: FEModel, heat: Heat | None = None) -> Solid:
 def critical_factor(K: Matrix, K_geo: Matrix) -> float:
     """Smallest positive tau with a singular K + tau K_geo; infinite if there is none.
 
-    Args:
-        K: (n, n) stiffness, positive definite.
-        K_geo: (n, n) symmetric geometric stiffness of a load.
+    K (n, n) is positive definite, K_geo (n, n) the symmetric geometric stiffness of a load.
     """
     most = largest_ratio(csr_matrix(-K_geo), K)
     return 1 / most if most > 0 else np.inf
