@@ -171,8 +171,7 @@ def _lost(name: str, place: str, why: str) -> UnknownNameError:
     why = why if why.startswith("is ") else f"cannot be imported: {why}"
     whose = f"{name!r} belongs to the field {module!r}, which" if name else f"the field {module!r}"
     return UnknownNameError(
-        f"{whose} {why}.",
-        hint=f"pip install --force-reinstall {package} brings the field whole.",
+        f"{whose} {why}.", hint=f"pip install --force-reinstall {package} brings the field whole."
     )
 
 

@@ -11,15 +11,7 @@ from rom.body.frame import on_mean_axes, seen_from
 from rom.body.nonlinear.quartic import Quartic
 from rom.body.nonlinear.sampled import Sampled
 from rom.body.nonlinear.statics import critical_shares, follow
-from rom.body.records import (
-    BodyData,
-    Loads,
-    Marker,
-    Patch,
-    Surface,
-    n_rigid_motions,
-    still_motions,
-)
+from rom.body.records import BodyData, Loads, Marker, Patch, Surface, n_rigid_motions, still_motions
 from rom.body.reference import marker_motion, rigid_elastic, rigid_mass
 from rom.body.rotating import rotating_frequencies
 from rom.body.stiffening import SecondOrder

@@ -242,10 +242,7 @@ def _model(options: _Options, part: SolidMesh | None, head: _Head) -> FEModel:
         interfaces[key] = replace(interfaces[key], origin=point, axis=along)
     provenance = head.origin | made.provenance | {"warnings": remarks, "solver": why}
     return replace(
-        made,
-        operators=made.operators.solved_by(how),
-        provenance=provenance,
-        interfaces=interfaces,
+        made, operators=made.operators.solved_by(how), provenance=provenance, interfaces=interfaces
     )
 
 

@@ -78,10 +78,7 @@ WRONG_JSON = (*WRONG_TEXT, TypeError, AttributeError, RecursionError)
 
 @contextmanager
 def damaged(
-    what: str,
-    where: object = "",
-    hint: str = "",
-    causes: tuple[type[Exception], ...] = WRONG_TEXT,
+    what: str, where: object = "", hint: str = "", causes: tuple[type[Exception], ...] = WRONG_TEXT
 ) -> Iterator[None]:
     """Turn what wrong text causes, a ValueError, say, into an error that names its place."""
     try:

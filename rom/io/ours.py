@@ -43,11 +43,7 @@ FILE_SIGNS = {  # kind of file: how each that rom writes begins
     "vtkhdf": rb"\x89HDF\r\n.*" + MARK_BYTES,
     "json": rb'\{\s*"schema": ?"rom-(run|scene)"',
 }
-SAME_KIND = {
-    "sid-pysid": "sid",
-    "sid-geisler": "sid",
-    "openfast-4": "openfast",
-}
+SAME_KIND = {"sid-pysid": "sid", "sid-geisler": "sid", "openfast-4": "openfast"}
 LOCK_NAME = ".rom.lock"
 MAX_OWNER_BYTES = 300
 

@@ -7,12 +7,7 @@ from rom.body.flexible import FlexibleBody
 from rom.body.records import Marker
 from rom.body.recovery import CENTRIFUGAL_LOADS, PRODUCTS
 from rom.body.reference import skew_tensor
-from rom.body.stiffening import (
-    ANGULAR_LOADS,
-    LINEAR_LOADS,
-    SecondOrder,
-    interface_loads,
-)
+from rom.body.stiffening import ANGULAR_LOADS, LINEAR_LOADS, SecondOrder, interface_loads
 from rom.errors import ConfigError
 from rom.io.sid.dialect import by_mode, first
 from rom.io.sid.format import StandardInput, Taylor

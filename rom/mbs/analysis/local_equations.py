@@ -13,13 +13,7 @@ from scipy.linalg import solve_triangular
 from rom.arguments import typed
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.mbs.elements.family import Laws, apply_laws
-from rom.mbs.equations.equations import (
-    evaluate,
-    linearize_constraints,
-    residual,
-    retract,
-    tangents,
-)
+from rom.mbs.equations.equations import evaluate, linearize_constraints, residual, retract, tangents
 from rom.mbs.equations.packing import Packed, pack
 from rom.mbs.equations.sparse_solve import Matrix, Pattern
 from rom.mbs.integrate.consistent_start import (

@@ -76,13 +76,7 @@ def distance(
 
 
 def universal(
-    self: Whole,
-    name: str,
-    m1: Marker,
-    m2: Marker,
-    *,
-    axis1: Direction,
-    axis2: Direction,
+    self: Whole, name: str, m1: Marker, m2: Marker, *, axis1: Direction, axis2: Direction
 ) -> None:
     """Cardan joint: one axis on m1 stays perpendicular to another on m2; four constraints.
 

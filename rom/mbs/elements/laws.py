@@ -146,11 +146,7 @@ def law(  # noqa: PLR0913  one keyword per property
 
 
 def user_force(
-    self: Whole,
-    name: str,
-    function: Callable[..., Any],
-    m1: Marker,
-    m2: Marker | None = None,
+    self: Whole, name: str, function: Callable[..., Any], m1: Marker, m2: Marker | None = None
 ) -> None:
     """Force law in Python: ``function(t, a)`` or ``function(t, a, b)``.
 
@@ -419,7 +415,6 @@ LAWS_FAMILY = Family(
         body[at[:n]] for at, n in zip(laws.marker, laws.count, strict=True)
     ],
     hooks=Hooks(
-        asked=asked,
-        answers=lambda laws: [laws.answer[i:j] for i, j in pairwise(laws.answer_at)],
+        asked=asked, answers=lambda laws: [laws.answer[i:j] for i, j in pairwise(laws.answer_at)]
     ),
 )

@@ -6,13 +6,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve, qr
 
 from rom.arguments import typed, whole
-from rom.eigen.verbs import (
-    Held,
-    Operators,
-    orthonormal,
-    unit_motions,
-    without_dependent,
-)
+from rom.eigen.verbs import Held, Operators, orthonormal, unit_motions, without_dependent
 from rom.errors import InterfaceError
 from rom.model import Array, Basis, Index
 from rom.reduction.bases.fixed_interface import (

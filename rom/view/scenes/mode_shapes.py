@@ -195,10 +195,7 @@ class Around:
 
 
 def _around(
-    models: Sequence[FEModel],
-    hidden: tuple[str, ...],
-    axis: npt.ArrayLike,
-    sectors: Sequence[int],
+    models: Sequence[FEModel], hidden: tuple[str, ...], axis: npt.ArrayLike, sectors: Sequence[int]
 ) -> Around:
     e = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
     outside = {id(m): _outside(m, hidden) for m in models}

@@ -86,14 +86,7 @@ def disc_on_plane(  # noqa: PLR0913  two surfaces and a law
 
 
 def sphere_on_sphere(
-    self: Whole,
-    name: str,
-    m1: Marker,
-    m2: Marker,
-    law: Impact,
-    *,
-    radius1: Length,
-    radius2: Length,
+    self: Whole, name: str, m1: Marker, m2: Marker, law: Impact, *, radius1: Length, radius2: Length
 ) -> None:
     """Spheres of radius1 about m1 and radius2 about m2 [m].
 
