@@ -27,20 +27,17 @@ class StressRecovery:
     Rigid motion has none, so that it does not depend on the floating frame. The stress of modes
     that a reduction left out follows inertia without delay; the accelerations give it back.
 
-    Attributes:
-        points: (p, 3) undeformed positions [m].
-        operator: (6 p, r) stress xx, yy, zz, yz, xz, xy in the body frame per unit of each elastic
-            coordinate [Pa]; row 6*node + component.
-        inertial: (6 p, 12 + r) stress of the modes left out per unit of what `accelerations`
-            returns; None for bases without constraint modes.
-
     Source:
         The correction is the mode acceleration method, Craig and Kurdila, Fundamentals of
         Structural Dynamics (2006), applied to the inner dofs; Coriolis forces are left out.
     """
 
-    points: Array
+    points: Array  # (p, 3) undeformed positions [m]
+    # (6 p, r) stress xx, yy, zz, yz, xz, xy in the body frame per unit of each elastic coordinate
+    # [Pa]; row 6*node + component
     operator: Array
+    # (6 p, 12 + r) stress of the modes left out per unit of what `accelerations` returns; None for
+    # bases without constraint modes
     inertial: Array | None = None
 
     def field(self, q: Array, accelerations: Array | None = None) -> Array:

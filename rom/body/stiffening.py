@@ -67,18 +67,12 @@ def known_loads(body: BodyData) -> tuple[str, ...]:
 
 @dataclass(frozen=True, slots=True)
 class SecondOrder:
-    """Displacements psi_kl of second order, as far as loads see them.
+    """Displacements psi_kl of second order, as far as loads see them."""
 
-    Attributes:
-        S: (3, r, r) integral of rho psi_kl [kg m].
-        Ibar: (3, 3, r, r) entry [a, b, k, l] is the integral of rho X_a psi_kl,b [kg m^2].
-        N: (r, r, r) entry [m, k, l] is the integral of rho phi_m . psi_kl.
-        markers: {interface: (6, r, r) translation and rotation vector of its marker}.
-    """
-
-    S: Array
-    Ibar: Array
-    N: Array
+    S: Array  # (3, r, r) integral of rho psi_kl [kg m]
+    Ibar: Array  # (3, 3, r, r) entry [a, b, k, l] is the integral of rho X_a psi_kl,b [kg m^2]
+    N: Array  # (r, r, r) entry [m, k, l] is the integral of rho phi_m . psi_kl
+    # {interface: (6, r, r) translation and rotation vector of its marker}
     markers: dict[str, Array]
 
     @classmethod

@@ -72,21 +72,13 @@ def bound(found: type | Callable[..., object]) -> object:
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """A function of the motion whose zeros are looked for.
+    """A function of the motion whose zeros are looked for."""
 
-    Attributes:
-        function: of the time and an instant of the motion.
-        direction: 1 for rising values, -1 for falling ones, 0 for both.
-        terminal: whether it ends the run.
-        markers: the function asks for, beside those with names.
-        coordinates: joints and rows of the coordinates it asks for.
-    """
-
-    function: Callable[..., object]
-    direction: int
-    terminal: bool
-    markers: tuple[Marker, ...] = ()
-    coordinates: tuple[tuple[str, Row], ...] = ()
+    function: Callable[..., object]  # of the time and an instant of the motion
+    direction: int  # 1 for rising values, -1 for falling ones, 0 for both
+    terminal: bool  # whether it ends the run
+    markers: tuple[Marker, ...] = ()  # it asks for, beside those with names
+    coordinates: tuple[tuple[str, Row], ...] = ()  # it asks for: joints and rows
 
 
 @typed
@@ -101,7 +93,10 @@ class Mechanism(Methods, metaclass=Open, kind="methods", bound=bound):
         gravity: (3,) acceleration of gravity [m/s^2].
 
     Raises:
-        ConfigError: if gravity is not three finite numbers.
+        ConfigError: if gravity is not three finite numbers; of all methods, for a name in use,
+            a marker that is not there, or a body connected with itself.
+        ModelError: of joints that carry moments, if a body has free-free modes only, which carry
+            no moment to an interface.
 
     Warns:
         RomWarning: for numbers legal but strange: gravity beyond that of all planets, an inertia
@@ -183,7 +178,6 @@ class Mechanism(Methods, metaclass=Open, kind="methods", bound=bound):
                 in `add_flexible` [rad/s].
 
         Raises:
-            ConfigError: for a name in use, a wrong shape or a number that is not finite.
             ModelError: if mass or inertia are not those of a real body, or a body that spins is
                 not round.
 
@@ -220,8 +214,8 @@ class Mechanism(Methods, metaclass=Open, kind="methods", bound=bound):
 
         Args:
             name: name of the body in this mechanism.
-            body: a ``FlexibleBody`` with r elastic coordinates; one of other units is converted
-                to SI, in which a mechanism is.
+            body: with r elastic coordinates; one of other units is converted to SI, in which a
+                mechanism is.
             at: (3,) origin of its frame at the start, world [m].
             orientation: (3, 3) matrix or (4,) quaternion [1], body to world; None for parallel.
             velocity: (3,) of the origin, world [m/s].
@@ -235,7 +229,6 @@ class Mechanism(Methods, metaclass=Open, kind="methods", bound=bound):
                 are those of small displacements; films, teeth and rolling bearings know of it.
 
         Raises:
-            ConfigError: for no body, a name in use, a wrong shape or a number that is not finite.
             ModelError: if the mass matrix of the body is singular: rigid motions left in it; or a
                 body that spins is not round, or one of large deflection, or such a one has
                 geometric stiffness.
@@ -314,8 +307,7 @@ class Mechanism(Methods, metaclass=Open, kind="methods", bound=bound):
                 use: markers, joints, or pairs of a joint and its "angle" or "displacement".
 
         Raises:
-            ConfigError: for a name in use, another direction, or a marker, joint or coordinate that
-                is not there.
+            ConfigError: for a marker, joint or coordinate that is not there.
         """
         self.check_new(name)
         markers = tuple(one for one in follow if isinstance(one, Marker))

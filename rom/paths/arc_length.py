@@ -49,35 +49,22 @@ class Problem(Protocol):
 
 @dataclass(frozen=True)
 class Point:
-    """A point of a path.
+    """A point of a path."""
 
-    Attributes:
-        at: the solution.
-        p: the parameter.
-        step, rate: (k,) change of solution and parameter per arc length.
-        passes: corrections that it took.
-    """
-
-    at: Any
-    p: float
-    step: Array
-    rate: float
-    passes: int = 0
+    at: Any  # the solution
+    p: float  # the parameter
+    step: Array  # (k,) change of the solution per arc length
+    rate: float  # change of the parameter per arc length
+    passes: int = 0  # corrections that it took
 
 
 @dataclass(frozen=True)
 class Curve:
-    """A path.
+    """A path."""
 
-    Attributes:
-        problem: its equations.
-        unit: change of the parameter that counts like a change of size one of the solution.
-        tol: size of a correction that no longer matters.
-    """
-
-    problem: Problem
-    unit: float
-    tol: float = CORRECTION_TOL
+    problem: Problem  # its equations
+    unit: float  # change of the parameter that counts like a change of size one of the solution
+    tol: float = CORRECTION_TOL  # size of a correction that no longer matters
 
     def length(self, step: Array, rate: float) -> float:
         """Arc length of a change of solution and parameter."""

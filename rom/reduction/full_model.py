@@ -34,17 +34,11 @@ def operators(model: FEModel) -> Operators:
 
 @dataclass(frozen=True, slots=True)
 class MassProperties:
-    """What a rigid body needs to know of a solid.
+    """What a rigid body needs to know of a solid."""
 
-    Attributes:
-        mass: mass [kg].
-        centre: (3,) mass centre [m].
-        inertia: (3, 3) about the mass centre, axes of the geometry [kg m^2].
-    """
-
-    mass: float
-    centre: Array
-    inertia: Array
+    mass: float  # [kg]
+    centre: Array  # (3,) of mass [m]
+    inertia: Array  # (3, 3) about the mass centre, axes of the geometry [kg m^2]
 
 
 @typed

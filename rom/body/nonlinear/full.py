@@ -28,16 +28,11 @@ class TurningSection:
 
     With B = sum x w^T = P R over its nodes, P = P^T, its angular velocity is
     (tr P - P)^-1 sum R w x (rate of x), by which moments act.
-
-    Attributes:
-        dofs: (3 k,) of its nodes in the solid.
-        points: (k, 3) its nodes from their centre [m].
-        weights: (k, 3) w [1/m].
     """
 
-    dofs: Index
-    points: Array
-    weights: Array
+    dofs: Index  # (3 k,) of its nodes in the solid
+    points: Array  # (k, 3) its nodes from their centre [m]
+    weights: Array  # (k, 3) w [1/m]
 
     @classmethod
     def of(cls, interface: Interface, dofs: Index) -> "TurningSection":

@@ -20,17 +20,11 @@ FORCES = ("f_x", "f_y", "f_z", "m_x", "m_y", "m_z")
 
 @dataclass(frozen=True)
 class Load:
-    """A component of a range of loads.
+    """A component of a range of loads."""
 
-    Attributes:
-        interface: where it acts; "" for centrifugal force, which acts everywhere.
-        component: 0 to 5 of force and moment, or of the products of angular velocities.
-        largest: [N, N m, 1/s^2].
-    """
-
-    interface: str
-    component: int
-    largest: float = 1.0
+    interface: str  # where it acts; "" for centrifugal force, which acts everywhere
+    component: int  # 0 to 5 of force and moment, or of the products of angular velocities
+    largest: float = 1.0  # [N, N m, 1/s^2]
 
     @property
     def name(self) -> str:

@@ -139,22 +139,16 @@ def read_mesh(  # noqa: PLR0913  limits and trust beside what is read
 
 @dataclass(frozen=True, slots=True)
 class FlatMesh:
-    """Triangles of a plane section.
+    """Triangles of a plane section."""
 
-    Attributes:
-        points: (n, 2) coordinates [m].
-        triangles: (t, 3) corners, counter-clockwise.
-        curves: {name: (k, 2)} nodes of the sides of physical curves, the solid on the left.
-        surfaces: {name: (k,)} triangles of each plane surface; those of a physical surface of
-            several are numbered, "stone 1", "stone 2". Without physical ones, all there are.
-        provenance: where the mesh comes from: path, sha256, parameters, versions.
-    """
-
-    points: Array
-    triangles: Index
+    points: Array  # (n, 2) coordinates [m]
+    triangles: Index  # (t, 3) corners, counter-clockwise
+    # {name: (k, 2)} nodes of the sides of physical curves, the solid on the left
     curves: dict[str, Index]
+    # {name: (k,)} triangles of each plane surface; those of a physical surface of several are
+    # numbered, "stone 1", "stone 2". Without physical ones, all there are
     surfaces: dict[str, Index]
-    provenance: Notes
+    provenance: Notes  # where the mesh comes from: path, sha256, parameters, versions
 
     def nodes(self, name: str) -> Index:
         """(k,) nodes of a physical curve.

@@ -68,16 +68,11 @@ def doubt(name: str, stiffness: float, damping: float) -> None:
 
 @table
 class Springs(Table):
-    """All springs.
+    """All springs."""
 
-    Attributes:
-        i, j: (s,) markers.
-        law: (s, 3) stiffness [N/m], damping [N s/m], free length [m].
-    """
-
-    i: Index1
-    j: Index1
-    law: Array2
+    i: Index1  # (s,) marker
+    j: Index1  # (s,) other marker
+    law: Array2  # (s, 3) stiffness [N/m], damping [N s/m], free length [m]
 
 
 def pack(springs: Mapping[str, Spring], places: Places) -> Springs:

@@ -39,10 +39,8 @@ ZERO_RTOL = 1e-15
 class Pattern:
     """Where the entries of the matrices of a mechanism stand, in `Work` and in sparse matrices.
 
-    Attributes:
-        n, m: numbers of velocities and of constraint rows.
-        groups: unknowns of each body and each joint, (n + m,) in all, in the order in which they
-            are eliminated best.
+    The groups are the n velocities and m multipliers of each body and each joint, in the order in
+    which they are eliminated best.
     """
 
     def __init__(self, packed: Packed):

@@ -15,12 +15,9 @@ from rom.view.canvas.offscreen import checked, styled
 
 
 class Picture(Figure):
-    """A finished figure; notebooks show it, `save` writes it.
+    """A finished figure; notebooks show it, `save` writes it."""
 
-    Attributes:
-        path: where it was written last, or None; the picture may stand for this path.
-    """
-
+    # where it was written last, or None; the picture may stand for this path
     path: Path | None = None
 
     def save(self, path: str | Path) -> Path:
