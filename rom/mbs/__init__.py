@@ -1,7 +1,8 @@
 """Mechanisms of rigid and flexible bodies, and their motion.
 
-`mechanism` is what users write, of `parts`, `connections` and `elements`; `equations` packs it,
-`integrate` moves it by `kernels`, `results` are what comes out, `analysis` needs no motion.
+`kernels` are compiled by `compiler`; a mechanism has `parts`, `connections` and `elements`, in
+`mechanism` is what users write; `equations` packs it, `integrate` moves it, `results` are what
+comes out, `analysis` needs no motion.
 """
 
 from rom.lazy import front

@@ -93,8 +93,8 @@ class Mechanism(Methods, metaclass=Open, kind="methods", bound=bound):
         gravity: (3,) acceleration of gravity [m/s^2].
 
     Raises:
-        ConfigError: if gravity is not three finite numbers; of all methods, for a name in use,
-            a marker that is not there, or a body connected with itself.
+        ConfigError: if gravity is not three finite numbers; of all methods, for a name in use, a
+            marker or joint that is not there, a body connected with itself, or no direction.
         ModelError: of joints that carry moments, if a body has free-free modes only, which carry
             no moment to an interface.
 

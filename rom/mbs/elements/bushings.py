@@ -76,7 +76,6 @@ def bushing(  # noqa: PLR0913  one keyword per property
     Rotations count up to half a turn; a rotational spring about a joint counts whole turns.
 
     Args:
-        name: name of the bushing.
         m1: marker that carries the axes.
         m2: other marker; turned by less than half a turn against the first.
         stiffness: (6,) or symmetric (6, 6) [N/m, N/rad; N m/m, N m/rad], translations first,

@@ -114,7 +114,6 @@ def law(  # noqa: PLR0913  one keyword per property
     `rom.check_law` looks for mistakes in it.
 
     Args:
-        name: name of the law.
         function: ``law(t, parameters, motion, memory, out)``; a function of Python, compiled by
             Numba when it can be, one of Numba, or anything with an ``address`` in C.
         markers: at least one, of any bodies or the ground.

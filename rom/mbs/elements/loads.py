@@ -55,20 +55,12 @@ class Load:
 
 
 def force(self: Whole, name: str, marker: Marker, vector: Any, *, frame: Axes = "world") -> None:
-    """Force at a marker: (3,) [N], or a function of time; axes of the world or the marker.
-
-    Raises:
-        ConfigError: for a name in use, an unknown marker or frame, or a wrong vector.
-    """
+    """Force at a marker: (3,) [N], or a function of time; axes of the world or the marker."""
     _load(self, name, marker, vector, frame, FORCE_WORLD)
 
 
 def torque(self: Whole, name: str, marker: Marker, vector: Any, *, frame: Axes = "world") -> None:
-    """Torque at a marker: (3,) [N m], or a function of time; axes of world or marker.
-
-    Raises:
-        ConfigError: for a name in use, an unknown marker or frame, or a wrong vector.
-    """
+    """Torque at a marker: (3,) [N m], or a function of time; axes of world or marker."""
     _load(self, name, marker, vector, frame, TORQUE_WORLD)
 
 
@@ -167,14 +159,13 @@ def spread_load(
     reduced for stays the undeformed one.
 
     Args:
-        name: name of the load.
         part: what `add_flexible` returned.
         load: from `rom.surface_load` or `rom.mass_load` of the same reduced body.
         amplitude: a number, or a function of time.
         frame: "body" or "world".
 
     Raises:
-        ConfigError: for a name in use, a load of another body, or a wrong frame or amplitude.
+        ConfigError: for a load of another body.
     """
     part = self.part(str(getattr(part, "name", part)))
     shapes = getattr(load, "shapes", None)

@@ -130,11 +130,7 @@ class Assembly:
     parts: tuple[Part, ...]  # the bodies of its frames
 
     def marker(self, place: str | int) -> Marker:
-        """Handle of a named place, or of the origin of a frame, counted from 0 or the end.
-
-        Raises:
-            ConfigError: listing the places.
-        """
+        """Handle of a named place, or of the origin of a frame, counted from 0 or the end."""
         frame = self.body.places.get(place) if isinstance(place, str) else place
         if isinstance(frame, bool) or not isinstance(frame, int | np.integer):
             raise ConfigError(
@@ -177,7 +173,6 @@ def add_nonlinear(
         omega: (3,) angular velocity of the body as a whole, axes of the body [rad/s].
 
     Raises:
-        ConfigError: for a name in use, a wrong shape or a number that is not finite.
         ModelError: naming a frame without mass or inertia.
     """
     self.check_new(name)

@@ -280,11 +280,7 @@ SAMPLES_FAMILY = Family("bodies of sampled elements", LargeDeflection, *OF_SAMPL
 
 
 def deflection_of(part: Part) -> tuple[LargeDeflection, Family]:
-    """The energy of a body of large deflection beyond that of small deflection, and its family.
-
-    Raises:
-        ModelError: for geometric stiffness beside it, or a body that spins in its frame.
-    """
+    """The energy of a body of large deflection beyond that of small deflection, and its family."""
     body = part.flexible
     if body.K_geo:
         raise ModelError(

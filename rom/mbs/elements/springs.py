@@ -43,15 +43,9 @@ def spring_damper(
     """Spring [N/m] and damper [N s/m] along the line between two markers.
 
     Args:
-        name: name of the spring.
-        m1: one end.
-        m2: other end.
         stiffness: [N/m].
         damping: [N s/m].
         free_length: length without force [m]; None for the length at the start.
-
-    Raises:
-        ConfigError: for a name in use, an unknown marker, or a length below zero.
     """
     if free_length is None:
         gap = self.design_point(m2) - self.design_point(m1)

@@ -187,11 +187,7 @@ class Packed:
 
 
 def pack(mechanism: Mechanism, *, whole: bool = False) -> Packed:
-    """Write the mechanism into arrays; whole matrices (n, n) if wanted, else blocks where they pay.
-
-    Raises:
-        ConfigError: if there is no body.
-    """
+    """Write the mechanism into arrays; whole matrices if wanted, else blocks where they pay."""
     parts = tuple(mechanism.parts.values())
     if not parts:
         raise ConfigError("the mechanism has no body.", hint="Use add_rigid or add_flexible.")

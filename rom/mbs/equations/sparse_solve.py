@@ -106,14 +106,9 @@ def _families(graph: Graph, n_bodies: int) -> list[Index]:
 class Constrained:
     """The factorised equations.
 
-    Args:
-        A: (n, n) in units in which the mass matrix has ones on its diagonal.
-        G: (m, n) gradient of the constraints, rows of length one.
-        redundant: whether constraints may repeat others; multipliers are then those of a
-            mechanism whose joints are equally stiff.
-
-    Raises:
-        SolverError: if they are singular.
+    A is (n, n) in units in which the mass matrix has ones on its diagonal, G (m, n) has rows of
+    length one. Where constraints may repeat others (``redundant``), multipliers are those of a
+    mechanism whose joints are equally stiff.
     """
 
     def __init__(self, A: csc_matrix, G: csr_matrix, *, redundant: bool):

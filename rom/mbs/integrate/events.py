@@ -74,14 +74,11 @@ class Instant(Whereabouts):
 
 
 class Noted(NamedTuple):
-    """What a watch knows at one time: last signs, and how often each event happened.
-
-    ``found`` holds what happened if the watch that noted it is gone.
-    """
+    """What a watch knows at one time: last signs, and how often each event happened."""
 
     signs: dict[str, float]
     counts: dict[str, int]
-    found: dict[str, list[tuple[float, Array, Array]]]
+    found: dict[str, list[tuple[float, Array, Array]]]  # if the watch that noted it is gone
 
 
 @dataclass

@@ -124,9 +124,9 @@ class Plan(Table):
     size: Index1  # (k,) number d of each node
     wide: Index1  # (k,) number c
     start: Index1  # (k,) its first place
-    pivot: Index1  # (k,) where its blocks begin in the factor: this
-    right: Index1  # (k,) this
-    below: Index1  # (k,) and this
+    pivot: Index1  # (k,) where its block (d, d) begins in the factor
+    right: Index1  # (k,) where its block (d, c) does
+    below: Index1  # (k,) where its block (c, d) does
     next_first: Index1  # (k + 1,) where those of each node begin in next and shift
     next: Index1  # the later nodes coupled to each node
     shift: Index1  # and their first columns

@@ -146,9 +146,6 @@ def line_law(
     """Add a force of t, length x [m] and rate v [m/s] that pushes two markers apart [N] as a law.
 
     Its potential is the integral of the force over x, if it is known [N m].
-
-    Raises:
-        ConfigError: for a name in use, or two markers in one place, which have no direction.
     """
     start = float(np.linalg.norm(mechanism.design_point(m2) - mechanism.design_point(m1)))
     if start == 0.0:
