@@ -28,9 +28,6 @@ class Rayleigh:
     Attributes:
         alpha: factor of the mass [1/s].
         beta: factor of the stiffness [s].
-
-    Raises:
-        ConfigError: for a factor that is negative or not finite.
     """
 
     alpha: Annotated[float, NotNegative("1/s")] = 0.0

@@ -345,11 +345,9 @@ class FlexibleBody(BodyData):
         return self.quartic
 
     def full_matrices(self) -> tuple[Array, Array]:
-        """Mass and stiffness of small motions.
+        """(6 + r, 6 + r) mass and stiffness of small motions, in units of the body.
 
-        Returns:
-            (6 + r, 6 + r), (6 + r, 6 + r), in units of the body; the six rigid coordinates come
-            first.
+        The six rigid coordinates come first.
         """
         M = np.block([[rigid_mass(self), rigid_elastic(self)], [rigid_elastic(self).T, self.M]])
         K = np.zeros_like(M)

@@ -41,10 +41,7 @@ class StressRecovery:
     inertial: Array | None = None
 
     def field(self, q: Array, accelerations: Array | None = None) -> Array:
-        """(p, 6) stress for elastic coordinates q (r,) [Pa].
-
-        Accelerations (12 + r,) are what `accelerations` returns; None for statics.
-        """
+        """(p, 6) stress [Pa] for q (r,) and what `accelerations` returns; None for statics."""
         q = finite("q", q, self.operator.shape[1:])
         found: Array = self.operator @ q
         if accelerations is not None:
@@ -68,13 +65,10 @@ class StressRecovery:
 
     @staticmethod
     def accelerations(a: Array, alpha: Array, omega: Array, qdd: Array) -> Array:
-        """(12 + r,) what the stress of the modes left out depends on.
+        """(12 + r,) what the stress of the modes left out depends on, axes of the body.
 
-        Args:
-            a: (3,) acceleration of the body origin minus gravity, body frame [m/s^2].
-            alpha: (3,) angular acceleration, body frame [rad/s^2].
-            omega: (3,) angular velocity, body frame [rad/s].
-            qdd: (r,) second derivatives of the elastic coordinates.
+        Those are the acceleration of the origin minus gravity a (3,) [m/s^2], alpha (3,) [rad/s^2],
+        omega (3,) [rad/s], and second derivatives qdd (r,) of the elastic coordinates.
         """
         return np.concatenate([a, alpha, [omega[i] * omega[j] for i, j in PRODUCTS], qdd])
 

@@ -268,9 +268,6 @@ def assemble(
         regions: {region name: tag}; one region called "solid" when not given.
         attachments: point masses and rigid bodies carried by interfaces.
 
-    Returns:
-        FEModel, free-free; see `model`.
-
     Raises:
         ConfigError, MeshError, TagError, MaterialError, InterfaceError: see `model`.
     """

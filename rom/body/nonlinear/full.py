@@ -76,15 +76,10 @@ def nearest_rotation(B: Array) -> Array:
 class HeldSolid:
     """A full model at finite strain, motions of its interfaces held in the mean.
 
-    Args:
-        solid: its ``force`` and ``tangent``.
-        M: (n, n) mass [kg].
-        C: (h, n) motions that are held.
-        T: (n, m) its displacements u = T a; None for the identity.
-        comm: of the processes, every one of which has all of it.
-        sections: on which moments act that turn with them; a load (n + 3 s,) has their moments
-            behind the nodal forces.
-        workers: who factors its stiffness.
+    The solid has ``force`` and ``tangent``, its displacements are u = T a, T (n, m), or a itself
+    for None; M (n, n) is its mass [kg], C (h, n) motions that are held. On sections moments act
+    that turn with them: a load (n + 3 s,) has their moments behind the nodal forces. Every process
+    of ``comm`` has all of it; ``workers`` factor the stiffness.
     """
 
     def __init__(

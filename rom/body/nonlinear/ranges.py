@@ -71,7 +71,7 @@ class Geometric:
     Where the body snaps on the way to a load, its path is followed by arc length.
 
     Raises:
-        ConfigError: for loads that are none, or numbers out of range.
+        ConfigError: for a range without any load, or a point without a spin.
 
     Example:
         >>> rom.Geometric(loads={"tip": (0, 200.0, 0, 0, 0, 0)}).n_steps

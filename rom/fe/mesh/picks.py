@@ -39,10 +39,7 @@ class Pick:
 
 
 def picks(wanted: object) -> tuple[Pick, ...]:
-    """What a face is picked by: text as above, a number, a point (3), a box (6), or a list of all.
-
-    ConfigError where it is none of them.
-    """
+    """What a face is picked by: text as above, a number, a point (3), a box (6), or a list."""
     if isinstance(wanted, str):
         return tuple(_of_text(part.strip(), wanted) for part in PLUS_PATTERN.split(wanted))
     if isinstance(wanted, np.ndarray):

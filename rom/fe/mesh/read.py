@@ -151,11 +151,7 @@ class FlatMesh:
     provenance: Notes  # where the mesh comes from: path, sha256, parameters, versions
 
     def nodes(self, name: str) -> Index:
-        """(k,) nodes of a physical curve.
-
-        Raises:
-            TagError: if there is none of this name.
-        """
+        """(k,) nodes of a physical curve."""
         check_known(name, self.curves, f"there is no curve {name!r}; there are", TagError)
         return np.unique(self.curves[name])
 
@@ -178,11 +174,8 @@ def read_triangles(
         trust: run a ``.py`` file.
 
     Raises:
-        ConfigError: unknown suffix or parameter.
-        FileFormatError: the file is missing, cut, or not what its name promises.
-        UnsafeFileError: a geometry would do more than make a mesh, or is a ``.py`` not trusted.
+        ConfigError, FileFormatError, UnsafeFileError, ResourceError: as `read_mesh`.
         MeshError: there are no triangles, other cells, or they leave the plane.
-        ResourceError: meshing exceeds its limit of time or memory.
     """
     path = Path(path)
     with in_file(path):
