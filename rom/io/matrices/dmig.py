@@ -79,8 +79,7 @@ def write_dmig(
             scalar points as SPOINT.
 
     Raises:
-        ConfigError: if the place is not writable.
-        ResourceError: if the disk is full.
+        ConfigError, ResourceError: if the place is not writable, or the disk is full.
     """
     lines = [f"$ {ORIGIN_MARK}", *_points(dofs, nodes)] if nodes else []
     for name, A in matrices.items():

@@ -93,8 +93,7 @@ def write_abaqus_matrix(A: Array | csr_matrix, dofs: Dofs, path: str | Path) -> 
         path: file to write.
 
     Raises:
-        ConfigError: if the place is not writable.
-        ResourceError: if the disk is full.
+        ConfigError, ResourceError: if the place is not writable, or the disk is full.
     """
     found = coo_matrix(np.tril(A) if isinstance(A, np.ndarray) else A)
     entries = zip(found.row, found.col, found.data, strict=True)
@@ -223,10 +222,9 @@ def _dense(table: Array, sizes: tuple[int, ...], sign: float) -> tuple[Index, In
 
 
 def read_stored_matrix(path: str | Path) -> tuple[csr_matrix, Dofs]:
-    """The upper triangle (n, n) and (n, 2) node and component of each row.
+    """The upper triangle (n, n) and (n, 2) node and component of each row of ``.sti`` or ``.mas``.
 
-    Args:
-        path: ``.sti`` or ``.mas``; the ``.dof`` stands beside.
+    The ``.dof`` stands beside.
 
     Raises:
         FileFormatError: naming the line, if one of the two is missing, damaged or cut, or they do

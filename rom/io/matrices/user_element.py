@@ -77,8 +77,7 @@ def write_user_element(
             modes, lie at the origin.
 
     Raises:
-        ConfigError: if the place is not writable.
-        ResourceError: if the disk is full.
+        ConfigError, ResourceError: if the place is not writable, or the disk is full.
     """
     return write_lines(path, _document(matrices, np.asarray(dofs), nodes))
 

@@ -21,11 +21,7 @@ class Picture(Figure):
     path: Path | None = None
 
     def save(self, path: str | Path) -> Path:
-        """Write it as .png, whole or not at all.
-
-        Raises:
-            ConfigError: for another ending, or a place that is not writable.
-        """
+        """Write it as .png, whole or not at all."""
         self.path = written(self, checked(path, ".png"))
         return self.path
 

@@ -170,9 +170,6 @@ def coil(
         wire: diameter of the wire [m].
         turns: number of turns.
 
-    Returns:
-        Points and triangles.
-
     Raises:
         ConfigError: if the wire is thicker than its bends allow.
     """
@@ -188,9 +185,6 @@ def wound(line: npt.ArrayLike, diameter: float, wire: float, *, turns: float = 6
         diameter: of the middle line of the wire [m].
         wire: diameter of the wire [m].
         turns: number of turns.
-
-    Returns:
-        Points and triangles.
 
     Raises:
         ConfigError: if the points are no curve, or the wire is thicker than its bends allow.
@@ -237,9 +231,6 @@ def extruded(outline: npt.ArrayLike, width: float, *, bore: float = 0.0) -> Mesh
         outline: (n, 2) corners, counter-clockwise, all of them in sight of the origin [m].
         width: along z [m].
         bore: diameter of a round hole about the origin [m]; 0 for none.
-
-    Returns:
-        Points and triangles.
 
     Raises:
         ConfigError: if the outline is not seen from the origin, or the bore leaves it.

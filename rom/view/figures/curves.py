@@ -171,9 +171,6 @@ def frequencies(
         beside: one or more scenes from top to bottom of what vibrates.
         ax: Axes of matplotlib, and one for each scene; None for a page of its own.
 
-    Returns:
-        The figure; that of ``ax`` where it is given.
-
     Raises:
         ConfigError: without a comparison, or if pictures cannot be made here.
     """
@@ -223,9 +220,6 @@ def convergence(
         beside: one or more scenes from top to bottom to which the errors belong.
         ax: Axes of matplotlib, one for each panel, then each scene; None for a page of its own.
 
-    Returns:
-        The figure; that of ``ax`` where it is given.
-
     Raises:
         ConfigError: if lengths differ, or pictures cannot be made here.
     """
@@ -274,9 +268,6 @@ def campbell(  # noqa: PLR0913  keywords of one picture
         beside: one or more scenes from top to bottom of what vibrates.
         ax: Axes of matplotlib, two if there is damping, then one for each scene; None for a page
             of its own.
-
-    Returns:
-        The figure; that of ``ax`` where it is given.
 
     Raises:
         ConfigError: if there is not one name per mode, or pictures cannot be made here.

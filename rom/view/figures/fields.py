@@ -94,9 +94,6 @@ def plane(
         height: of each drawing [pixel].
         ax: Axes of matplotlib to draw into, one for each drawing; None for a page of its own.
 
-    Returns:
-        The figure; that of ``ax`` where it is given.
-
     Raises:
         ConfigError: without a drawing, or if pictures cannot be made here.
     """

@@ -90,9 +90,6 @@ def panels(
         caption: what a stranger has to know; not written into axes of yours.
         ax: Axes of matplotlib, one for each diagram, row by row; None for a page of its own.
 
-    Returns:
-        The figure; that of ``ax`` where it is given.
-
     Raises:
         ConfigError: if lengths differ, or pictures cannot be made here.
     """

@@ -84,9 +84,6 @@ def deformed(  # noqa: PLR0913  keywords of one picture
         ax: Axes of matplotlib, one for the curves and one for each shape; None for a page of its
             own.
 
-    Returns:
-        The figure; that of ``ax`` where it is given.
-
     Raises:
         ConfigError: if the shapes do not fit beside the curves, or pictures cannot be made here.
     """
@@ -139,9 +136,6 @@ def flow(
         path: film to write, .gif or .mp4; None to write nothing.
         seconds: how long the film lasts [s].
         caption: what a stranger has to know.
-
-    Returns:
-        The film.
 
     Raises:
         ConfigError: if lengths differ, or pictures cannot be made here.

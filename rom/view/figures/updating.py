@@ -55,9 +55,6 @@ def updating(  # noqa: PLR0913  keywords of one picture
         ax: four Axes of matplotlib, for responses, changes, their errors and structure; None for a
             page of its own.
 
-    Returns:
-        The figure; that of ``ax`` where it is given.
-
     Raises:
         ConfigError: if lengths differ, or pictures cannot be made here.
     """
