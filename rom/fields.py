@@ -173,9 +173,8 @@ def _lost(name: str, place: str, why: str) -> UnknownNameError:
 class Open(type):
     """Class of classes to which fields give what is asked of their objects.
 
-    Args:
-        kind: of what is given, an attribute of `Field`.
-        bound: what becomes an attribute of the class of what a field has.
+    ``kind`` of what is given is an attribute of `Field`; ``bound`` is what becomes an attribute of
+    the class of what a field has.
     """
 
     _kind: str

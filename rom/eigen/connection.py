@@ -42,20 +42,12 @@ class Connection:
     ties: dict[str, Tie]  # {interface: how its coordinates govern its dofs}
 
     def held(self, fixed: Fixed) -> Index:
-        """Dof numbers that are zero when these interfaces are held.
-
-        Raises:
-            ConfigError, InterfaceError: see `rom.eigen.supports`.
-        """
+        """Dof numbers that are zero when these interfaces are held."""
         rows = self.held_parts(fixed)
         return self.boundary[rows]
 
     def on_springs(self, stiffness: dict[str, Array]) -> "Connection":
-        """The model on springs to the ground: {interface: (6, 6)} for its six coordinates.
-
-        Raises:
-            InterfaceError: if one has other coordinates.
-        """
+        """The model on springs to the ground: {interface: (6, 6)} for its six coordinates."""
         ops = self.ops
         dK = csr_matrix((ops.n_local, ops.n))
         for name, k in stiffness.items():

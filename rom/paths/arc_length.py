@@ -83,11 +83,7 @@ class Curve:
         return self.point(at, p, slope, (0.0 * slope, 1.0 if forwards else -1.0))
 
     def ahead(self, point: Point, h: float) -> Point:
-        """The point of the path at an arc length h further.
-
-        Raises:
-            SolverError: if it is too far for Newton's method, or for linear equations to say where.
-        """
+        """The point of the path at an arc length h further; a SolverError if that is too far."""
         if not self.problem.size(h * point.step) < MAX_PREDICTION:
             raise SolverError("the path is steeper than its points are close.")
         p, last, away = point.p + h * point.rate, np.inf, 0.0
@@ -108,11 +104,7 @@ class Curve:
         raise SolverError("no point of the path was found.")
 
     def steps(self, point: Point, longest: float) -> Iterator[tuple[Point, float, Point]]:
-        """Neighbouring points, and the arc length between them, without end.
-
-        Raises:
-            SolverError: if even the shortest step finds no further point.
-        """
+        """Neighbouring points, and the arc length between them, without end; or a SolverError."""
         h = FIRST_STEP_RATIO * longest
         while True:
             try:

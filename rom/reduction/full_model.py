@@ -47,9 +47,6 @@ def mass_properties(model: FEModel) -> MassProperties:
 
     From the rigid part R^T M R of the mass matrix; under mpirun to be called on all ranks.
 
-    Args:
-        model: the body.
-
     Example:
         >>> steel = rom.Material(E=210e9, nu=0.3, rho=7850.0)
         >>> beam = rom.fe.model("meshes/beam.geo", material=steel)  # 1 m x 50 mm x 30 mm

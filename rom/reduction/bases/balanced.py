@@ -31,7 +31,7 @@ class BalancedTruncation(Constrained):
         damping_ratio: modal damping of the pool [1], for the choice only.
 
     Raises:
-        ConfigError: for numbers of modes or a damping that cannot be.
+        ConfigError: for a pool of fewer than n_modes.
 
     Source:
         Chahlaoui, Lemonnier, Vandendorpe and Van Dooren, Second-order balanced truncation, Linear

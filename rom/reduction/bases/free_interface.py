@@ -33,9 +33,6 @@ class Rubin(Counted):
     Attributes:
         n_modes: number of elastic free-free modes.
 
-    Raises:
-        ConfigError: if n_modes is no number of modes.
-
     Source:
         Rubin, Improved component-mode representation for structural dynamic analysis, AIAA J. 13
         (1975) 995; Craig and Chang, NASA CR-145123 (1977); inertia relief after MacNeal, Comput.
@@ -68,9 +65,6 @@ class Herting(Counted, Constrained):
     Attributes:
         n_modes: number of elastic free-free modes.
 
-    Raises:
-        ConfigError: if n_modes is no number of modes.
-
     Source:
         Herting, A general purpose, multi-stage, component modal synthesis method, Finite Elem.
         Anal. Des. 1 (1985) 153.
@@ -96,9 +90,6 @@ class FreeFree(Counted):
 
     Attributes:
         n_modes: number of elastic free-free modes.
-
-    Raises:
-        ConfigError: if n_modes is no number of modes.
 
     Source:
         O'Shea, Jayakumar, Mechergui, Shabana and Wang, J. Comput. Nonlinear Dynam. 13 (2018)
