@@ -123,10 +123,8 @@ class Assembly:
     def conditions(self, fixed: tuple[Place, ...] = ()) -> Array:
         """(c, 6 n_b + r) what is zero: gaps of coupled interfaces, coordinates of held ones [m, 1].
 
-        Columns are the rigid and elastic coordinates of one body after another.
-
-        Args:
-            fixed: (body, interface) pairs that are held.
+        Columns are the rigid and elastic coordinates of one body after another; ``fixed`` are
+        (body, interface) pairs that are held.
 
         Raises:
             ConfigError, InterfaceError: if a body or an interface is unknown.

@@ -61,16 +61,14 @@ class Pieces:
     def add_to(self, mech: Any, name: str, **pose: Any) -> dict[str, Any]:
         """Add all bodies to a mechanism, welded to each other.
 
-        They are called "name piece" there, the welds "name interface".
+        They are called "name piece" there, the welds "name interface". Given back are
+        {interface: its marker} of the interfaces that are no welds.
 
         Args:
             mech: the `rom.Mechanism`.
             name: of the whole.
             pose: ``at``, ``orientation``, ``velocity`` and ``omega`` of the whole at the start, see
                 `rom.Mechanism.add_flexible`.
-
-        Returns:
-            {interface: its marker} of the interfaces that are no welds.
 
         Raises:
             ConfigError: see `rom.Mechanism.add_flexible`; for elastic coordinates, which each

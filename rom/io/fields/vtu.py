@@ -25,11 +25,7 @@ TYPES = {"<f8": "Float64", "<i8": "Int64", "|u1": "UInt8"}
 
 
 def write_vtu(body: FlexibleBody, path: str | Path) -> Path:
-    """Write the outer surface with one displacement field per elastic coordinate.
-
-    Args:
-        body: a body with a surface.
-        path: file ending in ``.vtu``.
+    """Write the outer surface with one displacement field per elastic coordinate, as ``.vtu``.
 
     Raises:
         ConfigError: if the body has no surface, or the place is not writable.

@@ -50,9 +50,6 @@ def audit(solution: Solution) -> Report:
     Geometric stiffness enters through the kinetic energy and the work of forces, see
     `rom.mbs.kernels.second_order`: the balance of energy holds with it as it does without.
 
-    Returns:
-        Report with a row per check.
-
     Example:
         >>> mech = rom.Mechanism(gravity=(0, 0, -9.81))
         >>> ball = mech.add_rigid("ball", mass=1.0, inertia=(1e-3,) * 3, at=(0, 0, 0))

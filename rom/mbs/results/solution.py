@@ -315,10 +315,7 @@ class Solution(Whereabouts, Columns, metaclass=Open, kind="columns", bound=typed
         return tracks.momentum[:, :3], tracks.momentum[:, 3:]
 
     def to_pandas(self, *, every: int = 1) -> Any:
-        """The motion as a table: a DataFrame of `rom.io.history.data_frame`.
-
-        Args:
-            every: take every so many instants.
+        """Every so many instants as a table: a DataFrame of `rom.io.history.data_frame`.
 
         Raises:
             ResourceError: if pandas is missing.

@@ -108,15 +108,12 @@ def ring(
 def ellipsoid(
     semi_axes: npt.ArrayLike, centre: npt.ArrayLike = (0.0, 0.0, 0.0), *, sides: int = 32
 ) -> Mesh:
-    """Ellipsoid, or ball, with its axes along x, y and z.
+    """Ellipsoid, or ball, with its axes along x, y and z, and its points on the surface.
 
     Args:
         semi_axes: (3,) half of its lengths [m].
         centre: (3,) its centre [m].
         sides: number of flat faces around; half as many from pole to pole.
-
-    Returns:
-        Points and triangles; the points lie on the surface.
     """
     latitudes = np.pi * np.arange(1, sides // 2) / (sides // 2)
     circle = _circle(np.eye(3)[0], np.eye(3)[1], 1.0, sides)
