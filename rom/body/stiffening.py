@@ -12,11 +12,10 @@ interface the displacements psi of its marker. Body forces of the moving frame, 
 springs then stiffen the body by their virtual work on psi, whatever they are, and energy and
 momentum stay exactly balanced.
 
-Names of the loads: "omega_x^2" and "omega_x omega_y" for centrifugal force, "domega_x" for
-angular acceleration, "a_x" for acceleration of the frame, "ddq_1" for that of the first elastic
-coordinate, each per unit of the quantity and as the force -rho times acceleration it stands for;
-"tip f_x" and "tip m_x" for force and moment on the interface "tip". A load left out has no
-geometric stiffness.
+Names of the loads: "omega_x^2" and "omega_x omega_y" for centrifugal force, "domega_x" for angular
+acceleration, "a_x" for acceleration of the frame, "ddq_1" for that of the first elastic coordinate,
+each per unit of the quantity and as the force -rho times acceleration it stands for; "tip f_x" and
+"tip m_x" for force and moment on the interface "tip". A load left out has no geometric stiffness.
 
 Source:
     Wallrapp and Schwertassek, Representation of geometric stiffening in multibody system

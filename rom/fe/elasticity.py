@@ -80,8 +80,7 @@ def model(
             an unknown solver.
         UnsafeFileError: for a geometry that would do more than make a mesh, or is Python without
             ``trust``.
-        ResourceError: if meshing exceeds its limit of time or memory, or no way to solve would
-            fit.
+        ResourceError: if meshing exceeds its limit of time or memory, or no way to solve would fit.
         MaterialError: if a region has no material or a material no region.
         InterfaceError: if an interface is empty or an attachment hangs on none.
 

@@ -59,9 +59,8 @@ def read_matrix(source: str | Path | tuple[str | Path, str]) -> NamedMatrix:
     Args:
         source: file, or (file, name) where it holds several: ``.mtx`` and ``.mm`` for Matrix Market
             (told by its first line) or Abaqus text, matrices or a linear user element, the latter
-            also in ``.inp``; ``.sti`` and ``.mas`` for CalculiX, with
-            ``.dof`` beside, ``.op4`` for OUTPUT4, ``.bdf``, ``.dat``, ``.pch``, ``.dmig`` for DMIG
-            cards.
+            also in ``.inp``; ``.sti`` and ``.mas`` for CalculiX, with ``.dof`` beside, ``.op4`` for
+            OUTPUT4, ``.bdf``, ``.dat``, ``.pch``, ``.dmig`` for DMIG cards.
 
     Raises:
         ConfigError: for another ending, or if a name is needed or unknown.

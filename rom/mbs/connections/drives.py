@@ -52,10 +52,9 @@ def gear(
 ) -> None:
     """Couple two joints: coordinate of the second = ``ratio`` times that of the first.
 
-    Between two angles a pair of gears (negative ratio for outer teeth, seen along parallel
-    axes), a chain or a belt; between an angle and a displacement a rack [m/rad]. A
-    carrier that moves is the first body of both joints. Angles count over whole turns from the
-    start.
+    Between two angles a pair of gears (negative ratio for outer teeth, seen along parallel axes), a
+    chain or a belt; between an angle and a displacement a rack [m/rad]. A carrier that moves is the
+    first body of both joints. Angles count over whole turns from the start.
 
     Args:
         name: ``sol.reaction(name)`` gives its load on the second body of ``joint2``.

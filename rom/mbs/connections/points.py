@@ -90,8 +90,7 @@ def rolling(
 ) -> None:
     """A ball or thin wheel about m2 touches a plane through m1 and rolls on it without slip.
 
-    One constraint of position and two of velocity (not holonomic). Spin about the normal is
-    free.
+    One constraint of position and two of velocity (not holonomic). Spin about the normal is free.
 
     Args:
         normal: (3,) of the plane towards the centre, world at the start [1].

@@ -158,8 +158,7 @@ def friction(  # noqa: PLR0913  one keyword per property
             that change the speed by much more take many corrections.
         coulomb: level that is always there [N or N m].
         mu: coefficient of friction [1].
-        radius: at which friction acts on an angle, that of the pin [m]; none for a
-            displacement.
+        radius: at which friction acts on an angle, that of the pin [m]; none for a displacement.
         static: level at rest over that of fast motion, at least 1 [1].
         stribeck_speed: speed over which this fades [m/s or rad/s].
         viscous: force per speed [N s/m or N m s/rad].

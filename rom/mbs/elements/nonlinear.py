@@ -14,9 +14,8 @@ angular velocity in the axes of the frame, in the order of position, quaternion,
 velocity. It writes, with n = 6 k and the rows force in the world, moment in the frame: stored
 energy [J]; lost power [W]; (n,) forces of energy and damping that resist the motion; and, if
 ``wanted`` is not zero, (n, n) their derivative by displacements in the world and rotations in the
-frame; (n, n) their derivative by the velocities. ``space`` is memory for
-LAW_MEMORY_SIZE numbers. Such a function is made with ``numba.cfunc`` or by any
-compiler; `compiled_law` keeps what it makes.
+frame; (n, n) their derivative by the velocities. ``space`` is memory for LAW_MEMORY_SIZE numbers.
+Such a function is made with ``numba.cfunc`` or by any compiler; `compiled_law` keeps what it makes.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
