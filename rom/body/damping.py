@@ -86,8 +86,7 @@ class ModalDamping:
         """(r, r) damping [N s/m].
 
         Raises:
-            ConfigError: if there is not one ratio per elastic coordinate of the body, or for wrong
-                directions.
+            ConfigError: if there is not one ratio per elastic coordinate, or for wrong directions.
             InterfaceError: if an interface is unknown.
             ModelError: if an interface of a basis of free-free modes alone is held.
         """

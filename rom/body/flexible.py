@@ -46,8 +46,7 @@ class FlexibleBody(BodyData):
         S_kl: (3, 3, r, r) entry [a, b, k, l] is the integral of rho phi_k,a phi_l,b [kg].
         K: (r, r) stiffness [N/m]; the shapes are mass-normalised, so that it is diag(omega^2).
         D: (r, r) damping [N s/m].
-        K_geo: (r, r) geometric stiffness per unit load, by name of the load, see
-            `rom.body.stiffening`.
+        K_geo: (r, r) geometric stiffness per unit load, by name, see `rom.body.stiffening`.
         quartic: strain energy at large deflection, of which K is the part of second order; None
             for a body of small deflection.
         markers: interfaces by name.
@@ -57,8 +56,7 @@ class FlexibleBody(BodyData):
         omega: (r,) natural frequencies of the elastic coordinates, frame held still [rad/s].
         labels: (r,) what each coordinate is.
         reference: the reference condition.
-        units: declared unit system of all its numbers; SI in a mechanism or an assembly, which
-            convert it.
+        units: declared unit system of all its numbers; mechanisms and assemblies convert to SI.
         provenance: how the body was made.
         certificate: evidence that it stands for the full model, or None.
     """

@@ -74,8 +74,7 @@ class Draft:
 def run(stages: Iterable[Stage], draft: Draft) -> Any:
     """Do the stages of a reduction one after the other, and time them; the body of the draft.
 
-    Stages are functions of the draft, such as `rom.workflow.stages` lists; your own may be among
-    them.
+    Stages are functions of the draft, such as `rom.workflow.stages` lists, or your own.
     """
     with stopwatch() as draft.watch:
         for stage in stages:

@@ -125,8 +125,7 @@ def pieces(  # noqa: PLR0913  those of `model`, and how to cut
     Args:
         path: geometry or mesh file, see `model`.
         n: number of pieces of about equal length, cut between layers of cells.
-        axis: (3,) direction of the normal of the cuts [1]; without n and axis each region is a
-            piece.
+        axis: (3,) normal of the cuts [1]; without n and axis each region is a piece.
         material: as for the whole.
         degree: as for `model`, as are all that follow.
         parameters: of the geometry.

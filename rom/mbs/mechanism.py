@@ -178,8 +178,7 @@ class Mechanism(Methods, metaclass=Open, kind="methods", bound=bound):
                 in `add_flexible` [rad/s].
 
         Raises:
-            ModelError: if mass or inertia are not those of a real body, or a body that spins is
-                not round.
+            ModelError: if mass or inertia are of no real body, or a body that spins is not round.
 
         Example:
             >>> mech = rom.Mechanism()
@@ -214,14 +213,12 @@ class Mechanism(Methods, metaclass=Open, kind="methods", bound=bound):
 
         Args:
             name: name of the body in this mechanism.
-            body: with r elastic coordinates; one of other units is converted to SI, in which a
-                mechanism is.
+            body: with r elastic coordinates; one of other units is converted to SI.
             at: (3,) origin of its frame at the start, world [m].
             orientation: (3, 3) matrix or (4,) quaternion [1], body to world; None for parallel.
             velocity: (3,) of the origin, world [m/s].
             omega: (3,) angular velocity of the frame, body frame [rad/s].
-            q: (r,) elastic coordinates at the start, in the units of the body's shapes; None for
-                undeformed.
+            q: (r,) elastic coordinates at the start, in units of the shapes; None for undeformed.
             qd: (r,) their rates, in the units of q per second.
             spin: (3,) angular velocity [rad/s] with which the material of a round body turns
                 through the frame, which does not: shafts that bend under a load rest, whirl and

@@ -51,8 +51,7 @@ class Geometric:
             one, so that for a skew load of two equal ones each is given 1.41 times as large.
         n_modes: how many of the lowest fixed-interface modes drag others along, beside the
             static shapes of the loads; a repeated frequency counts as a whole.
-        tol: how much of the energy of the states reached may be left out, as the root of its
-            share [1].
+        tol: how much of the energy of the states may be left out, as the root of its share [1].
         n_shapes: alternatively, the number of shapes added to the basis. All are spent on the
             loads of the range: without it there are some for what else acts on their interfaces,
             as a torque on a beam that is bent.

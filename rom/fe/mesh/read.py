@@ -1,8 +1,7 @@
 """Meshes of solids: one record, whatever file they come from.
 
 A mesh is read and checked on one process as NumPy arrays, before dolfinx sees it. gmsh and the
-readers of decks run in a process of their own (`rom.fe.mesh.child`), which hostile or broken files
-can crash.
+readers of decks, which broken files can crash, run in a process of their own (`rom.fe.mesh.child`).
 """
 
 import hashlib
@@ -95,8 +94,7 @@ def read_mesh(  # noqa: PLR0913  limits and trust beside what is read
         memory_limit: of meshing a geometry [bytes]; by default 80 % of the machine's, 0 for none.
 
     Returns:
-        A mesh that passed `rom.fe.mesh.validate.validate`. Its warnings are also issued as
-        `RomWarning`.
+        A mesh that passed `rom.fe.mesh.validate.validate`, whose warnings are also issued.
 
     Raises:
         ConfigError: unknown suffix or parameter.

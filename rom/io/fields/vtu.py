@@ -52,8 +52,7 @@ def write_stress(
         body: a body reduced with ``stress=True``.
         q: (r,) elastic coordinates, in units of the body's shapes.
         path: file ending in ``.vtu``.
-        accelerations: (6 + r,) see `rom.body.recovery.StressRecovery.accelerations`; None for
-            statics.
+        accelerations: (6 + r,) see `rom.body.recovery.StressRecovery`; None for statics.
 
     Raises:
         ConfigError: if the stress of the body cannot be recovered, q has another length, or the

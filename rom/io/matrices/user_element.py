@@ -46,8 +46,7 @@ def read_user_element(path: str | Path) -> dict[str, tuple[csr_matrix, Dofs]]:
     """{"STIFFNESS", "MASS", ...: (lower triangle (n, n), (n, 2) node and component)}.
 
     Raises:
-        FileFormatError: naming the line, if the file is missing, damaged or cut, or has no element
-            of this kind.
+        FileFormatError: naming the line, if the file is missing, damaged or has no such element.
         UnsafeFileError: if it claims more nodes than a dense matrix can have.
     """
     path = Path(path)

@@ -201,8 +201,7 @@ class _Search:
     def settle(self, state: State, load: float, *, directly: bool = False) -> State:
         """Equilibrium at a share of the loads; directly: by Newton's corrections while they shrink.
 
-        Raises ModelError if a body turns on and on, as a rotor does against whose drag nothing
-        holds.
+        Raises ModelError if a body turns on and on, as a rotor against whose drag nothing holds.
         """
         now, last, trials = self.now.scaled(load), np.inf, MAX_TRIALS
         turned, length = np.zeros((now.packed.system.bodies.mass.size, 3)), 0.0

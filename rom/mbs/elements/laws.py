@@ -118,8 +118,7 @@ def law(  # noqa: PLR0913  one keyword per property
             Numba when it can be, one of Numba, or anything with an ``address`` in C.
         markers: at least one, of any bodies or the ground.
         parameters: (p,) numbers handed to the law, in its own units.
-        memory: (m,) numbers that the law remembers from step to step, at the start, in its own
-            units.
+        memory: (m,) numbers remembered from step to step, at the start, in its own units.
         outputs: names of its own outputs; ``solution.law(name)`` has them.
         energy: whether it tells stored energy and lost power. If not, all its work is that of an
             applied force, and equilibria let it grow with the loads.

@@ -68,8 +68,7 @@ class CraigBampton(Constrained):
         supports: columns of the interfaces that are held for this, which `rom.reduce` fills in.
 
     Raises:
-        ConfigError: if both n_modes and f_max are given, or for substructures without f_max or
-            with tol.
+        ConfigError: for both n_modes and f_max, or substructures without f_max or with tol.
 
     Source:
         Craig and Bampton, Coupling of substructures for dynamic analyses, AIAA J. 6 (1968) 1313.

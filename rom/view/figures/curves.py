@@ -254,8 +254,7 @@ def campbell(  # noqa: PLR0913  keywords of one picture
 ) -> "Figure":
     """Draw natural frequencies over the speed of rotation, with multiples of the speed.
 
-    A ring marks where a mode meets a multiple of the speed. A second panel shows the damping,
-    unless there is none.
+    A ring marks where a mode meets a multiple of the speed. A second panel shows damping, if any.
 
     Args:
         diagram: what `rom.campbell` returned.
@@ -266,8 +265,7 @@ def campbell(  # noqa: PLR0913  keywords of one picture
         title: heading.
         caption: what a stranger has to know; not written into axes of yours.
         beside: one or more scenes from top to bottom of what vibrates.
-        ax: Axes of matplotlib, two if there is damping, then one for each scene; None for a page
-            of its own.
+        ax: Axes of matplotlib, two with damping, then one a scene; None for a page of its own.
 
     Raises:
         ConfigError: if there is not one name per mode, or pictures cannot be made here.

@@ -167,8 +167,7 @@ def through_points(
 ) -> tuple[Formula, Formula]:
     """A curve through points (n,), x ascending, straight beyond its ends, and its integral.
 
-    "monotone" interpolation nowhere leaves the range of neighbours, "cubic" is a spline with
-    continuous curvature.
+    "monotone" nowhere leaves the range of neighbours, "cubic" is a spline of continuous curvature.
 
     Source:
         Fritsch, Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300, for the monotone one.
