@@ -187,8 +187,7 @@ class DualAssembly:
 
         Returns:
             (k, k) stiffness [rad^2/s^2] and (k, k) mass [1], for coordinates whose modes have mass
-            one; rows and columns of "dual" that belong to forces are in flexibility [m/N] and its
-            mass.
+            one; of "dual" those that belong to forces are in flexibility [m/N] and its mass.
 
         Raises:
             InterfaceError: see the class.

@@ -95,8 +95,7 @@ class Mechanism(Methods, metaclass=Open, kind="methods", bound=bound):
     Raises:
         ConfigError: if gravity is not three finite numbers; of all methods, for a name in use, a
             marker or joint that is not there, a body connected with itself, or no direction.
-        ModelError: of joints that carry moments, if a body has free-free modes only, which carry
-            no moment to an interface.
+        ModelError: of joints with moments, if a body has free-free modes only, which carry none.
 
     Warns:
         RomWarning: for numbers legal but strange: gravity beyond that of all planets, an inertia
@@ -174,8 +173,7 @@ class Mechanism(Methods, metaclass=Open, kind="methods", bound=bound):
             markers: {name: (3,) point from the mass centre, body frame [m]}.
             velocity: (3,) of the mass centre, world [m/s].
             omega: (3,) angular velocity, body frame [rad/s].
-            spin: (3,) angular velocity of the body in its frame, which does not turn with it, as
-                in `add_flexible` [rad/s].
+            spin: (3,) angular velocity in its frame, which stands, as in `add_flexible` [rad/s].
 
         Raises:
             ModelError: if mass or inertia are of no real body, or a body that spins is not round.

@@ -23,8 +23,7 @@ def standard_input(body: FlexibleBody) -> StandardInput:
     """The blocks of a body, its geometric stiffness included; interfaces become nodes.
 
     Left out is what SID has no place for: terms of second order in J and Gr, surface and stress.
-    Geometric stiffness acts on Oe1 (rotation), Ct1 and Cr1 (acceleration), phi1 and psi1 (forces
-    and moments on the nodes).
+    Geometric stiffness acts on Oe1 (rotation), Ct1, Cr1 (acceleration), phi1, psi1 (node loads).
     """
     K = {load: np.asarray(A) for load, A in body.K_geo.items()}
     SecondOrder.of(body)  # refuses loads that are not known

@@ -51,8 +51,7 @@ def compiled_function(
 ) -> Entry | None:
     """What ``make`` compiles a function of the user to; None when it is left to Python.
 
-    True to insist, False to leave it to Python, None for what works; the hint says what it may be
-    made of.
+    True to insist, False for Python, None for what works; the hint says what it may be made of.
     """
     if wanted is False:
         return None
