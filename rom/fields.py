@@ -46,32 +46,27 @@ ENTRY_POINT_GROUP = "rom.fields"  # of entry points, by which other packages bri
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """What a field has.
+    """What a field has."""
 
-    Attributes:
-        families: of its elements, as `rom.mbs.elements.family` describes them.
-        methods: {name: function on a mechanism; or a record, for the elements of that kind}.
-        bodies: {what a body has: function of it, which gives its element and its family}.
-        sections: {section of a mechanism file: a `rom.config.mechanism_keys.Section`}.
-        symbols: {name of a family: function of scenery, name and element, which gives what is drawn
-            of it: actors, or circles by marker, axis and radius}.
-        columns: {name: function on a solution, by which it tells of an element over time}.
-        takes: {"verb.name": to what a verb of the core hands objects of the class, or files of the
-            schema, of that name: a module or a function}.
-        verbs: {verb of the command line: its module}.
-        first_use: {name: function that does a small case of all that is compiled}.
-        moved: {earlier name of a module, as pickles may have it: its name}.
-    """
-
-    families: tuple[str, ...] = ()
+    families: tuple[str, ...] = ()  # of its elements, as `rom.mbs.elements.family` describes them
+    # {name: function on a mechanism; or a record, for the elements of that kind}
     methods: Mapping[str, str] = field(default_factory=dict)
+    # {what a body has: function of it, which gives its element and its family}
     bodies: Mapping[str, str] = field(default_factory=dict)
+    # {section of a mechanism file: a `rom.config.mechanism_keys.Section`}
     sections: Mapping[str, str] = field(default_factory=dict)
+    # {name of a family: function of scenery, name and element, which gives what is drawn of it:
+    # actors, or circles by marker, axis and radius}
     symbols: Mapping[str, str] = field(default_factory=dict)
+    # {name: function on a solution, by which it tells of an element over time}
     columns: Mapping[str, str] = field(default_factory=dict)
+    # {"verb.name": to what a verb of the core hands objects of the class, or files of the schema,
+    # of that name: a module or a function}
     takes: Mapping[str, str] = field(default_factory=dict)
-    verbs: Mapping[str, str] = field(default_factory=dict)
+    verbs: Mapping[str, str] = field(default_factory=dict)  # {verb of the command line: its module}
+    # {name: function that does a small case of all that is compiled}
     first_use: Mapping[str, str] = field(default_factory=dict)
+    # {earlier name of a module, as pickles may have it: its name}
     moved: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -171,17 +166,15 @@ def _lost(name: str, place: str, why: str) -> UnknownNameError:
     why = why if why.startswith("is ") else f"cannot be imported: {why}"
     whose = f"{name!r} belongs to the field {module!r}, which" if name else f"the field {module!r}"
     return UnknownNameError(
-        f"{whose} {why}.",
-        hint=f"pip install --force-reinstall {package} brings the field whole.",
+        f"{whose} {why}.", hint=f"pip install --force-reinstall {package} brings the field whole."
     )
 
 
 class Open(type):
     """Class of classes to which fields give what is asked of their objects.
 
-    Args:
-        kind: of what is given, an attribute of `Field`.
-        bound: what becomes an attribute of the class of what a field has.
+    ``kind`` of what is given is an attribute of `Field`; ``bound`` is what becomes an attribute of
+    the class of what a field has.
     """
 
     _kind: str

@@ -10,12 +10,7 @@ MAX_FILE_BYTES = 2**32  # of a file that is still read
 
 
 def check_readable(path: str | Path, largest: int = MAX_FILE_BYTES) -> Path:
-    """The path, if it is a file that may be read and is not too large.
-
-    Raises:
-        FileFormatError: if it is missing, a folder, a pipe, a circle of links, or not for us.
-        UnsafeFileError: if it has more than the largest number of bytes.
-    """
+    """The path, if it is a file that may be read and is not too large."""
     path = Path(path)
     try:
         found = path.stat()

@@ -69,15 +69,7 @@ def quaternion(A: npt.ArrayLike) -> Array:
 
 
 def multiply(p: npt.ArrayLike, q: npt.ArrayLike) -> Array:
-    """(4,) product p o q; matrix(p o q) = matrix(p) matrix(q).
-
-    Args:
-        p: (4,) quaternion [1].
-        q: (4,) quaternion [1].
-
-    Returns:
-        (4,) quaternion [1].
-    """
+    """(4,) product p o q [1] of quaternions (4,) [1]; matrix(p o q) = matrix(p) matrix(q)."""
     p, q = np.asarray(p, dtype=float), np.asarray(q, dtype=float)
     scalar = p[0] * q[0] - p[1:] @ q[1:]
     return np.concatenate(([scalar], p[0] * q[1:] + q[0] * p[1:] + np.cross(p[1:], q[1:])))

@@ -140,14 +140,11 @@ def fits(given: Dimension, wanted: Dimension) -> bool:
 
 
 def in_si(text: str, wanted: str) -> float:
-    """A quantity such as ``"210 GPa"`` in SI, correctly rounded.
+    """A quantity such as ``"210 GPa"`` in units of SI, correctly rounded.
 
     Args:
         text: number and unit.
         wanted: a unit of the dimension it must have, e.g. ``"Pa"``; ``"1"`` for a plain number.
-
-    Returns:
-        The number, in units of SI.
 
     Raises:
         ConfigError: if it is no quantity, or one of another dimension.

@@ -64,12 +64,7 @@ def matrix(name: str, value: Any, shape: tuple[int | None, int | None] = (None, 
 
 
 def symmetric(
-    name: str,
-    A: Any,
-    rtol: float,
-    *,
-    where: str = "",
-    error: type[RomError] = QualityGateError,
+    name: str, A: Any, rtol: float, *, where: str = "", error: type[RomError] = QualityGateError
 ) -> None:
     """Refuse a matrix (n, n), sparse or dense, of a file, that belongs to no energy.
 

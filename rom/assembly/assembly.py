@@ -40,16 +40,14 @@ class Assembly:
     meshes do not match, a projection couples moments of common functions.
 
     Attributes:
-        bodies: {name: body}, all in one system of coordinates; those of other units are
-            converted to SI.
+        bodies: {name: body}, all in one system of coordinates; other units become SI.
         couplings: ((body, interface), (body, interface)) pairs that move together.
         projection: functions that couple deformable interfaces whose coordinates differ, e.g.
             ``Polynomial(4)``; displacements that they contain pass without error.
 
     Raises:
         ConfigError: if a body is unknown or a coupling is no pair of places.
-        InterfaceError: if two interfaces are of different kind or size, lie apart, or need a
-            projection.
+        InterfaceError: if two interfaces differ in kind or size, lie apart, or need a projection.
 
     Warns:
         RomWarning: of bodies by `rom.EnhancedCraigBampton`, which is for bodies that stay alone.
@@ -123,10 +121,8 @@ class Assembly:
     def conditions(self, fixed: tuple[Place, ...] = ()) -> Array:
         """(c, 6 n_b + r) what is zero: gaps of coupled interfaces, coordinates of held ones [m, 1].
 
-        Columns are the rigid and elastic coordinates of one body after another.
-
-        Args:
-            fixed: (body, interface) pairs that are held.
+        Columns are the rigid and elastic coordinates of one body after another; ``fixed`` are
+        (body, interface) pairs that are held.
 
         Raises:
             ConfigError, InterfaceError: if a body or an interface is unknown.

@@ -31,19 +31,12 @@ log = logging.getLogger("rom")
 
 @dataclass(frozen=True, slots=True)
 class Partition:
-    """Motions of a structure, with and without motion of its interfaces.
+    """Motions of a structure, with and without motion of its interfaces."""
 
-    Attributes:
-        C: (n, c) motions that move the interfaces, K-orthogonal to F.
-        F: (n, f) motions that hold them, M-orthonormal.
-        lam: (c,) eigenvalues of the interface motions [rad^2/s^2], ascending.
-        chi: (c, c) their shapes in C: the characteristic constraint modes, all of them.
-    """
-
-    C: Array
-    F: Array
-    lam: Array
-    chi: Array
+    C: Array  # (n, c) motions that move the interfaces, K-orthogonal to F
+    F: Array  # (n, f) motions that hold them, M-orthonormal
+    lam: Array  # (c,) eigenvalues of the interface motions [rad^2/s^2], ascending
+    chi: Array  # (c, c) their shapes in C: the characteristic constraint modes, all of them
 
 
 @dataclass(frozen=True, slots=True)

@@ -114,8 +114,9 @@ class DualAssembly:
             conforming "full" interfaces are paired in their order.
 
     Raises:
-        ConfigError: if a body is unknown.
-        InterfaceError: if an interface is unknown, or two differ in size or lie apart.
+        ConfigError: if a body, or in the methods the kind, is unknown.
+        InterfaceError: if an interface is unknown, or two differ in size or lie apart; of the
+            methods, if forces on interfaces are redundant.
     """
 
     bodies: dict[str, FreeSubstructure]
@@ -159,10 +160,6 @@ class DualAssembly:
             n: how many; None for all.
             kind: "macneal", "rubin" or "dual".
             fixed: (body, interface) pairs that are held.
-
-        Raises:
-            ConfigError: if the kind is unknown.
-            InterfaceError: if an interface is unknown, or forces on interfaces are redundant.
         """
         lam = self.eigenvalues(kind=kind, fixed=fixed)
         lam = lam[lam > -1e-9 * np.abs(lam).max()] if kind == "dual" else lam
@@ -176,10 +173,6 @@ class DualAssembly:
         Args:
             kind: "macneal", "rubin" or "dual".
             fixed: (body, interface) pairs that are held.
-
-        Raises:
-            ConfigError: if the kind is unknown.
-            InterfaceError: if an interface is unknown, or forces on interfaces are redundant.
         """
         K, M = self.matrices(kind=kind, fixed=fixed)
         scale = 1 / np.sqrt(np.diag(M))
@@ -194,12 +187,10 @@ class DualAssembly:
 
         Returns:
             (k, k) stiffness [rad^2/s^2] and (k, k) mass [1], for coordinates whose modes have mass
-            one; rows and columns of "dual" that belong to forces are in flexibility [m/N] and its
-            mass.
+            one; of "dual" those that belong to forces are in flexibility [m/N] and its mass.
 
         Raises:
-            ConfigError: if the kind is unknown.
-            InterfaceError: if an interface is unknown, or forces on interfaces are redundant.
+            InterfaceError: see the class.
         """
         one_of("kind", kind, KINDS)
         Lam, Psi, Gamma, H = self._coupled(fixed)

@@ -61,16 +61,14 @@ class Pieces:
     def add_to(self, mech: Any, name: str, **pose: Any) -> dict[str, Any]:
         """Add all bodies to a mechanism, welded to each other.
 
-        They are called "name piece" there, the welds "name interface".
+        They are called "name piece" there, the welds "name interface". Given back are
+        {interface: its marker} of the interfaces that are no welds.
 
         Args:
             mech: the `rom.Mechanism`.
             name: of the whole.
             pose: ``at``, ``orientation``, ``velocity`` and ``omega`` of the whole at the start, see
                 `rom.Mechanism.add_flexible`.
-
-        Returns:
-            {interface: its marker} of the interfaces that are no welds.
 
         Raises:
             ConfigError: see `rom.Mechanism.add_flexible`; for elastic coordinates, which each
@@ -115,17 +113,11 @@ class Pieces:
 
 @dataclass(frozen=True)
 class Repeated:
-    """A piece that is another one elsewhere.
+    """A piece that is another one elsewhere."""
 
-    Attributes:
-        of: name of the other one.
-        shift: (3,) from its place to this one [m].
-        interfaces: {interface: that of the other one}.
-    """
-
-    of: str
-    shift: Array
-    interfaces: dict[str, str]
+    of: str  # name of the other one
+    shift: Array  # (3,) from its place to this one [m]
+    interfaces: dict[str, str]  # {interface: that of the other one}
 
     @classmethod
     def found(
@@ -164,14 +156,10 @@ def _equal(A: Any, B: Any) -> bool:
 
 @dataclass(frozen=True)
 class Tree:
-    """Pieces in the order in which they hang on the one with the reference.
+    """Pieces in the order in which they hang on the one with the reference."""
 
-    Attributes:
-        reference: {piece: interface on which its frame sits}, parents first.
-        joints: {interface: its two pieces, the nearer one to the reference first}.
-    """
-
-    reference: dict[str, str]
+    reference: dict[str, str]  # {piece: interface on which its frame sits}, parents first
+    # {interface: its two pieces, the nearer one to the reference first}
     joints: dict[str, tuple[str, str]]
 
     @classmethod

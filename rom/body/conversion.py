@@ -23,17 +23,12 @@ SIX = np.array([1, 1, 1, 0, 0, 0])  # powers of a length in a displacement and a
 
 @dataclass(frozen=True, slots=True)
 class Factors:
-    """Numbers in the new units per number in the old ones.
-
-    Attributes:
-        length, mass, time: of the three dimensions.
-        shape: of a displacement shape, by choice: an elastic coordinate is length / shape.
-    """
+    """Numbers in the new units per number in the old ones."""
 
     length: float
     mass: float
     time: float
-    shape: float
+    shape: float  # of a displacement shape, by choice: an elastic coordinate is length / shape
 
     @classmethod
     def between(cls, old: UnitSystem, new: UnitSystem) -> "Factors":

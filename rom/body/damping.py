@@ -28,9 +28,6 @@ class Rayleigh:
     Attributes:
         alpha: factor of the mass [1/s].
         beta: factor of the stiffness [s].
-
-    Raises:
-        ConfigError: for a factor that is negative or not finite.
     """
 
     alpha: Annotated[float, NotNegative("1/s")] = 0.0
@@ -89,8 +86,7 @@ class ModalDamping:
         """(r, r) damping [N s/m].
 
         Raises:
-            ConfigError: if there is not one ratio per elastic coordinate of the body, or for wrong
-                directions.
+            ConfigError: if there is not one ratio per elastic coordinate, or for wrong directions.
             InterfaceError: if an interface is unknown.
             ModelError: if an interface of a basis of free-free modes alone is held.
         """

@@ -11,15 +11,7 @@ from rom.body.frame import on_mean_axes, seen_from
 from rom.body.nonlinear.quartic import Quartic
 from rom.body.nonlinear.sampled import Sampled
 from rom.body.nonlinear.statics import critical_shares, follow
-from rom.body.records import (
-    BodyData,
-    Loads,
-    Marker,
-    Patch,
-    Surface,
-    n_rigid_motions,
-    still_motions,
-)
+from rom.body.records import BodyData, Loads, Marker, Patch, Surface, n_rigid_motions, still_motions
 from rom.body.reference import marker_motion, rigid_elastic, rigid_mass
 from rom.body.rotating import rotating_frequencies
 from rom.body.stiffening import SecondOrder
@@ -54,8 +46,7 @@ class FlexibleBody(BodyData):
         S_kl: (3, 3, r, r) entry [a, b, k, l] is the integral of rho phi_k,a phi_l,b [kg].
         K: (r, r) stiffness [N/m]; the shapes are mass-normalised, so that it is diag(omega^2).
         D: (r, r) damping [N s/m].
-        K_geo: (r, r) geometric stiffness per unit load, by name of the load, see
-            `rom.body.stiffening`.
+        K_geo: (r, r) geometric stiffness per unit load, by name, see `rom.body.stiffening`.
         quartic: strain energy at large deflection, of which K is the part of second order; None
             for a body of small deflection.
         markers: interfaces by name.
@@ -65,8 +56,7 @@ class FlexibleBody(BodyData):
         omega: (r,) natural frequencies of the elastic coordinates, frame held still [rad/s].
         labels: (r,) what each coordinate is.
         reference: the reference condition.
-        units: declared unit system of all its numbers; SI in a mechanism or an assembly, which
-            convert it.
+        units: declared unit system of all its numbers; mechanisms and assemblies convert to SI.
         provenance: how the body was made.
         certificate: evidence that it stands for the full model, or None.
     """
@@ -353,11 +343,9 @@ class FlexibleBody(BodyData):
         return self.quartic
 
     def full_matrices(self) -> tuple[Array, Array]:
-        """Mass and stiffness of small motions.
+        """(6 + r, 6 + r) mass and stiffness of small motions, in units of the body.
 
-        Returns:
-            (6 + r, 6 + r), (6 + r, 6 + r), in units of the body; the six rigid coordinates come
-            first.
+        The six rigid coordinates come first.
         """
         M = np.block([[rigid_mass(self), rigid_elastic(self)], [rigid_elastic(self).T, self.M]])
         K = np.zeros_like(M)

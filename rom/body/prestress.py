@@ -45,19 +45,12 @@ class Carried:
 
 @dataclass(frozen=True)
 class UnitLoads:
-    """Centrifugal force and interface loads of a model, and the stress they leave in it.
+    """Centrifugal force and interface loads of a model, and the stress they leave in it."""
 
-    Attributes:
-        model: the model, with finite elements.
-        mesh: operators of the mesh alone, nodal dofs.
-        whole: the same with attachments.
-        connection: the model in interface coordinates.
-    """
-
-    model: FEModel
-    mesh: Operators
-    whole: Operators
-    connection: Connection
+    model: FEModel  # with finite elements
+    mesh: Operators  # operators of the mesh alone, nodal dofs
+    whole: Operators  # the same with attachments
+    connection: Connection  # the model in interface coordinates
 
     def __post_init__(self) -> None:
         with_elements(self.model, "geometric stiffness", ", or reduce with stiffening=False")

@@ -33,19 +33,12 @@ RIGID_RESIDUAL = 1e-6  # relative distance of a rigid motion from the basis that
 
 @dataclass(frozen=True, slots=True)
 class Elastic:
-    """The part of a basis without rigid motion.
+    """The part of a basis without rigid motion."""
 
-    Attributes:
-        V: (r + 6, r) combinations of the basis columns: free-free modes of the reduced model.
-        omega: (r,) their circular frequencies [rad/s].
-        rigid: (r + 6, 6) combinations that give the six rigid motions.
-        residual: distance of the rigid motions from the basis, relative.
-    """
-
-    V: Array
-    omega: Array
-    rigid: Array
-    residual: float
+    V: Array  # (r + 6, r) combinations of the basis columns: free-free modes of the reduced model
+    omega: Array  # (r,) their circular frequencies [rad/s]
+    rigid: Array  # (r + 6, 6) combinations that give the six rigid motions
+    residual: float  # distance of the rigid motions from the basis, relative
 
 
 def elastic_part(ops: Operators, Psi: Array) -> Elastic:

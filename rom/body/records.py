@@ -44,17 +44,13 @@ def n_rigid_motions(held: Iterable[Array], size: float) -> int:
 
 @dataclass(frozen=True, slots=True)
 class Patch:
-    """The meshed surface behind a deformable interface, to couple meshes that do not match.
+    """The meshed surface behind a deformable interface, to couple meshes that do not match."""
 
-    Attributes:
-        points: (k, 3) undeformed nodes in the body frame [m].
-        surface_mass: (k, k) sparse matrix of the integrals of N_i N_j over the surface [m^2].
-        shapes: (3k, n_c) displacement of the nodes per unit of each interface coordinate; None
-            when the coordinates are these displacements.
-    """
-
-    points: Array
+    points: Array  # (k, 3) undeformed nodes in the body frame [m]
+    # (k, k) sparse matrix of the integrals of N_i N_j over the surface [m^2]
     surface_mass: csr_matrix
+    # (3k, n_c) displacement of the nodes per unit of each interface coordinate; None when the
+    # coordinates are these displacements
     shapes: Array | None = None
 
 

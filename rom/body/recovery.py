@@ -27,27 +27,21 @@ class StressRecovery:
     Rigid motion has none, so that it does not depend on the floating frame. The stress of modes
     that a reduction left out follows inertia without delay; the accelerations give it back.
 
-    Attributes:
-        points: (p, 3) undeformed positions [m].
-        operator: (6 p, r) stress xx, yy, zz, yz, xz, xy in the body frame per unit of each elastic
-            coordinate [Pa]; row 6*node + component.
-        inertial: (6 p, 12 + r) stress of the modes left out per unit of what `accelerations`
-            returns; None for bases without constraint modes.
-
     Source:
         The correction is the mode acceleration method, Craig and Kurdila, Fundamentals of
         Structural Dynamics (2006), applied to the inner dofs; Coriolis forces are left out.
     """
 
-    points: Array
+    points: Array  # (p, 3) undeformed positions [m]
+    # (6 p, r) stress xx, yy, zz, yz, xz, xy in the body frame per unit of each elastic coordinate
+    # [Pa]; row 6*node + component
     operator: Array
+    # (6 p, 12 + r) stress of the modes left out per unit of what `accelerations` returns; None for
+    # bases without constraint modes
     inertial: Array | None = None
 
     def field(self, q: Array, accelerations: Array | None = None) -> Array:
-        """(p, 6) stress for elastic coordinates q (r,) [Pa].
-
-        Accelerations (12 + r,) are what `accelerations` returns; None for statics.
-        """
+        """(p, 6) stress [Pa] for q (r,) and what `accelerations` returns; None for statics."""
         q = finite("q", q, self.operator.shape[1:])
         found: Array = self.operator @ q
         if accelerations is not None:
@@ -71,13 +65,10 @@ class StressRecovery:
 
     @staticmethod
     def accelerations(a: Array, alpha: Array, omega: Array, qdd: Array) -> Array:
-        """(12 + r,) what the stress of the modes left out depends on.
+        """(12 + r,) what the stress of the modes left out depends on, axes of the body.
 
-        Args:
-            a: (3,) acceleration of the body origin minus gravity, body frame [m/s^2].
-            alpha: (3,) angular acceleration, body frame [rad/s^2].
-            omega: (3,) angular velocity, body frame [rad/s].
-            qdd: (r,) second derivatives of the elastic coordinates.
+        Those are the acceleration of the origin minus gravity a (3,) [m/s^2], alpha (3,) [rad/s^2],
+        omega (3,) [rad/s], and second derivatives qdd (r,) of the elastic coordinates.
         """
         return np.concatenate([a, alpha, [omega[i] * omega[j] for i, j in PRODUCTS], qdd])
 

@@ -59,7 +59,7 @@ def surface_load(
             returns (t,) booleans, the name of a deformable interface, or None for all of it.
 
     Raises:
-        ConfigError: for not exactly one load, a wrong shape, or a place without area.
+        ConfigError: for not exactly one load, or a place without area.
         ModelError: if the body has no surface, or one whose triangles do not tell inside from
             outside, which a pressure needs.
     """
@@ -90,9 +90,6 @@ def mass_load(body: FlexibleBody, acceleration: npt.ArrayLike) -> SpreadLoad:
     Args:
         body: flexible.
         acceleration: (3,) force per mass [m/s^2].
-
-    Raises:
-        ConfigError: for another shape.
     """
     g = finite("acceleration", acceleration, (3,))
     shapes = np.einsum("ak,b->kab", body.S, g)

@@ -12,11 +12,10 @@ interface the displacements psi of its marker. Body forces of the moving frame, 
 springs then stiffen the body by their virtual work on psi, whatever they are, and energy and
 momentum stay exactly balanced.
 
-Names of the loads: "omega_x^2" and "omega_x omega_y" for centrifugal force, "domega_x" for
-angular acceleration, "a_x" for acceleration of the frame, "ddq_1" for that of the first elastic
-coordinate, each per unit of the quantity and as the force -rho times acceleration it stands for;
-"tip f_x" and "tip m_x" for force and moment on the interface "tip". A load left out has no
-geometric stiffness.
+Names of the loads: "omega_x^2" and "omega_x omega_y" for centrifugal force, "domega_x" for angular
+acceleration, "a_x" for acceleration of the frame, "ddq_1" for that of the first elastic coordinate,
+each per unit of the quantity and as the force -rho times acceleration it stands for; "tip f_x" and
+"tip m_x" for force and moment on the interface "tip". A load left out has no geometric stiffness.
 
 Source:
     Wallrapp and Schwertassek, Representation of geometric stiffening in multibody system
@@ -67,18 +66,12 @@ def known_loads(body: BodyData) -> tuple[str, ...]:
 
 @dataclass(frozen=True, slots=True)
 class SecondOrder:
-    """Displacements psi_kl of second order, as far as loads see them.
+    """Displacements psi_kl of second order, as far as loads see them."""
 
-    Attributes:
-        S: (3, r, r) integral of rho psi_kl [kg m].
-        Ibar: (3, 3, r, r) entry [a, b, k, l] is the integral of rho X_a psi_kl,b [kg m^2].
-        N: (r, r, r) entry [m, k, l] is the integral of rho phi_m . psi_kl.
-        markers: {interface: (6, r, r) translation and rotation vector of its marker}.
-    """
-
-    S: Array
-    Ibar: Array
-    N: Array
+    S: Array  # (3, r, r) integral of rho psi_kl [kg m]
+    Ibar: Array  # (3, 3, r, r) entry [a, b, k, l] is the integral of rho X_a psi_kl,b [kg m^2]
+    N: Array  # (r, r, r) entry [m, k, l] is the integral of rho phi_m . psi_kl
+    # {interface: (6, r, r) translation and rotation vector of its marker}
     markers: dict[str, Array]
 
     @classmethod

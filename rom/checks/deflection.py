@@ -123,21 +123,15 @@ def _turn(body: FlexibleBody, q: Array) -> float:
 
 @dataclass(frozen=True)
 class Step:
-    """A state of the body against that of the full model.
+    """A state of the body against that of the full model."""
 
-    Attributes:
-        displacement: distance of the two, relative, in the mean square over the mass [1].
-        reached: displacement of the body along that of the full model, as a share of it [1].
-        frequencies: largest relative error of the lowest frequencies about it [1].
-        compliance: the same of displacements of the interfaces of the range, each by a small
-            further force or moment along itself [1].
-        stress: distance of the stress on the surface, relative, in the mean square [1].
-    """
-
-    displacement: float
-    reached: float
-    frequencies: float
+    displacement: float  # distance of the two, relative, in the mean square over the mass [1]
+    reached: float  # displacement of the body along that of the full model, as a share of it [1]
+    frequencies: float  # largest relative error of the lowest frequencies about it [1]
+    # the same of displacements of the interfaces of the range, each by a small further force or
+    # moment along itself [1]
     compliance: float | None = None
+    # distance of the stress on the surface, relative, in the mean square [1]
     stress: float | None = None
 
 

@@ -22,24 +22,9 @@ Stage = Callable[[Any], None]
 
 @dataclass(kw_only=True)
 class Draft:
-    """What a reduction was asked for, and what each of its stages has found so far.
+    """What a reduction was asked for, and what each of its stages has found so far."""
 
-    Attributes:
-        model, method, interfaces, reference, damping, name, stress, stiffening, nonlinear, certify:
-            as `rom.reduce` takes them.
-        open_orders: names of interfaces whose polynomials have no order yet.
-        connection: the model in the coordinates of its interfaces.
-        maker: the method that makes the basis there.
-        basis: its shapes in these coordinates.
-        Psi: (n_local, 6 + r) the same in nodal dofs.
-        elastic: the part of it without rigid motion.
-        E: (n_local, r) shapes of the body in nodal dofs.
-        rows: further lines for the certificate of the body.
-        body: what the reduction gives.
-        watch: of the time of the stages, which begin a heading of it or count to that before.
-    """
-
-    model: Any
+    model: Any  # this and what follows as `rom.reduce` takes it
     method: Any = None
     interfaces: dict[str, Any] = field(default_factory=dict)
     reference: Any = "mean-axis"
@@ -49,15 +34,16 @@ class Draft:
     stiffening: bool = False
     nonlinear: Any = None
     certify: Any = True
-    open_orders: list[str] = field(init=False)
-    connection: Connection = field(init=False)
-    maker: Any = field(init=False)
-    basis: Basis = field(init=False)
-    Psi: Array = field(init=False)
-    elastic: Elastic = field(init=False)
-    E: Array = field(init=False)
-    rows: tuple[Row, ...] = ()
-    body: Any = field(init=False)
+    open_orders: list[str] = field(init=False)  # interfaces whose polynomials have no order yet
+    connection: Connection = field(init=False)  # the model in the coordinates of its interfaces
+    maker: Any = field(init=False)  # the method that makes the basis there
+    basis: Basis = field(init=False)  # its shapes in these coordinates
+    Psi: Array = field(init=False)  # (n_local, 6 + r) the same in nodal dofs
+    elastic: Elastic = field(init=False)  # the part of it without rigid motion
+    E: Array = field(init=False)  # (n_local, r) shapes of the body in nodal dofs
+    rows: tuple[Row, ...] = ()  # further lines for the certificate of the body
+    body: Any = field(init=False)  # what the reduction gives
+    # of the time of the stages, which begin a heading of it or count to that before
     watch: Stopwatch = field(default_factory=Stopwatch)
 
     def __post_init__(self) -> None:
@@ -88,8 +74,7 @@ class Draft:
 def run(stages: Iterable[Stage], draft: Draft) -> Any:
     """Do the stages of a reduction one after the other, and time them; the body of the draft.
 
-    Stages are functions of the draft, such as `rom.workflow.stages` lists; your own may be among
-    them.
+    Stages are functions of the draft, such as `rom.workflow.stages` lists, or your own.
     """
     with stopwatch() as draft.watch:
         for stage in stages:

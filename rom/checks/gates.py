@@ -15,10 +15,7 @@ from rom.rows import row
 
 @typed
 def check(record: object) -> Report:
-    """Check a record against the limits its kind has to meet.
-
-    Args:
-        record: an `FEModel`, or a `FlexibleBody` (its certificate is part of the report).
+    """Check an `FEModel`, or a `FlexibleBody` with its certificate, against the limits of its kind.
 
     Raises:
         ConfigError: if there is nothing to check on this kind of object.

@@ -20,17 +20,11 @@ MEETING_RTOL = 1e-6  # of the size of a section: how far nodes that meet may lie
 
 @dataclass(frozen=True)
 class GluedSolid:
-    """The whole solid at finite strain.
+    """The whole solid at finite strain."""
 
-    Attributes:
-        models: the pieces.
-        dofs: {piece: (n_k,) numbers of its dofs in the whole}.
-        n: number of dofs of the whole.
-    """
-
-    models: Mapping[str, FEModel]
-    dofs: dict[str, Index]
-    n: int
+    models: Mapping[str, FEModel]  # the pieces
+    dofs: dict[str, Index]  # {piece: (n_k,) numbers of its dofs in the whole}
+    n: int  # number of dofs of the whole
 
     @classmethod
     def of(

@@ -5,16 +5,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from rom.arguments import Quantity, Whole
-from rom.cli.options import (
-    count,
-    faces,
-    meshing,
-    names,
-    number_or_text,
-    numbers_of,
-    option,
-    unique,
-)
+from rom.cli.options import count, faces, meshing, names, number_or_text, numbers_of, option, unique
 from rom.config.component_keys import TABLE
 from rom.config.keys import Text, Words
 from rom.errors import ConfigError

@@ -72,11 +72,7 @@ class Component(Described):
 
     @property
     def mesh(self) -> tuple[Path, Values]:
-        """File and keywords for `rom.fe.mesh.read.read_mesh`.
-
-        Raises:
-            ConfigError: without a geometry.
-        """
+        """File and keywords for `rom.fe.mesh.read.read_mesh`."""
         geometry = self._section("geometry")
         own = geometry["file"].suffix.lower() in (".step", ".stp")
         if own and geometry["unit"] != "m":
@@ -92,11 +88,7 @@ class Component(Described):
         return geometry["file"], {"parameters": parameters} | how | self.meshing
 
     def model(self) -> "FEModel":
-        """The finite element model; a geometry needs FEniCSx.
-
-        Raises:
-            RomError: of what is wrong with file, mesh, material or matrices.
-        """
+        """The finite element model; a geometry needs FEniCSx."""
         given = [name for name in ("geometry", "matrices") if name in self.values]
         if len(given) != 1:
             what = "both geometry and matrices" if given else "neither geometry nor matrices"
@@ -110,11 +102,7 @@ class Component(Described):
         return model(file, degree=geometry["degree"], solver=geometry["solver"], **keywords)
 
     def body(self) -> "FlexibleBody":
-        """The reduced body.
-
-        Raises:
-            RomError: as `model` and `rom.reduce`.
-        """
+        """The reduced body."""
         from rom.workflow import reduce
 
         reduction, kinds = self.values["reduction"], self.kinds

@@ -60,11 +60,7 @@ class Written(Protocol):
         """In a few words, for the documentation."""
 
     def read(self, value: object, place: Place) -> Any:
-        """The value, checked and in SI.
-
-        Raises:
-            ConfigError: if it is none of this kind.
-        """
+        """The value, checked and in SI."""
 
 
 def read_value(kind: "Kind", value: object, place: Place) -> Any:

@@ -35,11 +35,7 @@ class MechanismFile(Described):
     __slots__ = ()
 
     def mechanism(self) -> "Mechanism":
-        """The mechanism, ready to move; component files in it are meshed and reduced.
-
-        Raises:
-            ConfigError, ModelError: with file and line of the body, joint or force.
-        """
+        """The mechanism, ready to move; component files in it are meshed and reduced."""
         from rom.mbs.mechanism import Mechanism
 
         for path, file in python_entries(self.document):
@@ -72,9 +68,6 @@ class MechanismFile(Described):
             made: the mechanism, if it has been built already.
             progress: report on stderr.
             keep: folder that is written while the run lasts.
-
-        Raises:
-            RomError: as `mechanism` and `rom.simulate`.
         """
         from rom.mbs.integrate.simulation import simulate
 

@@ -202,21 +202,14 @@ def pushing(kind: str, unit: str) -> Declared:
 
 
 class Section(NamedTuple):
-    """A section of a mechanism file.
+    """A section of a mechanism file."""
 
-    Attributes:
-        about: what its entries are.
-        kind: how they are written.
-        connect: what an `Entry` of it does, see `rom.config.connections`.
-        bodies: whether they are bodies, which markers name.
-        summary: a sentence about them, where there is more to say.
-    """
-
-    about: str
-    kind: Kind
+    about: str  # what its entries are
+    kind: Kind  # how they are written
+    # what an `Entry` of it does, see `rom.config.connections`
     connect: Callable[[Any], None] | None = None
-    bodies: bool = False
-    summary: str = ""
+    bodies: bool = False  # whether they are bodies, which markers name
+    summary: str = ""  # a sentence about them, where there is more to say
 
     def key(self, name: str) -> Key:
         """The section as a key of the file."""

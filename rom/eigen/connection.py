@@ -14,26 +14,16 @@ from rom.model import Array, Index
 
 @dataclass(frozen=True, slots=True)
 class Tie:
-    """One interface: dofs that leave, and how they follow from masters and dofs that stay.
+    """One interface: dofs that leave, and how they follow from masters and dofs that stay."""
 
-    Attributes:
-        label: name of the kind.
-        names: (m,) what each coordinate is.
-        coordinates: (m, 3k) map L from the dofs of the surface to its coordinates.
-        removed: (d,) dofs replaced; none when the coordinates are the dofs themselves.
-        by_masters: (d, m) how they follow from the coordinates; sparse where a function moves one
-            direction only.
-        kept: (s,) dofs that stay and take part.
-        by_kept: (d, s) how the removed ones follow from them.
-    """
-
-    label: str
-    names: tuple[str, ...]
-    coordinates: Any
-    removed: Index
+    label: str  # name of the kind
+    names: tuple[str, ...]  # (m,) what each coordinate is
+    coordinates: Any  # (m, 3k) map L from the dofs of the surface to its coordinates
+    removed: Index  # (d,) dofs replaced; none when the coordinates are the dofs themselves
+    # (d, m) how they follow from the coordinates; sparse where a function moves one direction only
     by_masters: Any
-    kept: Index
-    by_kept: Array
+    kept: Index  # (s,) dofs that stay and take part
+    by_kept: Array  # (d, s) how the removed ones follow from them
 
     @property
     def n_masters(self) -> int:
@@ -43,37 +33,21 @@ class Tie:
 
 @dataclass(frozen=True, slots=True)
 class Connection:
-    """A model written in interface coordinates.
+    """A model written in interface coordinates."""
 
-    Attributes:
-        ops: operators in the coordinates a of u = T a; ``ops.expand`` leads back.
-        boundary: (n_b,) dof numbers in a of all interface coordinates, interface by interface.
-        parts: {interface: positions in ``boundary``}.
-        labels: (n_b,) what each coordinate is, e.g. "pin_a rbe2 uz".
-        ties: {interface: how its coordinates govern its dofs}.
-    """
-
-    ops: Operators
-    boundary: Index
-    parts: dict[str, Index]
-    labels: tuple[str, ...]
-    ties: dict[str, Tie]
+    ops: Operators  # operators in the coordinates a of u = T a; ``ops.expand`` leads back
+    boundary: Index  # (n_b,) dof numbers in a of all interface coordinates, interface by interface
+    parts: dict[str, Index]  # {interface: positions in ``boundary``}
+    labels: tuple[str, ...]  # (n_b,) what each coordinate is, e.g. "pin_a rbe2 uz"
+    ties: dict[str, Tie]  # {interface: how its coordinates govern its dofs}
 
     def held(self, fixed: Fixed) -> Index:
-        """Dof numbers that are zero when these interfaces are held.
-
-        Raises:
-            ConfigError, InterfaceError: see `rom.eigen.supports`.
-        """
+        """Dof numbers that are zero when these interfaces are held."""
         rows = self.held_parts(fixed)
         return self.boundary[rows]
 
     def on_springs(self, stiffness: dict[str, Array]) -> "Connection":
-        """The model on springs to the ground: {interface: (6, 6)} for its six coordinates.
-
-        Raises:
-            InterfaceError: if one has other coordinates.
-        """
+        """The model on springs to the ground: {interface: (6, 6)} for its six coordinates."""
         ops = self.ops
         dK = csr_matrix((ops.n_local, ops.n))
         for name, k in stiffness.items():

@@ -80,8 +80,7 @@ def model(
             an unknown solver.
         UnsafeFileError: for a geometry that would do more than make a mesh, or is Python without
             ``trust``.
-        ResourceError: if meshing exceeds its limit of time or memory, or no way to solve would
-            fit.
+        ResourceError: if meshing exceeds its limit of time or memory, or no way to solve would fit.
         MaterialError: if a region has no material or a material no region.
         InterfaceError: if an interface is empty or an attachment hangs on none.
 
@@ -126,8 +125,7 @@ def pieces(  # noqa: PLR0913  those of `model`, and how to cut
     Args:
         path: geometry or mesh file, see `model`.
         n: number of pieces of about equal length, cut between layers of cells.
-        axis: (3,) direction of the normal of the cuts [1]; without n and axis each region is a
-            piece.
+        axis: (3,) normal of the cuts [1]; without n and axis each region is a piece.
         material: as for the whole.
         degree: as for `model`, as are all that follow.
         parameters: of the geometry.
@@ -242,10 +240,7 @@ def _model(options: _Options, part: SolidMesh | None, head: _Head) -> FEModel:
         interfaces[key] = replace(interfaces[key], origin=point, axis=along)
     provenance = head.origin | made.provenance | {"warnings": remarks, "solver": why}
     return replace(
-        made,
-        operators=made.operators.solved_by(how),
-        provenance=provenance,
-        interfaces=interfaces,
+        made, operators=made.operators.solved_by(how), provenance=provenance, interfaces=interfaces
     )
 
 
@@ -270,9 +265,6 @@ def assemble(
         degree: polynomial degree of the displacement, 1 to 3.
         regions: {region name: tag}; one region called "solid" when not given.
         attachments: point masses and rigid bodies carried by interfaces.
-
-    Returns:
-        FEModel, free-free; see `model`.
 
     Raises:
         ConfigError, MeshError, TagError, MaterialError, InterfaceError: see `model`.

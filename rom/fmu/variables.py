@@ -171,8 +171,7 @@ def _places(mechanism: Mechanism) -> dict[str, Marker]:
 class Outputs:
     """What an FMU tells of its mechanism: of the names of `output_names` that are given.
 
-    Joints among them get a friction of zero, which lets the integrator count their angles over
-    whole turns.
+    Joints among them get a friction of zero, by which the integrator counts their whole turns.
     """
 
     def __init__(self, mechanism: Mechanism, names: tuple[str, ...]):

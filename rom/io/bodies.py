@@ -12,11 +12,7 @@ from rom.io.archive import MAX_BYTES
 
 @typed
 def save(body: FlexibleBody | AnyFamily, path: str | Path) -> Path:
-    """Write a flexible body, or a family of them, whole or not at all.
-
-    Args:
-        body: what to write.
-        path: file name, usually ending in ``.rom.npz``.
+    """Write a flexible body, or a family of them, whole or not at all, usually as ``.rom.npz``.
 
     Raises:
         ConfigError: if the folder is missing or not writable.
@@ -42,9 +38,6 @@ def load(path: str | Path, *, limit: int = MAX_BYTES) -> Any:
     Args:
         path: file written by `save`.
         limit: bytes the arrays may take in memory.
-
-    Returns:
-        FlexibleBody or BodyFamily.
 
     Raises:
         FileFormatError: if the file is missing, cut, changed, or no body file.

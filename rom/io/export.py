@@ -88,9 +88,8 @@ def export(
             Order Flexible Solid, "radioss" for a flexible body of OpenRadioss, "openfast" for a
             superelement of OpenFAST's module ExtPtfm with the weight of the body, "openfast-4" for
             those up to version 4, "fmu" for a Functional Mock-up Unit of its small motions, see
-            `rom.write_body_fmu`; None for the ending of the path: ``.vtu``, ``.npz``,
-            ``.SID_FEM``, ``.dmig``, ``.op4``, ``.inp``, ``.py``, ``.fem``, ``.mat``, ``.pch``,
-            ``.fmu``.
+            `rom.write_body_fmu`; None for the ending of the path: ``.vtu``, ``.npz``, ``.SID_FEM``,
+            ``.dmig``, ``.op4``, ``.inp``, ``.py``, ``.fem``, ``.mat``, ``.pch``, ``.fmu``.
         held: interfaces that stand still; for "openfast", which takes one free interface.
 
     Raises:

@@ -19,13 +19,9 @@ from rom.readable import check_readable as check_readable
 def write_whole(path: str | Path, content: bytes | Callable[[IO[bytes]], object]) -> Path:
     """Write a file through a temporary one in the same folder, then rename; its path.
 
-    Args:
-        path: final name; a file of that name is replaced only by a complete new one.
-        content: what is in it, or what writes that into the open binary file.
-
-    Raises:
-        ConfigError: if the folder does not exist or may not be written, or the name is a folder.
-        ResourceError: if the disk is full.
+    A file of that name is replaced only by a complete new one. The content may be a function that
+    writes into the open binary file. A folder that is missing or may not be written is a
+    ConfigError, a full disk a ResourceError.
     """
     path = check_writable(path)
     part = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
@@ -78,10 +74,7 @@ WRONG_JSON = (*WRONG_TEXT, TypeError, AttributeError, RecursionError)
 
 @contextmanager
 def damaged(
-    what: str,
-    where: object = "",
-    hint: str = "",
-    causes: tuple[type[Exception], ...] = WRONG_TEXT,
+    what: str, where: object = "", hint: str = "", causes: tuple[type[Exception], ...] = WRONG_TEXT
 ) -> Iterator[None]:
     """Turn what wrong text causes, a ValueError, say, into an error that names its place."""
     try:
@@ -94,11 +87,7 @@ def damaged(
 def lines_of(
     path: Path, what: str, hint: str = "", encoding: str = "latin1"
 ) -> Iterator[Iterator[str]]:
-    """The lines of a text file; what its reader raises as of wrong text names the last one read.
-
-    Raises:
-        FileFormatError: if the file is missing, its last line is cut, or it is damaged.
-    """
+    """The lines of a text file; what its reader raises as of wrong text names the last one read."""
     check_last_line(path)
     at = Line(path)
 

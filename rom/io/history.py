@@ -56,7 +56,7 @@ def write_history(solution: AnySolution, path: str | Path, *, every: int = 1) ->
         every: take every so many instants.
 
     Raises:
-        ConfigError: for another ending, a wrong ``every``, or a place that is not writable.
+        ConfigError: for another ending, or a place that is not writable.
         ResourceError: if h5py is missing or clashes for ``.h5``, or the disk is full.
     """
     ending = Path(path).suffix.lower()
@@ -78,12 +78,7 @@ def _every(solution: Any, every: int) -> tuple[Array, tuple[Channel, ...]]:
 
 
 def data_frame(solution: Any, *, every: int = 1) -> Any:
-    """The table as a pandas DataFrame, indexed by time; columns are named as in the file.
-
-    Raises:
-        ConfigError: for a wrong ``every``.
-        ResourceError: if pandas is missing.
-    """
+    """The table as a pandas DataFrame, indexed by time; columns are named as in the file."""
     pandas = _library("pandas")
     t, found = _every(solution, every)
     values = np.hstack([c.values for c in found])
@@ -91,12 +86,7 @@ def data_frame(solution: Any, *, every: int = 1) -> Any:
 
 
 def data_set(solution: Any, *, every: int = 1) -> Any:
-    """The quantities as an xarray Dataset over "t", each with its unit as an attribute.
-
-    Raises:
-        ConfigError: for a wrong ``every``.
-        ResourceError: if xarray is missing.
-    """
+    """The quantities as an xarray Dataset over "t", each with its unit as an attribute."""
     xarray = _library("xarray")
     t, found = _every(solution, every)
     variables = {}

@@ -43,11 +43,7 @@ FILE_SIGNS = {  # kind of file: how each that rom writes begins
     "vtkhdf": rb"\x89HDF\r\n.*" + MARK_BYTES,
     "json": rb'\{\s*"schema": ?"rom-(run|scene)"',
 }
-SAME_KIND = {
-    "sid-pysid": "sid",
-    "sid-geisler": "sid",
-    "openfast-4": "openfast",
-}
+SAME_KIND = {"sid-pysid": "sid", "sid-geisler": "sid", "openfast-4": "openfast"}
 LOCK_NAME = ".rom.lock"
 MAX_OWNER_BYTES = 300
 
@@ -99,8 +95,7 @@ def claimed(folder: str | Path) -> Iterator[None]:
     """Keep other runs out of a folder, which is made if it is missing.
 
     The lock is one of the system and ends with the process that holds it, however that ends; a
-    folder that was made and stayed empty is removed. Where a file system has no locks, nothing is
-    kept out.
+    folder that was made and stayed empty is removed. A file system without locks keeps nothing out.
 
     Raises:
         ConfigError: if it is no folder, or may not be made or written.

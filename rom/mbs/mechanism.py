@@ -72,21 +72,13 @@ def bound(found: type | Callable[..., object]) -> object:
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """A function of the motion whose zeros are looked for.
+    """A function of the motion whose zeros are looked for."""
 
-    Attributes:
-        function: of the time and an instant of the motion.
-        direction: 1 for rising values, -1 for falling ones, 0 for both.
-        terminal: whether it ends the run.
-        markers: the function asks for, beside those with names.
-        coordinates: joints and rows of the coordinates it asks for.
-    """
-
-    function: Callable[..., object]
-    direction: int
-    terminal: bool
-    markers: tuple[Marker, ...] = ()
-    coordinates: tuple[tuple[str, Row], ...] = ()
+    function: Callable[..., object]  # of the time and an instant of the motion
+    direction: int  # 1 for rising values, -1 for falling ones, 0 for both
+    terminal: bool  # whether it ends the run
+    markers: tuple[Marker, ...] = ()  # it asks for, beside those with names
+    coordinates: tuple[tuple[str, Row], ...] = ()  # it asks for: joints and rows
 
 
 @typed
@@ -101,7 +93,9 @@ class Mechanism(Methods, metaclass=Open, kind="methods", bound=bound):
         gravity: (3,) acceleration of gravity [m/s^2].
 
     Raises:
-        ConfigError: if gravity is not three finite numbers.
+        ConfigError: if gravity is not three finite numbers; of all methods, for a name in use, a
+            marker or joint that is not there, a body connected with itself, or no direction.
+        ModelError: of joints with moments, if a body has free-free modes only, which carry none.
 
     Warns:
         RomWarning: for numbers legal but strange: gravity beyond that of all planets, an inertia
@@ -179,13 +173,10 @@ class Mechanism(Methods, metaclass=Open, kind="methods", bound=bound):
             markers: {name: (3,) point from the mass centre, body frame [m]}.
             velocity: (3,) of the mass centre, world [m/s].
             omega: (3,) angular velocity, body frame [rad/s].
-            spin: (3,) angular velocity of the body in its frame, which does not turn with it, as
-                in `add_flexible` [rad/s].
+            spin: (3,) angular velocity in its frame, which stands, as in `add_flexible` [rad/s].
 
         Raises:
-            ConfigError: for a name in use, a wrong shape or a number that is not finite.
-            ModelError: if mass or inertia are not those of a real body, or a body that spins is
-                not round.
+            ModelError: if mass or inertia are of no real body, or a body that spins is not round.
 
         Example:
             >>> mech = rom.Mechanism()
@@ -220,14 +211,12 @@ class Mechanism(Methods, metaclass=Open, kind="methods", bound=bound):
 
         Args:
             name: name of the body in this mechanism.
-            body: a ``FlexibleBody`` with r elastic coordinates; one of other units is converted
-                to SI, in which a mechanism is.
+            body: with r elastic coordinates; one of other units is converted to SI.
             at: (3,) origin of its frame at the start, world [m].
             orientation: (3, 3) matrix or (4,) quaternion [1], body to world; None for parallel.
             velocity: (3,) of the origin, world [m/s].
             omega: (3,) angular velocity of the frame, body frame [rad/s].
-            q: (r,) elastic coordinates at the start, in the units of the body's shapes; None for
-                undeformed.
+            q: (r,) elastic coordinates at the start, in units of the shapes; None for undeformed.
             qd: (r,) their rates, in the units of q per second.
             spin: (3,) angular velocity [rad/s] with which the material of a round body turns
                 through the frame, which does not: shafts that bend under a load rest, whirl and
@@ -235,7 +224,6 @@ class Mechanism(Methods, metaclass=Open, kind="methods", bound=bound):
                 are those of small displacements; films, teeth and rolling bearings know of it.
 
         Raises:
-            ConfigError: for no body, a name in use, a wrong shape or a number that is not finite.
             ModelError: if the mass matrix of the body is singular: rigid motions left in it; or a
                 body that spins is not round, or one of large deflection, or such a one has
                 geometric stiffness.
@@ -314,8 +302,7 @@ class Mechanism(Methods, metaclass=Open, kind="methods", bound=bound):
                 use: markers, joints, or pairs of a joint and its "angle" or "displacement".
 
         Raises:
-            ConfigError: for a name in use, another direction, or a marker, joint or coordinate that
-                is not there.
+            ConfigError: for a marker, joint or coordinate that is not there.
         """
         self.check_new(name)
         markers = tuple(one for one in follow if isinstance(one, Marker))

@@ -49,35 +49,22 @@ class Problem(Protocol):
 
 @dataclass(frozen=True)
 class Point:
-    """A point of a path.
+    """A point of a path."""
 
-    Attributes:
-        at: the solution.
-        p: the parameter.
-        step, rate: (k,) change of solution and parameter per arc length.
-        passes: corrections that it took.
-    """
-
-    at: Any
-    p: float
-    step: Array
-    rate: float
-    passes: int = 0
+    at: Any  # the solution
+    p: float  # the parameter
+    step: Array  # (k,) change of the solution per arc length
+    rate: float  # change of the parameter per arc length
+    passes: int = 0  # corrections that it took
 
 
 @dataclass(frozen=True)
 class Curve:
-    """A path.
+    """A path."""
 
-    Attributes:
-        problem: its equations.
-        unit: change of the parameter that counts like a change of size one of the solution.
-        tol: size of a correction that no longer matters.
-    """
-
-    problem: Problem
-    unit: float
-    tol: float = CORRECTION_TOL
+    problem: Problem  # its equations
+    unit: float  # change of the parameter that counts like a change of size one of the solution
+    tol: float = CORRECTION_TOL  # size of a correction that no longer matters
 
     def length(self, step: Array, rate: float) -> float:
         """Arc length of a change of solution and parameter."""
@@ -96,11 +83,7 @@ class Curve:
         return self.point(at, p, slope, (0.0 * slope, 1.0 if forwards else -1.0))
 
     def ahead(self, point: Point, h: float) -> Point:
-        """The point of the path at an arc length h further.
-
-        Raises:
-            SolverError: if it is too far for Newton's method, or for linear equations to say where.
-        """
+        """The point of the path at an arc length h further; a SolverError if that is too far."""
         if not self.problem.size(h * point.step) < MAX_PREDICTION:
             raise SolverError("the path is steeper than its points are close.")
         p, last, away = point.p + h * point.rate, np.inf, 0.0
@@ -121,11 +104,7 @@ class Curve:
         raise SolverError("no point of the path was found.")
 
     def steps(self, point: Point, longest: float) -> Iterator[tuple[Point, float, Point]]:
-        """Neighbouring points, and the arc length between them, without end.
-
-        Raises:
-            SolverError: if even the shortest step finds no further point.
-        """
+        """Neighbouring points, and the arc length between them, without end; or a SolverError."""
         h = FIRST_STEP_RATIO * longest
         while True:
             try:

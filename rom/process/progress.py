@@ -56,8 +56,7 @@ def line(text: str) -> None:
 def looked_for() -> bool:
     """Whether a line of progress is seen and wanted, where no argument says so.
 
-    On the first rank, where stderr is a terminal; not with ``-q``, and not when the logger "rom"
-    is set to errors.
+    On the first rank, where stderr is a terminal; not with ``-q`` or the logger "rom" at errors.
     """
     return not ranks()[0] and sys.stderr.isatty() and log.isEnabledFor(logging.WARNING)
 

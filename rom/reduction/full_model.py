@@ -34,17 +34,11 @@ def operators(model: FEModel) -> Operators:
 
 @dataclass(frozen=True, slots=True)
 class MassProperties:
-    """What a rigid body needs to know of a solid.
+    """What a rigid body needs to know of a solid."""
 
-    Attributes:
-        mass: mass [kg].
-        centre: (3,) mass centre [m].
-        inertia: (3, 3) about the mass centre, axes of the geometry [kg m^2].
-    """
-
-    mass: float
-    centre: Array
-    inertia: Array
+    mass: float  # [kg]
+    centre: Array  # (3,) of mass [m]
+    inertia: Array  # (3, 3) about the mass centre, axes of the geometry [kg m^2]
 
 
 @typed
@@ -52,9 +46,6 @@ def mass_properties(model: FEModel) -> MassProperties:
     """Mass, mass centre and inertia of a finite element model with all it carries.
 
     From the rigid part R^T M R of the mass matrix; under mpirun to be called on all ranks.
-
-    Args:
-        model: the body.
 
     Example:
         >>> steel = rom.Material(E=210e9, nu=0.3, rho=7850.0)

@@ -36,11 +36,7 @@ def source(text: str) -> str:
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[object]], caption: str) -> str:
-    """A table; numbers are written with five digits.
-
-    Raises:
-        ConfigError: if a row is not as long as the header.
-    """
+    """A table; numbers are written with five digits."""
     lines = []
     for row in rows:
         one_each(f"cells of the row {row}", len(row), "columns of the header", len(header))
@@ -71,11 +67,7 @@ def _table(header: Sequence[str], lines: Iterable[str], caption: str) -> str:
 
 
 def picture(path: str | Path, caption: str) -> str:
-    """A picture, .png or .gif, copied into the report.
-
-    Raises:
-        ConfigError: if it is missing, of another kind, or too large.
-    """
+    """A picture, .png or .gif, copied into the report."""
     words = html.escape(caption, quote=True)
     return f"<figure>{image(path, caption)}<figcaption>{words}</figcaption></figure>"
 
@@ -101,9 +93,6 @@ def write_report(sections: dict[str, Sequence[str]], path: str | Path, title: st
         sections: {heading: blocks} with blocks of the functions above.
         path: file to write, .html.
         title: heading.
-
-    Returns:
-        The path.
 
     Raises:
         ConfigError: if the ending is another one or the folder cannot be written.

@@ -372,10 +372,7 @@ def _energy(folder: Path, record: Told) -> list[str]:
         panels = [("energy [J]", curves)]
         history(numbers[:, 0], panels, path, title="Energy", caption=words)
 
-    return [
-        *drawn(draw, "Energies over time."),
-        html.table(header, rows, "Energies."),
-    ]
+    return [*drawn(draw, "Energies over time."), html.table(header, rows, "Energies.")]
 
 
 def drawn(draw: Callable[[Path], object], caption: str) -> list[str]:

@@ -40,9 +40,6 @@ def certify_pieces(
         models: {name: piece} of which they were made.
         nonlinear: the range; loads on interfaces. Forces keep their direction, moments their axis.
 
-    Returns:
-        The pieces; ``certificate`` is a `Report`.
-
     Raises:
         ConfigError: for a range with centrifugal force or supports beside the reference; for models
             of other pieces.

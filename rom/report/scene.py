@@ -108,11 +108,7 @@ def motion_scene(
     view: npt.ArrayLike | None = None,
     up: npt.ArrayLike | None = None,
 ) -> Scene:
-    """A motion; arguments as of `rom.view.animate`, but for ``up``: None is against gravity.
-
-    Raises:
-        ConfigError: for an unknown body, or directions that are none.
-    """
+    """A motion; arguments as of `rom.view.animate`, but for ``up``: None is against gravity."""
     mechanism = solution.mechanism
     given = _meshes(shapes or {}, mechanism)
     positive("magnify", magnify)

@@ -23,26 +23,19 @@ class CauchyRecovery:
     The gradient at a point is the mean of what its cells say, material by material, not weighted,
     and so is the stress where materials meet. At small deflection it is that of `StressRecovery`.
 
-    Attributes:
-        points: (p, 3) undeformed positions [m].
-        gradient: (9 s, r) displacement gradient at the samples per unit of each elastic coordinate
-            [1/m]; row 9 * sample + 3 a + b is the derivative of component a along b.
-        stiffness: (m, 6, 6) Hooke's law of each material, shear strains doubled [Pa].
-        node: (s,) number of the point of each sample.
-        material: (s,) number of its material.
-        share: (s,) share of the point that it stands for [1].
-
     Source:
         Bonet and Wood, Nonlinear Continuum Mechanics for Finite Element Analysis, Cambridge
         (2008), chapters 4 and 5.
     """
 
-    points: Array
+    points: Array  # (p, 3) undeformed positions [m]
+    # (9 s, r) displacement gradient at the samples per unit of each elastic coordinate [1/m]; row
+    # 9 * sample + 3 a + b is the derivative of component a along b
     gradient: Array
-    stiffness: Array
-    node: Index
-    material: Index
-    share: Array
+    stiffness: Array  # (m, 6, 6) Hooke's law of each material, shear strains doubled [Pa]
+    node: Index  # (s,) number of the point of each sample
+    material: Index  # (s,) number of its material
+    share: Array  # (s,) share of the point that it stands for [1]
     inertial: ClassVar[None] = None  # no correction for modes left out is known at large deflection
 
     @property

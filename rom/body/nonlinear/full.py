@@ -28,16 +28,11 @@ class TurningSection:
 
     With B = sum x w^T = P R over its nodes, P = P^T, its angular velocity is
     (tr P - P)^-1 sum R w x (rate of x), by which moments act.
-
-    Attributes:
-        dofs: (3 k,) of its nodes in the solid.
-        points: (k, 3) its nodes from their centre [m].
-        weights: (k, 3) w [1/m].
     """
 
-    dofs: Index
-    points: Array
-    weights: Array
+    dofs: Index  # (3 k,) of its nodes in the solid
+    points: Array  # (k, 3) its nodes from their centre [m]
+    weights: Array  # (k, 3) w [1/m]
 
     @classmethod
     def of(cls, interface: Interface, dofs: Index) -> "TurningSection":
@@ -81,15 +76,10 @@ def nearest_rotation(B: Array) -> Array:
 class HeldSolid:
     """A full model at finite strain, motions of its interfaces held in the mean.
 
-    Args:
-        solid: its ``force`` and ``tangent``.
-        M: (n, n) mass [kg].
-        C: (h, n) motions that are held.
-        T: (n, m) its displacements u = T a; None for the identity.
-        comm: of the processes, every one of which has all of it.
-        sections: on which moments act that turn with them; a load (n + 3 s,) has their moments
-            behind the nodal forces.
-        workers: who factors its stiffness.
+    The solid has ``force`` and ``tangent``, its displacements are u = T a, T (n, m), or a itself
+    for None; M (n, n) is its mass [kg], C (h, n) motions that are held. On sections moments act
+    that turn with them: a load (n + 3 s,) has their moments behind the nodal forces. Every process
+    of ``comm`` has all of it; ``workers`` factor the stiffness.
     """
 
     def __init__(

@@ -99,40 +99,26 @@ class Bent:
 
 @dataclass(frozen=True)
 class Shapes:
-    """A basis before it is cut, seen from a frame on the reference interface.
+    """A basis before it is cut, seen from a frame on the reference interface."""
 
-    Attributes:
-        E: (n_local, r) nodal shapes, those that move an interface first.
-        loads: (r, l) forces of the components of the load range at their largest [N].
-        further: (r, k) the same of all unit forces and moments on the interfaces of the range.
-        turns: {interface: (3, r)} rotations of those of the range, of small angles [1/m].
-        held: (h, r) motions that supports let vanish.
-        n_basis: how many of them the basis has already.
-        sections: of the interfaces with moments.
-    """
-
-    E: Array
-    loads: Array
-    further: Array
+    E: Array  # (n_local, r) nodal shapes, those that move an interface first
+    loads: Array  # (r, l) forces of the components of the load range at their largest [N]
+    further: Array  # (r, k) the same of all unit forces and moments on the interfaces of the range
+    # {interface: (3, r)} rotations of those of the range, of small angles [1/m]
     turns: dict[str, Array]
-    held: Array
-    n_basis: int
-    sections: list["Section"]
+    held: Array  # (h, r) motions that supports let vanish
+    n_basis: int  # how many of them the basis has already
+    sections: list["Section"]  # of the interfaces with moments
 
 
 @dataclass(frozen=True)
 class Section:
-    """How moments on an interface turn with it: as tractions that are linear over the section.
+    """How moments on an interface turn with it: as tractions that are linear over the section."""
 
-    Attributes:
-        turn: (3, r) its rotation, of small angles, per unit of each shape [1/m].
-        moments: (3, l) components of the load range at their largest [N m].
-        tractions: (r, 3, 3, 3) forces on the shapes, [:, a, b, k], where the part b of the
-            tractions of a unit moment about axis k acts along axis a.
-    """
-
-    turn: Array
-    moments: Array
+    turn: Array  # (3, r) its rotation, of small angles, per unit of each shape [1/m]
+    moments: Array  # (3, l) components of the load range at their largest [N m]
+    # (r, 3, 3, 3) forces on the shapes, [:, a, b, k], where the part b of the tractions of a unit
+    # moment about axis k acts along axis a
     tractions: Array
 
     @classmethod

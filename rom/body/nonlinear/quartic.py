@@ -44,17 +44,11 @@ class Energy:
 
 @dataclass(frozen=True)
 class Quartic(Energy):
-    """Strain energy of fourth order.
+    """Strain energy of fourth order."""
 
-    Attributes:
-        K: (r, r) stiffness without load [N/m].
-        cubic: (r (r + 1) (r + 2) / 6,) entries of T3, i <= j <= k, the last index fastest.
-        quartic: (r (r + 1) (r + 2) (r + 3) / 24,) entries of T4, i <= j <= k <= l.
-    """
-
-    K: Array
-    cubic: Array
-    quartic: Array
+    K: Array  # (r, r) stiffness without load [N/m]
+    cubic: Array  # (r (r + 1) (r + 2) / 6,) entries of T3, i <= j <= k, the last index fastest
+    quartic: Array  # (r (r + 1) (r + 2) (r + 3) / 24,) entries of T4, i <= j <= k <= l
 
     @classmethod
     def from_gram(cls, G: Array, r: int) -> "Quartic":

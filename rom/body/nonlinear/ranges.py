@@ -20,17 +20,11 @@ FORCES = ("f_x", "f_y", "f_z", "m_x", "m_y", "m_z")
 
 @dataclass(frozen=True)
 class Load:
-    """A component of a range of loads.
+    """A component of a range of loads."""
 
-    Attributes:
-        interface: where it acts; "" for centrifugal force, which acts everywhere.
-        component: 0 to 5 of force and moment, or of the products of angular velocities.
-        largest: [N, N m, 1/s^2].
-    """
-
-    interface: str
-    component: int
-    largest: float = 1.0
+    interface: str  # where it acts; "" for centrifugal force, which acts everywhere
+    component: int  # 0 to 5 of force and moment, or of the products of angular velocities
+    largest: float = 1.0  # [N, N m, 1/s^2]
 
     @property
     def name(self) -> str:
@@ -57,8 +51,7 @@ class Geometric:
             one, so that for a skew load of two equal ones each is given 1.41 times as large.
         n_modes: how many of the lowest fixed-interface modes drag others along, beside the
             static shapes of the loads; a repeated frequency counts as a whole.
-        tol: how much of the energy of the states reached may be left out, as the root of its
-            share [1].
+        tol: how much of the energy of the states may be left out, as the root of its share [1].
         n_shapes: alternatively, the number of shapes added to the basis. All are spent on the
             loads of the range: without it there are some for what else acts on their interfaces,
             as a torque on a beam that is bent.
@@ -77,7 +70,7 @@ class Geometric:
     Where the body snaps on the way to a load, its path is followed by arc length.
 
     Raises:
-        ConfigError: for loads that are none, or numbers out of range.
+        ConfigError: for a range without any load, or a point without a spin.
 
     Example:
         >>> rom.Geometric(loads={"tip": (0, 200.0, 0, 0, 0, 0)}).n_steps

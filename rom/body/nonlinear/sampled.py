@@ -33,19 +33,13 @@ STEP_SHARES = (0.1, 0.4, 0.7, 1.0)  # of the loads at which states are trained
 
 @dataclass(frozen=True)
 class Sampled(Energy):
-    """Strain energy of elastic coordinates q (r,), summed over weighted points.
+    """Strain energy of elastic coordinates q (r,), summed over weighted points."""
 
-    Attributes:
-        K: (r, r) stiffness of the body at small deflection [N/m].
-        gradients: (p, 9, r) displacement gradient per unit of each coordinate, row by row [1/m].
-        weights: (p,) volume for which a point stands [m^3].
-        lame: (p, 2) constants lam and mu there [Pa].
-    """
-
-    K: Array
+    K: Array  # (r, r) stiffness of the body at small deflection [N/m]
+    # (p, 9, r) displacement gradient per unit of each coordinate, row by row [1/m]
     gradients: Array
-    weights: Array
-    lame: Array
+    weights: Array  # (p,) volume for which a point stands [m^3]
+    lame: Array  # (p, 2) constants lam and mu there [Pa]
 
     def fits(self, r: int) -> bool:
         """Whether it is an energy of r coordinates."""

@@ -106,16 +106,11 @@ def _found_beyond(done: float) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class Stretch:
-    """Equilibria between two loads on a body, as `rom.paths.arc_length` asks for them.
+    """Equilibria between two loads on a body, as `rom.paths.arc_length` asks for them."""
 
-    Attributes:
-        body: the body on its supports.
-        start, end: (m,) loads [N]; the parameter is the share of the way.
-    """
-
-    body: Held
-    start: Array
-    end: Array
+    body: Held  # on its supports
+    start: Array  # (m,) loads [N]; the parameter is the share of the way from these
+    end: Array  # (m,) to these [N]
 
     def steps(self, y: Array, done: float) -> Iterator[tuple[Curve, Point, float, Point]]:
         """The path from a state on, and its neighbouring points, with the arc length between."""

@@ -2,9 +2,8 @@
 
 The part is released at rest, as it is drawn, with gravity across it. On a bore, and whatever else
 the geometry knows as a cylinder, it turns about the axis of that; on another face about the
-horizontal axis across. Of its certificate the rows
-without support do not count here, for the hinge holds it. For everything else there are the single
-verbs: mesh, reduce, check, simulate, view.
+horizontal axis across. Of its certificate the rows without support do not count here, for the hinge
+holds it. For everything else there are the single verbs: mesh, reduce, check, simulate, view.
 """
 
 import argparse

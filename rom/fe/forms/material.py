@@ -115,10 +115,7 @@ def geometric_stiffness(u: Expr, v: Expr, sigma: Expr) -> Expr:
 
 
 def doubts(solids: dict[str, Solid], size: float, cell: str, degree: int) -> Iterator[str]:
-    """Sentences about input that is legal but unusual.
-
-    Of {region name: material}, and of the longest edge of the bounding box [m].
-    """
+    """Sentences about legal but unusual {region: material}, and the longest edge of the box [m]."""
     if degree == 1 and cell == "tetrahedron":
         yield (
             "linear tetrahedra lock in bending: frequencies come out too high, often by tens of "

@@ -9,45 +9,30 @@ LENGTHS = ("middle", "point", "radius")
 
 @dataclass(frozen=True, slots=True)
 class Face:
-    """One face of a part, as its geometry says and not as it is meshed.
+    """One face of a part, as its geometry says and not as it is meshed."""
 
-    Attributes:
-        number: by which it is picked.
-        kind: "plane", "cylinder", "cone", "sphere", "torus" or "other".
-        area: [m^2].
-        middle: centroid of the face, on the axis for a whole bore [m].
-        radius: of a cylinder, a sphere or the tube of a torus [m]; None for others.
-        axis: unit direction of the axis of a cylinder, a cone or a torus; None for others.
-        point: point on that axis: of a cylinder in the middle of the face, of a torus its centre,
-            of a cone in the middle of its parameters; centre of a sphere [m].
-        normal: unit outward normal of a plane; None for others.
-        name: of the interface it belongs to; empty for none.
-    """
-
-    number: int
-    kind: str
-    area: float
-    middle: Vector
+    number: int  # by which it is picked
+    kind: str  # "plane", "cylinder", "cone", "sphere", "torus" or "other"
+    area: float  # [m^2]
+    middle: Vector  # centroid of the face, on the axis for a whole bore [m]
+    # of a cylinder, a sphere or the tube of a torus [m]; None for others
     radius: float | None = None
+    # unit direction of the axis of a cylinder, a cone or a torus; None for others
     axis: Vector | None = None
+    # point on that axis: of a cylinder in the middle of the face, of a torus its centre, of a cone
+    # in the middle of its parameters; centre of a sphere [m]
     point: Vector | None = None
-    normal: Vector | None = None
-    name: str = ""
+    normal: Vector | None = None  # unit outward normal of a plane; None for others
+    name: str = ""  # of the interface it belongs to; empty for none
 
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """Common axis of the cylinder faces of an interface.
+    """Common axis of the cylinder faces of an interface."""
 
-    Attributes:
-        point: on the axis, in the middle of the faces along it [m].
-        direction: unit vector; its largest component is positive.
-        radius: [m]; None where the faces have several.
-    """
-
-    point: Vector
-    direction: Vector
-    radius: float | None
+    point: Vector  # on the axis, in the middle of the faces along it [m]
+    direction: Vector  # unit vector; its largest component is positive
+    radius: float | None  # [m]; None where the faces have several
 
 
 Record = TypeVar("Record", Face, Axis)

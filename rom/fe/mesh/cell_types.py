@@ -36,23 +36,15 @@ DECK_EDGES = {
 
 @dataclass(frozen=True)
 class CellType:
-    """One kind of cell.
+    """One kind of cell."""
 
-    Attributes:
-        name: e.g. "tet10".
-        shape: "tetrahedron" or "hexahedron".
-        degree: polynomial degree of the geometry.
-        corners: (n_corners, 3) reference coordinates of the corners.
-        faces: corner numbers of each face, seen from outside counter-clockwise.
-        supports: for each node the corners whose mean it is.
-    """
-
-    name: str
-    shape: str
-    degree: int
-    corners: tuple[tuple[int, ...], ...]
+    name: str  # e.g. "tet10"
+    shape: str  # "tetrahedron" or "hexahedron"
+    degree: int  # polynomial degree of the geometry
+    corners: tuple[tuple[int, ...], ...]  # (n_corners, 3) reference coordinates of the corners
+    # corner numbers of each face, seen from outside counter-clockwise
     faces: tuple[tuple[int, ...], ...]
-    supports: tuple[tuple[int, ...], ...]
+    supports: tuple[tuple[int, ...], ...]  # for each node the corners whose mean it is
 
     @property
     def n_nodes(self) -> int:

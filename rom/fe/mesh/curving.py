@@ -98,19 +98,12 @@ def _smallest(x: Array, kind: CellType, gap: Array) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class Bezier:
-    """Polynomials on a reference cell by c coefficients.
+    """Polynomials on a reference cell by c coefficients."""
 
-    Attributes:
-        lattice: (c, 3) points at which values are taken.
-        coefficients: (c, c) coefficients from values at the lattice.
-        corners: positions of the coefficients that are values at the corners.
-        halving: (c, 8 c) transposed: coefficients on eight halves from those on the cell.
-    """
-
-    lattice: Array
-    coefficients: Array
-    corners: Index
-    halving: Array
+    lattice: Array  # (c, 3) points at which values are taken
+    coefficients: Array  # (c, c) coefficients from values at the lattice
+    corners: Index  # positions of the coefficients that are values at the corners
+    halving: Array  # (c, 8 c) transposed: coefficients on eight halves from those on the cell
 
 
 @cache

@@ -22,10 +22,9 @@ def cut(
 ) -> dict[str, SolidMesh]:
     """{name: piece} of a mesh, cut into n along an axis, or by its regions.
 
-    Where two pieces meet both have the surface, of one name: "cut 1" between the pieces "1" and
-    "2" of an axis, "hub-blade" between two regions. Pieces along an axis (3,) are about equally
-    long, and cut between layers of cells, which must be flat there; no cut may cross a named
-    surface.
+    Where two pieces meet both have the surface, of one name: "cut 1" between the pieces "1" and "2"
+    of an axis, "hub-blade" between two regions. Pieces along an axis (3,) are about equally long,
+    and cut between layers of cells, which must be flat there; no cut may cross a named surface.
     """
     normal = None if axis is None else finite("axis", axis, (3,))
     if (n is None) != (normal is None) or (normal is not None and not normal.any()):

@@ -41,20 +41,9 @@ def input_deck(
     Stiffness is that of `rom.fe.model`, for straight elements and the same degree. The mass of
     CalculiX is not: see `rom.io.matrices.matrix_files`.
 
-    Args:
-        mesh: tetrahedra, as `rom.fe.mesh.read.read_mesh` gives them.
-        material: `Material`, `Orthotropic`, or {region name: material}; None for the mesh alone.
-        degree: of the displacement: 1 for C3D4, 2 for C3D10.
-        fixed: interfaces held in all directions.
-        step: "frequencies", or "matrices" for stiffness and mass that `rom.read_model` reads.
-        n_modes: number of frequencies.
-
-    Raises:
-        ConfigError: for an unknown step, or a degree that is not 1 or 2.
-        InterfaceError: for a held interface that does not exist.
-        MaterialError: if the material is none, or names a region that does not exist.
-        MeshError: for hexahedra, or curved elements of degree 1.
-        TagError: if a region has no material, or a name is none for a deck.
+    The mesh is of tetrahedra; without a material it stands alone. C3D4 have the degree 1, C3D10
+    the degree 2; ``fixed`` interfaces are held in all directions. The step "matrices" gives
+    stiffness and mass that `rom.read_model` reads.
     """
     one_of("step", step, STEPS)
     for name in fixed:

@@ -30,24 +30,16 @@ GRAMMAR_HINT = (
 
 @dataclass(frozen=True, slots=True)
 class Pick:
-    """One wish.
+    """One wish."""
 
-    Attributes:
-        kind: "number", "point", "radius", "normal", or "box" for all faces inside of one.
-        values: the number; (3,) point [m]; radius [m]; (3,) direction; (6,) corners of the box [m].
-        text: as it was written, for messages.
-    """
-
-    kind: str
+    kind: str  # "number", "point", "radius", "normal", or "box" for all faces inside of one
+    # the number; (3,) point [m]; radius [m]; (3,) direction; (6,) corners of the box [m]
     values: tuple[float, ...]
-    text: str
+    text: str  # as it was written, for messages
 
 
 def picks(wanted: object) -> tuple[Pick, ...]:
-    """What a face is picked by: text as above, a number, a point (3), a box (6), or a list of all.
-
-    ConfigError where it is none of them.
-    """
+    """What a face is picked by: text as above, a number, a point (3), a box (6), or a list."""
     if isinstance(wanted, str):
         return tuple(_of_text(part.strip(), wanted) for part in PLUS_PATTERN.split(wanted))
     if isinstance(wanted, np.ndarray):

@@ -1,8 +1,7 @@
 """Meshes of solids: one record, whatever file they come from.
 
 A mesh is read and checked on one process as NumPy arrays, before dolfinx sees it. gmsh and the
-readers of decks run in a process of their own (`rom.fe.mesh.child`), which hostile or broken files
-can crash.
+readers of decks, which broken files can crash, run in a process of their own (`rom.fe.mesh.child`).
 """
 
 import hashlib
@@ -95,8 +94,7 @@ def read_mesh(  # noqa: PLR0913  limits and trust beside what is read
         memory_limit: of meshing a geometry [bytes]; by default 80 % of the machine's, 0 for none.
 
     Returns:
-        A mesh that passed `rom.fe.mesh.validate.validate`. Its warnings are also issued as
-        `RomWarning`.
+        A mesh that passed `rom.fe.mesh.validate.validate`, whose warnings are also issued.
 
     Raises:
         ConfigError: unknown suffix or parameter.
@@ -139,29 +137,19 @@ def read_mesh(  # noqa: PLR0913  limits and trust beside what is read
 
 @dataclass(frozen=True, slots=True)
 class FlatMesh:
-    """Triangles of a plane section.
+    """Triangles of a plane section."""
 
-    Attributes:
-        points: (n, 2) coordinates [m].
-        triangles: (t, 3) corners, counter-clockwise.
-        curves: {name: (k, 2)} nodes of the sides of physical curves, the solid on the left.
-        surfaces: {name: (k,)} triangles of each plane surface; those of a physical surface of
-            several are numbered, "stone 1", "stone 2". Without physical ones, all there are.
-        provenance: where the mesh comes from: path, sha256, parameters, versions.
-    """
-
-    points: Array
-    triangles: Index
+    points: Array  # (n, 2) coordinates [m]
+    triangles: Index  # (t, 3) corners, counter-clockwise
+    # {name: (k, 2)} nodes of the sides of physical curves, the solid on the left
     curves: dict[str, Index]
+    # {name: (k,)} triangles of each plane surface; those of a physical surface of several are
+    # numbered, "stone 1", "stone 2". Without physical ones, all there are
     surfaces: dict[str, Index]
-    provenance: Notes
+    provenance: Notes  # where the mesh comes from: path, sha256, parameters, versions
 
     def nodes(self, name: str) -> Index:
-        """(k,) nodes of a physical curve.
-
-        Raises:
-            TagError: if there is none of this name.
-        """
+        """(k,) nodes of a physical curve."""
         check_known(name, self.curves, f"there is no curve {name!r}; there are", TagError)
         return np.unique(self.curves[name])
 
@@ -184,11 +172,8 @@ def read_triangles(
         trust: run a ``.py`` file.
 
     Raises:
-        ConfigError: unknown suffix or parameter.
-        FileFormatError: the file is missing, cut, or not what its name promises.
-        UnsafeFileError: a geometry would do more than make a mesh, or is a ``.py`` not trusted.
+        ConfigError, FileFormatError, UnsafeFileError, ResourceError: as `read_mesh`.
         MeshError: there are no triangles, other cells, or they leave the plane.
-        ResourceError: meshing exceeds its limit of time or memory.
     """
     path = Path(path)
     with in_file(path):

@@ -23,34 +23,25 @@ Made = tuple[Notes, Notes]  # parameters used, defaults of some of them
 
 @dataclass(frozen=True, slots=True)
 class SolidMesh:
-    """A solid body cut into cells of one type.
+    """A solid body cut into cells of one type."""
 
-    Attributes:
-        points: (n, 3) node coordinates [m].
-        cells: (m, k) node numbers in gmsh order.
-        cell_type: "tet4", "tet10", "hex8" or "hex27".
-        regions: (m,) region number of each cell.
-        region_names: name of each region number.
-        facets: (f, kf) node numbers in gmsh order of the facets of each named surface; a facet may
-            belong to several surfaces.
-        provenance: where the mesh comes from: path, sha256, parameters, versions.
-        cell_ids: (m,) numbers of the cells in the file, for messages; None for 0, 1, 2, ...
-        warnings: what `rom.fe.mesh.validate.validate` found worth saying; None before it was asked.
-        axes: axis of each named surface that the CAD knows as cylinder faces about one line.
-        faces: all faces of the CAD, where they were asked for.
-    """
-
-    points: Array
-    cells: Index
-    cell_type: str
-    regions: Index
-    region_names: dict[int, str]
+    points: Array  # (n, 3) node coordinates [m]
+    cells: Index  # (m, k) node numbers in gmsh order
+    cell_type: str  # "tet4", "tet10", "hex8" or "hex27"
+    regions: Index  # (m,) region number of each cell
+    region_names: dict[int, str]  # name of each region number
+    # (f, kf) node numbers in gmsh order of the facets of each named surface; a facet may belong to
+    # several surfaces
     facets: dict[str, Index]
+    # where the mesh comes from: path, sha256, parameters, versions
     provenance: Notes = field(default_factory=dict)
+    # (m,) numbers of the cells in the file, for messages; None for 0, 1, 2, ..
     cell_ids: Index | None = None
+    # what `rom.fe.mesh.validate.validate` found worth saying; None before it was asked
     warnings: tuple[str, ...] | None = None
+    # axis of each named surface that the CAD knows as cylinder faces about one line
     axes: dict[str, Axis] = field(default_factory=dict)
-    faces: tuple[Face, ...] = ()
+    faces: tuple[Face, ...] = ()  # all faces of the CAD, where they were asked for
 
     @property
     def kind(self) -> CellType:

@@ -12,20 +12,14 @@ from rom.model import Index, Integers
 
 @dataclass(frozen=True, slots=True)
 class Faces:
-    """The distinct faces of a mesh.
+    """The distinct faces of a mesh."""
 
-    Attributes:
-        of_cell: (m, f) face number of each face of each cell.
-        sign: (m, f) +1 or -1: direction in which the cell runs around the face; two neighbours
-            that lie on opposite sides have opposite signs.
-        count: (n_faces,) number of cells at each face.
-        corners: (n_faces, c) corner nodes of each face, as one of its cells lists them.
-    """
-
-    of_cell: Index
+    of_cell: Index  # (m, f) face number of each face of each cell
+    # (m, f) +1 or -1: direction in which the cell runs around the face; two neighbours that lie on
+    # opposite sides have opposite signs
     sign: Integers
-    count: Index
-    corners: Index
+    count: Index  # (n_faces,) number of cells at each face
+    corners: Index  # (n_faces, c) corner nodes of each face, as one of its cells lists them
 
 
 def row_ids(rows: Index, n: int) -> tuple[Index, int]:

@@ -25,10 +25,7 @@ def scratch_folder() -> Path:
 
 
 def free_disk_bytes(comm: MPI.Comm) -> float:
-    """What all ranks together may write there [bytes]; 0 where any of them may not.
-
-    Ranks of one machine share its disk.
-    """
+    """What all ranks together may write there [bytes], disks shared; 0 where any may not."""
     folder = scratch_folder()
     node = comm.Split_type(MPI.COMM_TYPE_SHARED)
     writable = folder.is_dir() and os.access(folder, os.W_OK)

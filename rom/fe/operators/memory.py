@@ -14,8 +14,7 @@ THIN_FACTOR_RATIO = 0.2  # factor of a thin-walled body over that of a block wit
 def factor_bytes(n: int) -> float:
     """Predicted memory of a sparse factor of quadratic tetrahedra [bytes].
 
-    A power law through measured MUMPS factors of blocks with 16 731 to 224 547 dofs: 71 MB times
-    (n / 16 700)^1.37.
+    Power law of measured MUMPS factors, 16 731 to 224 547 dofs: 71 MB times (n / 16 700)^1.37.
     """
     return 71e6 * (n / 16_700) ** 1.37
 

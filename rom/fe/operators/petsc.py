@@ -70,15 +70,10 @@ class HeldPETSc(HeldBody):
 class PETScOperators(ModeSearch):
     """Stiffness and mass of one body, rows distributed over the ranks.
 
-    Args:
-        K: (n, n) stiffness, PETSc AIJ, symmetric.
-        M: (n, n) mass with the same layout.
-        rigid: (n_local, 6) rigid motions; node by node, unless these are new coordinates.
-        T: (n_parent, n) map to the coordinates these came from.
-        fixed: (n_local,) vector that does not depend on the partition; made from the rigid motions
-            when not given.
-        parent: the operators in the coordinates these came from.
-        solver: how equations are solved.
+    K and M (n, n) are PETSc AIJ of one layout, symmetric; ``rigid`` (n_local, 6) are rigid motions,
+    node by node, unless these are new coordinates; T (n_parent, n) is the map to those these came
+    from, which the operators ``parent`` are in. ``fixed`` (n_local,) is a vector that does not
+    depend on the partition, made from the rigid motions when not given.
     """
 
     held_kind = HeldPETSc

@@ -13,21 +13,16 @@ LOW_RANK_RTOL = 1e-8  # of a block's norm: what a compressed factor drops
 
 @dataclass(frozen=True, slots=True)
 class Solver:
-    """A choice among ways to solve.
+    """A choice among ways to solve."""
 
-    Attributes:
-        iterative: blocks of vectors and algebraic multigrid, no factor; whether modes are missing
-            is then asked of random loads, not of an inertia.
-        low_rank: tolerance to which blocks of the factor are compressed; 0 for an exact factor.
-            What is lost comes back by conjugate gradients on top.
-        out_of_core: the factor lives on disk, in the folder of MUMPS_OOC_TMPDIR or in /tmp.
-        automatic: the first of direct, out-of-core and iterative that fits, to be chosen.
-    """
-
+    # blocks of vectors and algebraic multigrid, no factor; whether modes are missing is then asked
+    # of random loads, not of an inertia
     iterative: bool = False
+    # tolerance to which blocks of the factor are compressed; 0 for an exact factor. What is lost
+    # comes back by conjugate gradients on top
     low_rank: float = 0.0
-    out_of_core: bool = False
-    automatic: bool = False
+    out_of_core: bool = False  # the factor is on disk, in the folder of MUMPS_OOC_TMPDIR or in /tmp
+    automatic: bool = False  # the first of direct, out-of-core and iterative that fits
 
 
 DIRECT_SOLVER = Solver()

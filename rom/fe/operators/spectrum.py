@@ -71,10 +71,7 @@ def polynomial_fields(comm: MPI.Comm, rigid: Array) -> Array:
 
 
 def first_elastic(ops: Any, R: Array | None = None) -> float:
-    """Estimate of the first elastic eigenvalue, for the choice of a shift.
-
-    With geometry, an upper bound; new coordinates leave its order of magnitude.
-    """
+    """First elastic eigenvalue, for a shift: an upper bound, or without geometry its magnitude."""
     if ops.parent is not None:
         return first_elastic(ops.parent)
     return _by_polynomials(ops) if ops.geometric else _by_inverse_iteration(ops)

@@ -22,15 +22,10 @@ Value = TypeVar("Value")
 
 @dataclass(frozen=True)
 class AllRanks:
-    """The `rom.eigen.workers.Workers` of finite elements: MUMPS, each matrix by one rank.
+    """The `rom.eigen.workers.Workers` of finite elements: MUMPS, each matrix by one rank."""
 
-    Attributes:
-        n_ranks: that have the matrices; tasks are shared where these are all there are.
-        kind: `PETScOperators` of a matrix without geometry.
-    """
-
-    n_ranks: int
-    kind: Callable[..., Any]
+    n_ranks: int  # that have the matrices; tasks are shared where these are all there are
+    kind: Callable[..., Any]  # `PETScOperators` of a matrix without geometry
 
     def operators(
         self, K: Any, M: Any, rigid: Array | None = None, *, together: bool = False

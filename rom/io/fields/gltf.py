@@ -101,8 +101,7 @@ def write_glb(
         title: name of the scene.
 
     Raises:
-        ConfigError: if the place is not writable.
-        ResourceError: if the disk is full.
+        ConfigError, ResourceError: if the place is not writable, or the disk is full.
     """
     document, samplers, channels = _Document(), list[Entry](), list[Entry]()
     children = list(range(1, 1 + len(bodies)))

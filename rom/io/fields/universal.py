@@ -62,10 +62,7 @@ class Function:
 
 
 def read_universal(path: str | Path) -> tuple[Function, ...]:
-    """All datasets 58 of a universal file; others are passed over.
-
-    Args:
-        path: the file, .unv or .uff.
+    """All datasets 58 of a universal file, .unv or .uff; others are passed over.
 
     Raises:
         FileFormatError: if the file is missing, cut, or holds no function.

@@ -25,11 +25,7 @@ TYPES = {"<f8": "Float64", "<i8": "Int64", "|u1": "UInt8"}
 
 
 def write_vtu(body: FlexibleBody, path: str | Path) -> Path:
-    """Write the outer surface with one displacement field per elastic coordinate.
-
-    Args:
-        body: a body with a surface.
-        path: file ending in ``.vtu``.
+    """Write the outer surface with one displacement field per elastic coordinate, as ``.vtu``.
 
     Raises:
         ConfigError: if the body has no surface, or the place is not writable.
@@ -56,8 +52,7 @@ def write_stress(
         body: a body reduced with ``stress=True``.
         q: (r,) elastic coordinates, in units of the body's shapes.
         path: file ending in ``.vtu``.
-        accelerations: (6 + r,) see `rom.body.recovery.StressRecovery.accelerations`; None for
-            statics.
+        accelerations: (6 + r,) see `rom.body.recovery.StressRecovery`; None for statics.
 
     Raises:
         ConfigError: if the stress of the body cannot be recovered, q has another length, or the

@@ -26,21 +26,13 @@ UNITS = {
 
 @dataclass(frozen=True, slots=True)
 class Variable:
-    """A real variable; its place in the list is its value reference.
+    """A real variable; its place in the list is its value reference."""
 
-    Attributes:
-        name: e.g. ``rod.b.position[1]``.
-        causality: "parameter", "input" or "output".
-        unit: e.g. "m/s".
-        start: value at the start; None for outputs, which follow from the others.
-        description: one phrase.
-    """
-
-    name: str
-    causality: str
-    unit: str
-    start: float | None = None
-    description: str = ""
+    name: str  # e.g. ``rod.b.position[1]``
+    causality: str  # "parameter", "input" or "output"
+    unit: str  # e.g. "m/s"
+    start: float | None = None  # value at the start; None for outputs, which follow from the others
+    description: str = ""  # one phrase
 
 
 def structured(*parts: str) -> str:
@@ -69,29 +61,18 @@ def components(
 
 @dataclass(frozen=True)
 class Content:
-    """What goes into an FMU.
+    """What goes into an FMU."""
 
-    Attributes:
-        name: of the model.
-        about: one sentence on it.
-        variables: in the order of their value references.
-        step: communication step for a start [s].
-        core: C file of the model behind the interface.
-        headers: C files that it includes.
-        data: C text of tables that the core includes as ``tables.h``.
-        resources: files by their names below ``resources/``.
-        tool: whether it needs another program where it runs.
-    """
-
-    name: str
-    about: str
-    variables: list[Variable]
-    step: float
-    core: str
-    headers: tuple[str, ...] = ()
-    data: str = ""
+    name: str  # of the model
+    about: str  # one sentence on it
+    variables: list[Variable]  # in the order of their value references
+    step: float  # communication step for a start [s]
+    core: str  # C file of the model behind the interface
+    headers: tuple[str, ...] = ()  # C files that it includes
+    data: str = ""  # C text of tables that the core includes as ``tables.h``
+    # files by their names below ``resources/``
     resources: dict[str, bytes] = field(default_factory=dict)
-    tool: bool = False
+    tool: bool = False  # whether it needs another program where it runs
 
 
 def model_description(

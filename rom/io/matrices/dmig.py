@@ -48,8 +48,7 @@ def read_grids(path: str | Path) -> tuple[Index, Array]:
     """Labels (k,) and positions (k, 3) of GRID cards in the basic system, in units of the file.
 
     Raises:
-        FileFormatError: naming the line, for a card that is damaged; or where nodes move along the
-            axes of another system.
+        FileFormatError: naming the line, for a damaged card, or nodes that move in another system.
     """
     found: dict[str, list[Card]] = {}
     for card in cards(path):
@@ -79,8 +78,7 @@ def write_dmig(
             scalar points as SPOINT.
 
     Raises:
-        ConfigError: if the place is not writable.
-        ResourceError: if the disk is full.
+        ConfigError, ResourceError: if the place is not writable, or the disk is full.
     """
     lines = [f"$ {ORIGIN_MARK}", *_points(dofs, nodes)] if nodes else []
     for name, A in matrices.items():

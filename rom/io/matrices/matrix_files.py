@@ -59,9 +59,8 @@ def read_matrix(source: str | Path | tuple[str | Path, str]) -> NamedMatrix:
     Args:
         source: file, or (file, name) where it holds several: ``.mtx`` and ``.mm`` for Matrix Market
             (told by its first line) or Abaqus text, matrices or a linear user element, the latter
-            also in ``.inp``; ``.sti`` and ``.mas`` for CalculiX, with
-            ``.dof`` beside, ``.op4`` for OUTPUT4, ``.bdf``, ``.dat``, ``.pch``, ``.dmig`` for DMIG
-            cards.
+            also in ``.inp``; ``.sti`` and ``.mas`` for CalculiX, with ``.dof`` beside, ``.op4`` for
+            OUTPUT4, ``.bdf``, ``.dat``, ``.pch``, ``.dmig`` for DMIG cards.
 
     Raises:
         ConfigError: for another ending, or if a name is needed or unknown.
@@ -93,8 +92,7 @@ def write_abaqus_matrix(A: Array | csr_matrix, dofs: Dofs, path: str | Path) -> 
         path: file to write.
 
     Raises:
-        ConfigError: if the place is not writable.
-        ResourceError: if the disk is full.
+        ConfigError, ResourceError: if the place is not writable, or the disk is full.
     """
     found = coo_matrix(np.tril(A) if isinstance(A, np.ndarray) else A)
     entries = zip(found.row, found.col, found.data, strict=True)
@@ -223,10 +221,9 @@ def _dense(table: Array, sizes: tuple[int, ...], sign: float) -> tuple[Index, In
 
 
 def read_stored_matrix(path: str | Path) -> tuple[csr_matrix, Dofs]:
-    """The upper triangle (n, n) and (n, 2) node and component of each row.
+    """The upper triangle (n, n) and (n, 2) node and component of each row of ``.sti`` or ``.mas``.
 
-    Args:
-        path: ``.sti`` or ``.mas``; the ``.dof`` stands beside.
+    The ``.dof`` stands beside.
 
     Raises:
         FileFormatError: naming the line, if one of the two is missing, damaged or cut, or they do

@@ -140,8 +140,7 @@ def write_op4(matrices: Mapping[str, Array | csr_matrix], path: str | Path) -> P
         path: file to write.
 
     Raises:
-        ConfigError: if the place is not writable.
-        ResourceError: if the disk is full.
+        ConfigError, ResourceError: if the place is not writable, or the disk is full.
     """
     texts = (_written(name, csc_matrix(A)) for name, A in matrices.items())
     return write_lines(path, chain.from_iterable(texts))

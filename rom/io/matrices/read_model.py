@@ -59,8 +59,7 @@ def read_model(
         ConfigError: for unknown endings, names or units.
         FileFormatError: if a file is missing, damaged, or does not fit the others.
         InterfaceError: if an interface has no nodes, or unknown ones.
-        ModelError: if the nodes turn, as those of beams and shells do, or the mass is not that of
-            a solid.
+        ModelError: if nodes turn, as those of beams and shells, or the mass is not that of a solid.
         QualityGateError: if a matrix is not symmetric, or the body is not free.
         UnsafeFileError: if a file asks for more memory than its size can mean.
 

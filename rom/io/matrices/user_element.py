@@ -46,8 +46,7 @@ def read_user_element(path: str | Path) -> dict[str, tuple[csr_matrix, Dofs]]:
     """{"STIFFNESS", "MASS", ...: (lower triangle (n, n), (n, 2) node and component)}.
 
     Raises:
-        FileFormatError: naming the line, if the file is missing, damaged or cut, or has no element
-            of this kind.
+        FileFormatError: naming the line, if the file is missing, damaged or has no such element.
         UnsafeFileError: if it claims more nodes than a dense matrix can have.
     """
     path = Path(path)
@@ -77,8 +76,7 @@ def write_user_element(
             modes, lie at the origin.
 
     Raises:
-        ConfigError: if the place is not writable.
-        ResourceError: if the disk is full.
+        ConfigError, ResourceError: if the place is not writable, or the disk is full.
     """
     return write_lines(path, _document(matrices, np.asarray(dofs), nodes))
 

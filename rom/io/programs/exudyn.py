@@ -119,8 +119,7 @@ def write_exudyn(body: FlexibleBody, path: str | Path) -> Path:
         path: file ending in ``.py``, a name that Python can import.
 
     Raises:
-        ConfigError: if the place is not writable.
-        ResourceError: if the disk is full.
+        ConfigError, ResourceError: if the place is not writable, or the disk is full.
 
     Warns:
         RomWarning: if the shapes move the mass centre, which gravity in Exudyn does not see.

@@ -40,11 +40,8 @@ class InterfaceForm:
 def interface_form(body: FlexibleBody) -> InterfaceForm:
     """The same body and the same motions in other coordinates.
 
-    Args:
-        body: with at least one interface, all of six coordinates (rbe2, rbe3).
-
     Raises:
-        ConfigError: if there is no interface, or one that is not rigid or averaged.
+        ConfigError: if there is no interface, or one without six coordinates (rbe2, rbe3).
         ModelError: if the shapes of the body do not let its interfaces move one by one.
     """
     names = body.interface_names

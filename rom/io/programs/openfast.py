@@ -50,8 +50,7 @@ class Superelement:
 
     Attributes:
         M, K, D: (n, n) mass [kg], stiffness [N/m], damping [N s/m], moments and rotations likewise.
-        weight: (n,) constant weight [N, N m]; zero in files up to version 4, which have it in the
-            loads.
+        weight: (n,) constant weight [N, N m]; zero up to version 4, where it is in the loads.
         K_W: (n, n) [N/m, N m/rad]: the weight is ``weight - K_W q``; zero in files up to version 4.
         t: (k,) times [s], evenly spaced; none in files of version 5.
         loads: (k, n) forces and moments on the interface [N], [N m], and on the modes.

@@ -7,12 +7,7 @@ from rom.body.flexible import FlexibleBody
 from rom.body.records import Marker
 from rom.body.recovery import CENTRIFUGAL_LOADS, PRODUCTS
 from rom.body.reference import skew_tensor
-from rom.body.stiffening import (
-    ANGULAR_LOADS,
-    LINEAR_LOADS,
-    SecondOrder,
-    interface_loads,
-)
+from rom.body.stiffening import ANGULAR_LOADS, LINEAR_LOADS, SecondOrder, interface_loads
 from rom.errors import ConfigError
 from rom.io.sid.dialect import by_mode, first
 from rom.io.sid.format import StandardInput, Taylor
@@ -28,10 +23,7 @@ def standard_input(body: FlexibleBody) -> StandardInput:
     """The blocks of a body, its geometric stiffness included; interfaces become nodes.
 
     Left out is what SID has no place for: terms of second order in J and Gr, surface and stress.
-
-    Args:
-        body: with r elastic coordinates; its geometric stiffness acts on Oe1 (rotation), Ct1 and
-            Cr1 (acceleration), phi1 and psi1 (forces and moments on the nodes).
+    Geometric stiffness acts on Oe1 (rotation), Ct1, Cr1 (acceleration), phi1, psi1 (node loads).
     """
     K = {load: np.asarray(A) for load, A in body.K_geo.items()}
     SecondOrder.of(body)  # refuses loads that are not known

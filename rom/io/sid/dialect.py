@@ -16,14 +16,7 @@ import numpy as np
 from rom.arguments import one_of, typed
 from rom.body.reference import skew_tensor
 from rom.errors import FileFormatError, warn
-from rom.io.sid.format import (
-    BLOCKS,
-    DIALECTS,
-    TENSOR_ENTRIES,
-    StandardInput,
-    Taylor,
-    repacked,
-)
+from rom.io.sid.format import BLOCKS, DIALECTS, TENSOR_ENTRIES, StandardInput, Taylor, repacked
 from rom.io.sid.reading import RawBlock, RawFile, read_raw, values
 from rom.model import Array, Report, Row
 

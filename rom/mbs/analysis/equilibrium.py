@@ -80,7 +80,6 @@ def equilibrium(
         A state for `linearize` and for ``simulate(..., state=...)``, with the reactions.
 
     Raises:
-        ConfigError: for a wrong argument.
         ModelError: naming the body that can still move although no force opposes, the joint that
             cannot be closed, or the joint or drive that turns at another speed than ``spin``.
         SolverError: naming the body out of balance, or the open joint, where Newton failed. Either
@@ -150,10 +149,9 @@ class _Search:
         return self.spins.steady(self.now, replace(first, q=q, lam=state.lam.copy(), base=base))
 
     def eased(self, state: State, steps: int) -> State | None:
-        """Equilibrium where some elements come to rest more easily in another form.
+        """Equilibrium where some elements come to rest more easily in another form; None elsewhere.
 
-        As they are at first, without smaller steps of the load; then from where they rest in that
-        other form. None if there is no such element, or neither way leads there.
+        As they are at first, without smaller load steps; then from where they rest in that form.
         """
         with self.now.packed.eased() as changed:
             pass
@@ -170,8 +168,7 @@ class _Search:
     def loaded(self, state: State, steps: int, *, least: float = MIN_LOAD_STEP) -> State:
         """Equilibrium under all of the loads, by steps, of which ``least`` is the smallest part.
 
-        Raises SolverError where Newton's method fails; ``error.solution`` is the equilibrium at the
-        share before.
+        An error has as ``error.solution`` the equilibrium at the share before.
         """
         failed: list[SolverError] = []
 
@@ -204,8 +201,7 @@ class _Search:
     def settle(self, state: State, load: float, *, directly: bool = False) -> State:
         """Equilibrium at a share of the loads; directly: by Newton's corrections while they shrink.
 
-        Raises ModelError if a body turns on and on, as a rotor does against whose drag nothing
-        holds.
+        Raises ModelError if a body turns on and on, as a rotor against whose drag nothing holds.
         """
         now, last, trials = self.now.scaled(load), np.inf, MAX_TRIALS
         turned, length = np.zeros((now.packed.system.bodies.mass.size, 3)), 0.0

@@ -84,15 +84,10 @@ def _probes(n: int, k: int) -> Array:
 
 @dataclass(frozen=True)
 class Wanted:
-    """Which modes are wanted: the n lowest, or those between two frequencies.
+    """Which modes are wanted: the n lowest, or those between two frequencies."""
 
-    Attributes:
-        n: number; 0 with a band.
-        band: (2,) [rad/s].
-    """
-
-    n: int
-    band: tuple[float, float] = (0.0, np.inf)
+    n: int  # 0 with a band
+    band: tuple[float, float] = (0.0, np.inf)  # [rad/s]
 
     @classmethod
     def of(cls, n: int | None, band: tuple[float, float] | None) -> "Wanted | None":
@@ -132,27 +127,17 @@ class Wanted:
 
 @dataclass(frozen=True)
 class Pencil:
-    """M u'' + C u' + K u + G^T l = 0 with G u = 0, in units that give M a diagonal of ones.
+    """M u'' + C u' + K u + G^T l = 0 with G u = 0, in units that give M a diagonal of ones."""
 
-    Attributes:
-        K, C, M: (n, n) stiffness [1/s^2], damping [1/s], mass [1].
-        G: (m, n) constraints, rows of length one.
-        groups: unknowns of u and l in the order of their elimination.
-        scale: square of a rate at which the search for the lowest mode begins [1/s^2].
-        basis: (n, n) variation of the coordinates, as in `State.v`, per u.
-        row: (m,) lengths of the rows as the mechanism has them.
-        independent: whether no constraint is known to repeat others.
-    """
-
-    K: csc_matrix
-    C: csc_matrix
-    M: csc_matrix
-    G: csr_matrix
-    groups: Sequence[Index]
-    scale: float
-    basis: csc_matrix
-    row: Array
-    independent: bool = False
+    K: csc_matrix  # (n, n) stiffness [1/s^2]
+    C: csc_matrix  # (n, n) damping [1/s]
+    M: csc_matrix  # (n, n) mass [1]
+    G: csr_matrix  # (m, n) constraints, rows of length one
+    groups: Sequence[Index]  # unknowns of u and l in the order of their elimination
+    scale: float  # square of a rate at which the search for the lowest mode begins [1/s^2]
+    basis: csc_matrix  # (n, n) variation of the coordinates, as in `State.v`, per u
+    row: Array  # (m,) lengths of the rows as the mechanism has them
+    independent: bool = False  # whether no constraint is known to repeat others
 
     @classmethod
     def of(cls, now: Instant, state: State, motions: tuple[csc_matrix, ...]) -> "Pencil":
@@ -320,10 +305,7 @@ class Pencil:
         return float(np.abs(squares[real]).min()) if real.any() else float(noise.max())
 
     def lowest(self, n: int) -> tuple[Array, Array]:
-        """The n lowest undamped modes: squares of rates [1/s^2], shapes of unit mass.
-
-        Raises ModesMissedError if the signature counts others than were found.
-        """
+        """The n lowest undamped modes: squares of rates [1/s^2], shapes of unit mass."""
         k = min(n + N_SPARE, self.n_free)
         squares, X = self.near(self.low_shift(), k)
         if k > n:

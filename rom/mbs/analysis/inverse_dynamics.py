@@ -39,8 +39,7 @@ def inverse_dynamics(mechanism: Mechanism, t: npt.ArrayLike, *, assemble: bool =
         assemble: see `rom.simulate`.
 
     Returns:
-        The motion, to be asked like one that was simulated: ``reaction``, ``drive_load``,
-        ``interface_loads``.
+        The motion, asked like a simulated one: ``reaction``, ``drive_load``, ``interface_loads``.
 
     Raises:
         ConfigError: for times that do not ascend.

@@ -50,9 +50,6 @@ def check_law(
         samples: number of motions, at most 1000.
         rng: source of the motions; None for always the same.
 
-    Returns:
-        Report with a row per check.
-
     Raises:
         ConfigError: for a name that no law has.
         Exception: whatever a law in Python raises.

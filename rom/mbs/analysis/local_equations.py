@@ -13,13 +13,7 @@ from scipy.linalg import solve_triangular
 from rom.arguments import typed
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.mbs.elements.family import Laws, apply_laws
-from rom.mbs.equations.equations import (
-    evaluate,
-    linearize_constraints,
-    residual,
-    retract,
-    tangents,
-)
+from rom.mbs.equations.equations import evaluate, linearize_constraints, residual, retract, tangents
 from rom.mbs.equations.packing import Packed, pack
 from rom.mbs.equations.sparse_solve import Matrix, Pattern
 from rom.mbs.integrate.consistent_start import (
@@ -47,23 +41,14 @@ VELOCITY_RTOL = 1e-3  # a time integration leaves far less
 
 @dataclass(frozen=True)
 class Instant:
-    """A mechanism at one time, ready to be asked for its equations at any coordinates.
-
-    Attributes:
-        packed: the mechanism.
-        W: memory.
-        t: time [s].
-        laws: forces of Python functions.
-        load: factor of gravity, of loads and of forces of Python functions.
-        pattern: of sparse matrices, in which all matrices are given then; None for dense ones.
-    """
+    """A mechanism at one time, ready to be asked for its equations at any coordinates."""
 
     packed: Packed
     W: Work
-    t: float
+    t: float  # [s]
     laws: Laws
-    load: float = 1.0
-    pattern: Pattern | None = None
+    load: float = 1.0  # factor of gravity, of loads and of forces of Python functions
+    pattern: Pattern | None = None  # of sparse matrices, in which all are given then
 
     def scaled(self, load: float) -> "Instant":
         """The same with another factor of the loads; the memory is shared."""
@@ -216,10 +201,7 @@ def instant(mechanism: Mechanism, t: float, *, sparse: bool | None = False) -> I
 
 
 def consistent(now: Instant, state: State | None, assemble: bool = False) -> State:
-    """The state with velocities, accelerations and multipliers that belong together.
-
-    Raises ModelError naming the joint that is open, or whose velocity contradicts it.
-    """
+    """The state with velocities, accelerations and multipliers that belong together."""
     packed, W = now.packed, now.W
     if state is None:
         state = initial_state(packed, now.t, assemble=assemble)
@@ -283,16 +265,10 @@ def of_instant(mechanism: Mechanism, now: Instant, at: State) -> Solution:
 
 @typed
 def snapshot(mechanism: Mechanism, state: State) -> Solution:
-    """Ask an equilibrium, or any other state, for positions, reactions, loads and energies.
+    """Ask an equilibrium, ``solution.final`` or any other state for positions, loads and energies.
 
-    Accelerations and reactions are those that belong to the position and the velocities.
-
-    Args:
-        mechanism: the mechanism.
-        state: a state of it, as of `equilibrium` or ``solution.final``.
-
-    Returns:
-        A motion of one instant: its arrays have one row.
+    Accelerations and reactions are those that belong to the position and the velocities. What
+    comes is a motion of one instant: its arrays have one row.
 
     Raises:
         ConfigError: if the state belongs to another mechanism.

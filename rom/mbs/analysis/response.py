@@ -152,18 +152,12 @@ def _refuse_moving(state: State) -> None:
 
 @dataclass(frozen=True)
 class _Large:
-    """Small motions of a large mechanism by sparse matrices.
-
-    Attributes:
-        now, state: where.
-        pencil: masses, damping, stiffness and constraints.
-        H: (k, 6, 6 + R) motion of all markers.
-    """
+    """Small motions of a large mechanism by sparse matrices."""
 
     now: Instant
     state: State
-    pencil: Pencil
-    H: Array
+    pencil: Pencil  # masses, damping, stiffness and constraints
+    H: Array  # (k, 6, 6 + R) motion of all markers
 
     @classmethod
     def of(

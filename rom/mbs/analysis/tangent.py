@@ -39,19 +39,12 @@ MAX_CORRECTION, COUNTED_CORRECTION, ROUND_OFF_CORRECTION = 100.0, 1e-2, 1e-9
 
 @dataclass(frozen=True)
 class Weakest:
-    """Free motions of unit mass, those of least stiffness first.
+    """Free motions of unit mass, those of least stiffness first."""
 
-    Attributes:
-        squares: (k,) their stiffness [1/s^2].
-        motions: (n, k) variations of the coordinates.
-        none: stiffness that counts as none, for each or for all [1/s^2].
-        along: (k,) forces out of balance in them.
-    """
-
-    squares: Array
-    motions: Array
-    none: Array | float
-    along: Array
+    squares: Array  # (k,) their stiffness [1/s^2]
+    motions: Array  # (n, k) variations of the coordinates
+    none: Array | float  # stiffness that counts as none, for each or for all [1/s^2]
+    along: Array  # (k,) forces out of balance in them
 
     @property
     def loose(self) -> Mask:
@@ -61,25 +54,16 @@ class Weakest:
 
 @dataclass(frozen=True)
 class Tangent:
-    """Linear equations of one correction, in motions that turn with the bodies.
-
-    Attributes:
-        now: the mechanism.
-        T: (n, n) variation of the coordinates per motion.
-        r, K: (n,), (n, n) forces out of balance and their derivative.
-        G, gap: (m, n), (m,) constraints.
-        Z: (n, f) free motions of unit mass.
-        pull: stiffness that the loads themselves give, gravity over length [1/s^2].
-    """
+    """Linear equations of one correction, in motions that turn with the bodies."""
 
     now: Instant
-    T: Array
-    r: Array
-    K: Array
-    G: Array
-    gap: Array
-    Z: Array
-    pull: float
+    T: Array  # (n, n) variation of the coordinates per motion
+    r: Array  # (n,) forces out of balance
+    K: Array  # (n, n) their derivative
+    G: Array  # (m, n) constraints
+    gap: Array  # (m,) of the constraints
+    Z: Array  # (n, f) free motions of unit mass
+    pull: float  # stiffness that the loads themselves give, gravity over length [1/s^2]
     # of the descent before a correction, if finite steps alone have caused it
     MAX_DESCENT_LEFT = 0.01
 
@@ -207,23 +191,14 @@ class _Correction(NamedTuple):
 
 @dataclass(frozen=True)
 class SparseTangent:
-    """The equations and answers of `Tangent`, by sparse matrices.
-
-    Attributes:
-        now: the mechanism.
-        pencil: masses and stiffness in motions u that turn with the bodies.
-        r: (n,) forces out of balance per u.
-        gap: (m,) constraints.
-        pull: stiffness that the loads themselves give [1/s^2].
-        loan: what was lent before.
-    """
+    """The equations and answers of `Tangent`, by sparse matrices."""
 
     now: Instant
-    pencil: Pencil
-    r: Array
-    gap: Array
-    pull: float
-    loan: Loan
+    pencil: Pencil  # masses and stiffness in motions u that turn with the bodies
+    r: Array  # (n,) forces out of balance per u
+    gap: Array  # (m,) of the constraints
+    pull: float  # stiffness that the loads themselves give [1/s^2]
+    loan: Loan  # what was lent before
     MAX_DESCENT_LEFT = 0.5
 
     @classmethod

@@ -116,9 +116,7 @@ class CodeFiles(IndexDataCacheFile):  # type: ignore[misc]
 def kept(compiler: Compiler, *, entry: bool = False) -> Compiler:
     """A decorator of Numba whose cache knows the sources that a function is made of.
 
-    Args:
-        compiler: the decorator.
-        entry: whether its functions are called wherever mechanisms are.
+    ``entry``: whether its functions are called wherever mechanisms are.
     """
 
     def compiled(function: Function) -> Dispatcher:

@@ -27,14 +27,7 @@ Build = Callable[[Context, Builder, Signature, Values], Value]
 
 
 def let_kernels_call(thing: object, name: str, signature: Signature, build: Build) -> None:
-    """Make an object of Python callable in kernels.
-
-    Args:
-        thing: the object.
-        name: what the compiler calls it.
-        signature: types of its result and arguments.
-        build: what a call becomes.
-    """
+    """Make an object of Python callable in kernels; ``build`` is what a call becomes."""
 
     def typed(template: AbstractTemplate, given: Sequence[types.Type], _: object) -> Signature:
         for kind, asked in zip(given, signature.args, strict=True):
@@ -95,10 +88,7 @@ def called(signature: Signature) -> tuple[Signature, Build]:
 def c_function(function: Function, types: str, options: dict[str, object]) -> CFunc:
     """A function of C, compiled and kept, with attribute ``address``.
 
-    Args:
-        function: in Python, of a module.
-        types: of its arguments, as ``numba.cfunc`` takes them.
-        options: of Numba, which its decorator would not take.
+    ``options`` are those of Numba that its decorator would not take.
     """
     made = CFunc(function, normalize_signature(types), {}, options)
     made.enable_caching()

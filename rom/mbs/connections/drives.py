@@ -52,22 +52,19 @@ def gear(
 ) -> None:
     """Couple two joints: coordinate of the second = ``ratio`` times that of the first.
 
-    Between two angles a pair of gears (negative ratio for outer teeth, seen along parallel
-    axes), a chain or a belt; between an angle and a displacement a rack [m/rad]. A
-    carrier that moves is the first body of both joints. Angles count over whole turns from the
-    start.
+    Between two angles a pair of gears (negative ratio for outer teeth, seen along parallel axes), a
+    chain or a belt; between an angle and a displacement a rack [m/rad]. A carrier that moves is the
+    first body of both joints. Angles count over whole turns from the start.
 
     Args:
-        name: name of the coupling; ``sol.reaction`` gives its load on the second body of
-            ``joint2``.
-        joint1: driving joint.
+        name: ``sol.reaction(name)`` gives its load on the second body of ``joint2``.
         joint2: driven joint.
         ratio: of the changes of coordinate 2 and coordinate 1 [1, m/rad or rad/m].
         coordinate1: "angle" or "displacement"; None for the only or the first one.
         coordinate2: likewise of ``joint2``.
 
     Raises:
-        ConfigError: if a joint is unknown, has no such coordinate, or is named twice.
+        ConfigError: if a joint has no such coordinate, or is named twice.
     """
     self.check_new(name)
     names, wanted = (joint1, joint2), (coordinate1, coordinate2)

@@ -16,19 +16,12 @@ MOMENT_FREE = ("spherical", "distance")  # joints that bodies without static sha
 
 @dataclass(frozen=True, slots=True)
 class Ends:
-    """The two markers of a joint where the bodies were added.
+    """The two markers of a joint where the bodies were added."""
 
-    Attributes:
-        name: of the joint.
-        markers: both.
-        frames: (3, 3) axes of both bodies, as columns in the world.
-        gap: (3,) from the first marker to the second, world [m].
-    """
-
-    name: str
-    markers: tuple[Marker, Marker]
-    frames: tuple[Array, Array]
-    gap: Array
+    name: str  # of the joint
+    markers: tuple[Marker, Marker]  # both
+    frames: tuple[Array, Array]  # (3, 3) axes of both bodies, as columns in the world
+    gap: Array  # (3,) from the first marker to the second, world [m]
 
     def direction(self, what: str, axis: npt.ArrayLike) -> Array:
         """(3,) unit vector of an axis that the user gave."""

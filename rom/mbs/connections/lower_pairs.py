@@ -14,17 +14,10 @@ FULL_TURN = 2 * np.pi
 
 
 def revolute(self: Whole, name: str, m1: Marker, m2: Marker, *, axis: Direction) -> None:
-    """Hinge about an axis; five constraints.
+    """Hinge about an axis; five constraints; its angle is the rotation of m2 against m1.
 
     Args:
-        name: name of the joint.
-        m1: one side.
-        m2: other side; the joint angle is its rotation against the first.
         axis: (3,) direction, world at the start [1].
-
-    Raises:
-        ConfigError: for a name in use, an unknown marker, one body twice, or no direction.
-        ModelError: if a body has free-free modes only, which carry no moment to an interface.
 
     Example:
         >>> mech = rom.Mechanism(gravity=(0, 0, -9.81))
@@ -44,14 +37,7 @@ def cylindrical(self: Whole, name: str, m1: Marker, m2: Marker, *, axis: Directi
     """Rotation about and sliding along an axis; four constraints.
 
     Args:
-        name: name of the joint.
-        m1: one side.
-        m2: other side.
         axis: (3,) direction, world at the start [1].
-
-    Raises:
-        ConfigError: for a name in use, an unknown marker, one body twice, or no direction.
-        ModelError: if a body has free-free modes only, which carry no moment to an interface.
     """
     ends = ends_of(self, name, m1, m2)
     t, rows, displacement = _coaxial(ends, ends.direction("axis", axis))
@@ -80,16 +66,11 @@ def screw(
     A positive pitch is a right-hand thread: a right-hand turn about the axis advances along it.
 
     Args:
-        name: name of the joint.
-        m1: one side.
-        m2: other side.
         axis: (3,) direction, world at the start [1].
         pitch: advance per turn [m].
 
     Raises:
-        ConfigError: for a pitch of zero, a name in use, an unknown marker, one body twice, or no
-            direction.
-        ModelError: if a body has free-free modes only, which carry no moment to an interface.
+        ConfigError: for a pitch of zero.
     """
     pitch = not_zero("pitch", pitch)
     ends = ends_of(self, name, m1, m2)
@@ -103,14 +84,7 @@ def prismatic(self: Whole, name: str, m1: Marker, m2: Marker, *, axis: Direction
     """Sliding along an axis; five constraints.
 
     Args:
-        name: name of the joint.
-        m1: one side.
-        m2: other side.
         axis: (3,) direction, world at the start [1].
-
-    Raises:
-        ConfigError: for a name in use, an unknown marker, one body twice, or no direction.
-        ModelError: if a body has free-free modes only, which carry no moment to an interface.
     """
     ends = ends_of(self, name, m1, m2)
     t, rows, displacement = _coaxial(ends, ends.direction("axis", axis))
@@ -119,26 +93,15 @@ def prismatic(self: Whole, name: str, m1: Marker, m2: Marker, *, axis: Direction
 
 
 def spherical(self: Whole, name: str, m1: Marker, m2: Marker) -> None:
-    """Ball joint; three constraints.
-
-    Raises:
-        ConfigError: for a name in use, an unknown marker, or one body twice.
-    """
+    """Ball joint; three constraints."""
     enter(self, Joint(name, "spherical", ends_of(self, name, m1, m2).markers, coincidence()))
 
 
 def planar(self: Whole, name: str, m1: Marker, m2: Marker, *, normal: Direction) -> None:
-    """Sliding in a plane through m1, turning about its normal; three constraints.
+    """Sliding of m2 in a plane through m1, turning about its normal; three constraints.
 
     Args:
-        name: name of the joint.
-        m1: point of the plane.
-        m2: what slides.
         normal: (3,) of the plane, world at the start [1].
-
-    Raises:
-        ConfigError: for a name in use, an unknown marker, one body twice, or no direction.
-        ModelError: if a body has free-free modes only, which carry no moment to an interface.
     """
     ends = ends_of(self, name, m1, m2)
     t = ends.triad(ends.direction("normal", normal))
@@ -148,10 +111,6 @@ def planar(self: Whole, name: str, m1: Marker, m2: Marker, *, normal: Direction)
 
 def fixed(self: Whole, name: str, m1: Marker, m2: Marker) -> None:
     """Weld; six constraints.
-
-    Raises:
-        ConfigError: for a name in use, an unknown marker, or one body twice.
-        ModelError: if a body has free-free modes only, which carry no moment to an interface.
 
     Example:
         >>> mech = rom.Mechanism()

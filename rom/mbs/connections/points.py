@@ -14,17 +14,10 @@ FLAT_COSINE = 1 - 1e-6  # of the angle between the axis of a wheel that lies fla
 
 
 def point_on_line(self: Whole, name: str, m1: Marker, m2: Marker, *, axis: Direction) -> None:
-    """The point m2 slides on a line through m1; two constraints.
+    """The point m2 slides on a line through m1, which its body carries; two constraints.
 
     Args:
-        name: name of the joint.
-        m1: point of the line, which its body carries.
-        m2: what slides.
         axis: (3,) direction of the line, world at the start [1].
-
-    Raises:
-        ConfigError: for a name in use, an unknown marker, one body twice, or no direction.
-        ModelError: if a body has free-free modes only, which carry no moment to an interface.
     """
     ends = ends_of(self, name, m1, m2)
     t = ends.triad(ends.direction("axis", axis))
@@ -33,17 +26,10 @@ def point_on_line(self: Whole, name: str, m1: Marker, m2: Marker, *, axis: Direc
 
 
 def point_on_plane(self: Whole, name: str, m1: Marker, m2: Marker, *, normal: Direction) -> None:
-    """The point m2 slides in a plane through m1; one constraint.
+    """The point m2 slides in a plane through m1, which its body carries; one constraint.
 
     Args:
-        name: name of the joint.
-        m1: point of the plane, which its body carries.
-        m2: what slides.
         normal: (3,) of the plane, world at the start [1].
-
-    Raises:
-        ConfigError: for a name in use, an unknown marker, one body twice, or no direction.
-        ModelError: if a body has free-free modes only, which carry no moment to an interface.
     """
     ends = ends_of(self, name, m1, m2)
     t = ends.triad(ends.direction("normal", normal))
@@ -56,9 +42,6 @@ def distance(
     """Massless rod between two points; one constraint.
 
     Args:
-        name: name of the joint.
-        m1: one end.
-        m2: other end.
         length: of the rod [m]; None for the distance at the start.
 
     Raises:
@@ -76,27 +59,16 @@ def distance(
 
 
 def universal(
-    self: Whole,
-    name: str,
-    m1: Marker,
-    m2: Marker,
-    *,
-    axis1: Direction,
-    axis2: Direction,
+    self: Whole, name: str, m1: Marker, m2: Marker, *, axis1: Direction, axis2: Direction
 ) -> None:
     """Cardan joint: one axis on m1 stays perpendicular to another on m2; four constraints.
 
     Args:
-        name: name of the joint.
-        m1: one side.
-        m2: other side.
         axis1: (3,) direction fixed to the first body, world at the start [1].
         axis2: (3,) direction fixed to the second body, world at the start [1].
 
     Raises:
-        ConfigError: if the axes are not perpendicular at the start; for a name in use, an unknown
-            marker, one body twice, or no direction.
-        ModelError: if a body has free-free modes only, which carry no moment to an interface.
+        ConfigError: if the axes are not perpendicular at the start.
     """
     ends = ends_of(self, name, m1, m2)
     one, two = ends.direction("axis1", axis1), ends.direction("axis2", axis2)
@@ -116,22 +88,17 @@ def rolling(
     radius: Length,
     axis: Direction | None = None,
 ) -> None:
-    """A ball or thin wheel touches a plane and rolls on it without slip.
+    """A ball or thin wheel about m2 touches a plane through m1 and rolls on it without slip.
 
-    One constraint of position and two of velocity (not holonomic). Spin about the normal is
-    free.
+    One constraint of position and two of velocity (not holonomic). Spin about the normal is free.
 
     Args:
-        name: name of the joint.
-        m1: point of the plane.
-        m2: centre of the ball or wheel.
         normal: (3,) of the plane towards the centre, world at the start [1].
         radius: [m].
         axis: (3,) axis of a wheel, world at the start [1]; None for a ball.
 
     Raises:
         ConfigError: if the wheel lies flat on the plane.
-        ModelError: if a body has free-free modes only, which carry no moment to an interface.
     """
     ends = ends_of(self, name, m1, m2)
     for marker in ends.markers:

@@ -76,7 +76,6 @@ def bushing(  # noqa: PLR0913  one keyword per property
     Rotations count up to half a turn; a rotational spring about a joint counts whole turns.
 
     Args:
-        name: name of the bushing.
         m1: marker that carries the axes.
         m2: other marker; turned by less than half a turn against the first.
         stiffness: (6,) or symmetric (6, 6) [N/m, N/rad; N m/m, N m/rad], translations first,
@@ -138,27 +137,18 @@ def _curve(
 
 @table
 class Bushings(Table):
-    """All bushings.
+    """All bushings."""
 
-    Attributes:
-        i, j: (b,) markers.
-        frame_i, frame_j: (b, 3, 3) axes of the bushing in those of its markers.
-        zero: (b, 3) position of j in these axes without force [m].
-        stiffness, damping: (b, 6, 6) translations, then rotations.
-        curve: (b, 6) first piece of a force over displacement, -1 for none; pieces: (b, 6).
-        piece: (n, 7) lower end, origin, four coefficients of powers, energy at the origin.
-    """
-
-    i: Index1
-    j: Index1
-    frame_i: Array3
-    frame_j: Array3
-    zero: Array2
-    stiffness: Array3
-    damping: Array3
-    curve: Index2
-    pieces: Index2
-    piece: Array2
+    i: Index1  # (b,) marker
+    j: Index1  # (b,) other marker
+    frame_i: Array3  # (b, 3, 3) axes of the bushing in those of the marker
+    frame_j: Array3  # (b, 3, 3) in those of the other marker
+    zero: Array2  # (b, 3) position of j in these axes without force [m]
+    stiffness: Array3  # (b, 6, 6) translations, then rotations
+    damping: Array3  # (b, 6, 6) likewise
+    curve: Index2  # (b, 6) first piece of a force over displacement, -1 for none
+    pieces: Index2  # (b, 6) number of them
+    piece: Array2  # (n, 7) lower end, origin, four coefficients of powers, energy at the origin
 
 
 def pack(bushings: Mapping[str, Bushing], places: Places) -> Bushings:

@@ -194,38 +194,35 @@ class Places:
 
 @dataclass(frozen=True, eq=False)
 class Hooks:
-    """What only few families have to say; None where one has nothing to say.
+    """What only few families have to say; None where one has nothing to say."""
 
-    Attributes:
-        asked: ({name: record}, table, number of joint coordinates) -> laws that stay in Python.
-        answers: table -> (e, ...) what each law of a user answered last.
-        lost: what is wrong if an answer is not finite; in place of {}, the names.
-        potential: whether the forces, dampers aside, follow from a potential; those of films and of
-            what spins go around.
-        loaded_rows: table -> constraint rows whose multipliers the forces depend on.
-        room: table -> (e,) gaps over those in the middle [1], which one correction towards an
-            equilibrium may halve or double at most.
-        eased: table -> context within which its elements find their equilibrium more easily, close
-            to the one that is wanted; it says whether that changes anything.
-        remembers: table -> (e,) whether forces depend on the past, other than by angles that go on.
-        kept: (table, (n_t, p) memory) -> (n_t,) energy in springs that slip, which is in the power
-            lost when they are stretched [J].
-        beyond: (name, record, (n_t,) times [s], body -> (n_t, 3, 3) its axes in the world) -> where
-            and how a motion left the range of its forces, in a sentence; empty if it did not.
-        phases: (table, work) -> (e,) numbers at the last residual which go on by whole ones in
-            motions that repeat [1].
-    """
-
+    # ({name: record}, table, number of joint coordinates) -> laws that stay in Python
     asked: Callable[[Mapping[str, Element], Filled, int], Sequence[Asked]] | None = None
+    # table -> (e, ...) what each law of a user answered last
     answers: Callable[[Filled], Sequence[npt.ArrayLike]] | None = None
+    # what is wrong if an answer is not finite; in place of {}, the names
     lost: str = "the law of {} gives no finite number"
+    # whether the forces, dampers aside, follow from a potential; those of films and of what spins
+    # go around
     potential: bool = True
+    # table -> constraint rows whose multipliers the forces depend on
     loaded_rows: Callable[[Filled], Index] | None = None
+    # table -> (e,) gaps over those in the middle [1], which one correction towards an equilibrium
+    # may halve or double at most
     room: Callable[[Filled], Array] | None = None
+    # table -> context within which its elements find their equilibrium more easily, close to the
+    # one that is wanted; it says whether that changes anything
     eased: Callable[[Filled], AbstractContextManager[bool]] | None = None
+    # table -> (e,) whether forces depend on the past, other than by angles that go on
     remembers: Callable[[Filled], Array] | None = None
+    # (table, (n_t, p) memory) -> (n_t,) energy in springs that slip, which is in the power lost
+    # when they are stretched [J]
     kept: Callable[[Filled, Array], Array] | None = None
+    # (name, record, (n_t,) times [s], body -> (n_t, 3, 3) its axes in the world) -> where and how a
+    # motion left the range of its forces, in a sentence; empty if it did not
     beyond: Callable[[str, Element, Array, Callable[[str], Array]], str] | None = None
+    # (table, work) -> (e,) numbers at the last residual which go on by whole ones in motions that
+    # repeat [1]
     phases: Callable[[Filled, Work], Array] | None = None
 
 

@@ -49,34 +49,21 @@ NO_PROGRAM = np.zeros(0)
 
 @table
 class JointForces(Table):
-    """All forces of one kind along joint coordinates.
+    """All forces of one kind along joint coordinates."""
 
-    Attributes:
-        at: (f,) joint coordinates.
-        law: (f, n) numbers of the law of that kind, see there.
-        load_first, load_count: (f,) constraint rows of the joint, for laws that ask for its load.
-        address: (f,) of compiled laws of the user, 0 for Python.
-        program_at: (f + 1,) where the programs of formulas begin; equal numbers for other laws.
-        programs: (p,) of all formulas.
-        clock: (1,) function that tells the time.
-        kind: of the laws.
-        formula: (3,) what the formula at hand gives: force, and its derivatives.
-        answer: (f,) forces at the last residual; those of laws in Python before it.
-        slope: (f, 2) derivatives of laws in Python by coordinate and rate.
-    """
-
-    at: Index1
-    law: Array2
-    load_first: Address1
-    load_count: Address1
-    address: Address1
+    at: Index1  # (f,) joint coordinates
+    law: Array2  # (f, n) numbers of the law of that kind, see there
+    load_first: Address1  # (f,) first constraint row of the joint, for laws that ask for its load
+    load_count: Address1  # (f,) number of them
+    address: Address1  # (f,) of compiled laws of the user, 0 for Python
+    # (f + 1,) where the programs of formulas begin; equal numbers for other laws
     program_at: Address1
-    programs: Scratch1
-    clock: Address1
-    kind: Annotated[int, PASSING_MARK]
-    formula: Scratch1
-    answer: Scratch1
-    slope: Scratch2
+    programs: Scratch1  # (p,) of all formulas
+    clock: Address1  # (1,) function that tells the time
+    kind: Annotated[int, PASSING_MARK]  # of the laws
+    formula: Scratch1  # (3,) what the formula at hand gives: force, and its derivatives
+    answer: Scratch1  # (f,) forces at the last residual; those of laws in Python before it
+    slope: Scratch2  # (f, 2) derivatives of laws in Python by coordinate and rate
 
 
 @table

@@ -47,14 +47,13 @@ def rotational_spring(
     """Spring and damper about the axis of a joint that turns.
 
     Args:
-        name: name of the spring.
         joint: joint with an angle.
         stiffness: [N m/rad].
         damping: [N m s/rad].
         free_angle: angle without moment [rad].
 
     Raises:
-        ConfigError: for a name in use, or a joint that is unknown or does not turn.
+        ConfigError: for a joint that does not turn.
     """
     coordinate_of(self.joints, joint, "angle", f"rotational spring {name!r}")
     doubt(name, stiffness, damping)
@@ -95,7 +94,6 @@ def stop(
     """Limit a joint coordinate by compliant stops.
 
     Args:
-        name: name of the stops.
         joint: joint with a coordinate.
         law: `rom.mbs.Impact`, its friction without effect.
         lower: smallest coordinate without force [rad or m]; None for no limit.
@@ -155,21 +153,20 @@ def friction(  # noqa: PLR0913  one keyword per property
     sticks creeps with less than the transition speed.
 
     Args:
-        name: name of the friction.
         joint: joint with a coordinate.
         transition_speed: speed over which the sign changes [m/s or rad/s]; implicit steps
             that change the speed by much more take many corrections.
         coulomb: level that is always there [N or N m].
         mu: coefficient of friction [1].
-        radius: at which friction acts on an angle, that of the pin [m]; none for a
-            displacement.
+        radius: at which friction acts on an angle, that of the pin [m]; none for a displacement.
         static: level at rest over that of fast motion, at least 1 [1].
         stribeck_speed: speed over which this fades [m/s or rad/s].
         viscous: force per speed [N s/m or N m s/rad].
         coordinate: "angle" or "displacement"; None for the only or the first one.
 
     Raises:
-        ConfigError: for a joint without such a coordinate, or numbers no friction has.
+        ConfigError: for a joint without such a coordinate, or mu on an angle without radius, or
+            static without its speed.
     """
     row = coordinate_of(self.joints, joint, coordinate, "friction")
     turns = row is self.joints[joint].turn

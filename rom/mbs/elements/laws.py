@@ -114,13 +114,11 @@ def law(  # noqa: PLR0913  one keyword per property
     `rom.check_law` looks for mistakes in it.
 
     Args:
-        name: name of the law.
         function: ``law(t, parameters, motion, memory, out)``; a function of Python, compiled by
             Numba when it can be, one of Numba, or anything with an ``address`` in C.
         markers: at least one, of any bodies or the ground.
         parameters: (p,) numbers handed to the law, in its own units.
-        memory: (m,) numbers that the law remembers from step to step, at the start, in its own
-            units.
+        memory: (m,) numbers remembered from step to step, at the start, in its own units.
         outputs: names of its own outputs; ``solution.law(name)`` has them.
         energy: whether it tells stored energy and lost power. If not, all its work is that of an
             applied force, and equilibria let it grow with the loads.
@@ -146,11 +144,7 @@ def law(  # noqa: PLR0913  one keyword per property
 
 
 def user_force(
-    self: Whole,
-    name: str,
-    function: Callable[..., Any],
-    m1: Marker,
-    m2: Marker | None = None,
+    self: Whole, name: str, function: Callable[..., Any], m1: Marker, m2: Marker | None = None
 ) -> None:
     """Force law in Python: ``function(t, a)`` or ``function(t, a, b)``.
 
@@ -166,39 +160,25 @@ def user_force(
 
 @table
 class Laws(Table):
-    """All laws.
+    """All laws."""
 
-    Attributes:
-        address, slopes: (e,) of laws and of their tangents; 0 for Python, or for differences.
-        count: (e,) markers of each; marker: (e, K) -1 beyond.
-        parameter_at, answer_at, memory_at: (e + 1,) where parameters, answers and remembered
-            numbers of each begin.
-        parameters: (p,) of all; first: (m,) what they remember at the start.
-        stores: (e,) 1 for laws that account for their energy.
-        clock: (1,) function that tells the time.
-        motion: (18 K,) of the markers of the law at hand.
-        answer: (a,) of all; probe: likewise, of one at moved markers.
-        D: (72 K^2,) derivatives of the law at hand by motions and by velocities, row by row.
-        derivatives_at: (e + 1,) where those of laws in Python begin; derivatives: (d,) all of them.
-    """
-
-    address: Address1
-    slopes: Address1
-    count: Index1
-    marker: Index2
-    parameter_at: Index1
-    answer_at: Index1
-    memory_at: Index1
-    parameters: Array1
-    first: Array1
-    stores: Index1
-    clock: Index1
-    motion: Scratch1
-    answer: Scratch1
-    probe: Scratch2
-    D: Scratch1
-    derivatives_at: Index1
-    derivatives: Scratch1
+    address: Address1  # (e,) 0 for Python
+    slopes: Address1  # (e,) of their tangents, 0 for differences
+    count: Index1  # (e,) number of markers
+    marker: Index2  # (e, K) -1 beyond
+    parameter_at: Index1  # (e + 1,) where the parameters of each begin
+    answer_at: Index1  # (e + 1,) where the answers do
+    memory_at: Index1  # (e + 1,) where the remembered numbers do
+    parameters: Array1  # (p,) of all
+    first: Array1  # (m,) what they remember at the start
+    stores: Index1  # (e,) 1 for laws that account for their energy
+    clock: Index1  # (1,) function that tells the time
+    motion: Scratch1  # (18 K,) of the markers of the law at hand
+    answer: Scratch1  # (a,) of all
+    probe: Scratch2  # (2, largest) of one at markers moved to both sides
+    D: Scratch1  # (72 K^2,) derivatives of the law at hand by motions and by velocities, row by row
+    derivatives_at: Index1  # (e + 1,) where those of laws in Python begin
+    derivatives: Scratch1  # (d,) all of them
 
 
 def pack(laws: Mapping[str, Law], places: Places) -> Laws:
@@ -419,7 +399,6 @@ LAWS_FAMILY = Family(
         body[at[:n]] for at, n in zip(laws.marker, laws.count, strict=True)
     ],
     hooks=Hooks(
-        asked=asked,
-        answers=lambda laws: [laws.answer[i:j] for i, j in pairwise(laws.answer_at)],
+        asked=asked, answers=lambda laws: [laws.answer[i:j] for i, j in pairwise(laws.answer_at)]
     ),
 )

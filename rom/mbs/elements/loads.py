@@ -55,20 +55,12 @@ class Load:
 
 
 def force(self: Whole, name: str, marker: Marker, vector: Any, *, frame: Axes = "world") -> None:
-    """Force at a marker: (3,) [N], or a function of time; axes of the world or the marker.
-
-    Raises:
-        ConfigError: for a name in use, an unknown marker or frame, or a wrong vector.
-    """
+    """Force at a marker: (3,) [N], or a function of time; axes of the world or the marker."""
     _load(self, name, marker, vector, frame, FORCE_WORLD)
 
 
 def torque(self: Whole, name: str, marker: Marker, vector: Any, *, frame: Axes = "world") -> None:
-    """Torque at a marker: (3,) [N m], or a function of time; axes of world or marker.
-
-    Raises:
-        ConfigError: for a name in use, an unknown marker or frame, or a wrong vector.
-    """
+    """Torque at a marker: (3,) [N m], or a function of time; axes of world or marker."""
     _load(self, name, marker, vector, frame, TORQUE_WORLD)
 
 
@@ -80,19 +72,12 @@ def _load(self: Whole, name: str, marker: Marker, vector: Given, frame: str, kin
 
 @table
 class Loads(Table):
-    """All loads.
+    """All loads."""
 
-    Attributes:
-        at: (l,) markers.
-        kind: (l,) FORCE_WORLD to TORQUE_BODY.
-        vector: (l, 3).
-        signal: (l,) function of time added to the vector, -1 for none.
-    """
-
-    at: Index1
-    kind: Index1
-    vector: Array2
-    signal: Index1
+    at: Index1  # (l,) markers
+    kind: Index1  # (l,) FORCE_WORLD to TORQUE_BODY
+    vector: Array2  # (l, 3)
+    signal: Index1  # (l,) function of time added to the vector, -1 for none
 
 
 def pack(loads: Mapping[str, Load], places: Places) -> Loads:
@@ -174,14 +159,13 @@ def spread_load(
     reduced for stays the undeformed one.
 
     Args:
-        name: name of the load.
         part: what `add_flexible` returned.
         load: from `rom.surface_load` or `rom.mass_load` of the same reduced body.
         amplitude: a number, or a function of time.
         frame: "body" or "world".
 
     Raises:
-        ConfigError: for a name in use, a load of another body, or a wrong frame or amplitude.
+        ConfigError: for a load of another body.
     """
     part = self.part(str(getattr(part, "name", part)))
     shapes = getattr(load, "shapes", None)
@@ -207,25 +191,16 @@ def _by_the_frame(part: Part, load: Any) -> Array:
 
 @table
 class SpreadLoads(Table):
-    """All spread loads.
+    """All spread loads."""
 
-    Attributes:
-        body: (l,) body; world: (l,) 1 if the forces keep their direction in the world, else 0.
-        force: (l, 3) sum of the forces f [N].
-        first: (l, 9) entry 3 a + b: sum of X_a f_b [N m].
-        shapes: (l, R, 9) entry 3 a + b: sum of phi_k,a f_b.
-        amplitude: (l,) factor; signal: (l,) function of time added to it, -1 for none.
-        arm: (l, 9) sum of positions and forces at the last residual, body frame.
-    """
-
-    body: Index1
-    world: Index1
-    force: Array2
-    first: Array2
-    shapes: Array3
-    amplitude: Array1
-    signal: Index1
-    arm: Scratch2
+    body: Index1  # (l,)
+    world: Index1  # (l,) 1 if the forces keep their direction in the world, else 0
+    force: Array2  # (l, 3) sum of the forces f [N]
+    first: Array2  # (l, 9) entry 3 a + b: sum of X_a f_b [N m]
+    shapes: Array3  # (l, R, 9) entry 3 a + b: sum of phi_k,a f_b
+    amplitude: Array1  # (l,) factor
+    signal: Index1  # (l,) function of time added to it, -1 for none
+    arm: Scratch2  # (l, 9) sum of positions and forces at the last residual, body frame
 
 
 def pack_spread(loads: Mapping[str, Spread], places: Places) -> SpreadLoads:

@@ -59,7 +59,6 @@ def motor(
     the motor was added. What cannot be compiled runs as plain Python, some ten times slower.
 
     Args:
-        name: name of the motor.
         joint: joint with a coordinate.
         law: function of time [s], coordinate [rad or m] and its rate, or one of Numba, or a
             `rom.mbs.elements.formulas.programs.Formula`.

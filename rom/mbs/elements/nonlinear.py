@@ -14,9 +14,8 @@ angular velocity in the axes of the frame, in the order of position, quaternion,
 velocity. It writes, with n = 6 k and the rows force in the world, moment in the frame: stored
 energy [J]; lost power [W]; (n,) forces of energy and damping that resist the motion; and, if
 ``wanted`` is not zero, (n, n) their derivative by displacements in the world and rotations in the
-frame; (n, n) their derivative by the velocities. ``space`` is memory for
-LAW_MEMORY_SIZE numbers. Such a function is made with ``numba.cfunc`` or by any
-compiler; `compiled_law` keeps what it makes.
+frame; (n, n) their derivative by the velocities. ``space`` is memory for LAW_MEMORY_SIZE numbers.
+Such a function is made with ``numba.cfunc`` or by any compiler; `compiled_law` keeps what it makes.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -123,24 +122,14 @@ class NonlinearBody(Protocol):
 @typed
 @dataclass(frozen=True)
 class Assembly:
-    """A non-linear body in a mechanism: frame k is the body ``name.k``.
-
-    Attributes:
-        name: name in the mechanism.
-        body: what was added.
-        parts: the bodies of its frames.
-    """
+    """A non-linear body in a mechanism: frame k is the body ``name.k``."""
 
     name: str
-    body: NonlinearBody
-    parts: tuple[Part, ...]
+    body: NonlinearBody  # what was added
+    parts: tuple[Part, ...]  # the bodies of its frames
 
     def marker(self, place: str | int) -> Marker:
-        """Handle of a named place, or of the origin of a frame, counted from 0 or the end.
-
-        Raises:
-            ConfigError: listing the places.
-        """
+        """Handle of a named place, or of the origin of a frame, counted from 0 or the end."""
         frame = self.body.places.get(place) if isinstance(place, str) else place
         if isinstance(frame, bool) or not isinstance(frame, int | np.integer):
             raise ConfigError(
@@ -183,7 +172,6 @@ def add_nonlinear(
         omega: (3,) angular velocity of the body as a whole, axes of the body [rad/s].
 
     Raises:
-        ConfigError: for a name in use, a wrong shape or a number that is not finite.
         ModelError: naming a frame without mass or inertia.
     """
     self.check_new(name)
@@ -249,31 +237,18 @@ def _faults(frames: Frames, elements: Sequence[Elements]) -> Iterator[str]:
 
 @table
 class Nonlinear(Table):
-    """Elements of non-linear bodies between up to K frames, each with a compiled law.
+    """Elements of non-linear bodies between up to K frames, each with a compiled law."""
 
-    Attributes:
-        address: (e,) of the laws.
-        count: (e,) number of frames.
-        body: (e, K) their bodies, -1 beyond.
-        numbers: (e, c) what the law knows of the element.
-        pose: (e, 13 K) frames at the last residual: position, quaternion, velocities.
-        answer: (2 + 6 K + 72 K^2,) what a law says.
-        space: (LAW_MEMORY_SIZE,) for the laws to use as they like.
-        owner: (e,) which of the bodies an element is part of.
-        forces: (n,) sum of all force components of each body: not finite where a law failed.
-        by_rate: (e,) 1 where forces depend on velocities.
-    """
-
-    address: Address1
-    count: Index1
-    body: Index2
-    numbers: Array2
-    pose: Scratch2
-    answer: Scratch1
-    space: Scratch1
-    owner: Index1
-    forces: Scratch1
-    by_rate: Index1
+    address: Address1  # (e,) of the laws
+    count: Index1  # (e,) number of frames
+    body: Index2  # (e, K) their bodies, -1 beyond
+    numbers: Array2  # (e, c) what the law knows of the element
+    pose: Scratch2  # (e, 13 K) frames at the last residual: position, quaternion, velocities
+    answer: Scratch1  # (2 + 6 K + 72 K^2,) what a law says
+    space: Scratch1  # (LAW_MEMORY_SIZE,) for the laws to use as they like
+    owner: Index1  # (e,) which of the bodies an element is part of
+    forces: Scratch1  # (n,) sum of all force components of each body: not finite where a law failed
+    by_rate: Index1  # (e,) 1 where forces depend on velocities
 
 
 def pack(bodies: Mapping[str, Assembly], places: Places) -> Nonlinear:

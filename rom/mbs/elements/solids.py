@@ -43,24 +43,15 @@ class LargeDeflection:
 
 @table
 class Quartics(Table):
-    """All bodies of large deflection; p <= P counts pairs of coordinates i <= j, the last fastest.
+    """All bodies of large deflection; p <= P counts pairs of coordinates i <= j, last fastest."""
 
-    Attributes:
-        body: (e,) which.
-        energy: (e,) which of the u energies it has.
-        by_one: (u, R, P) T3, its last two indices as a pair [N/m^2].
-        by_two: (u, P, P) T4 by its first and last two indices [N/m^3].
-        square: (P,) products of coordinates, twice where these differ.
-        S3, S4: (e, P) both contractions at the last residual.
-    """
-
-    body: Index1
-    energy: Index1
-    by_one: Array3
-    by_two: Array3
-    square: Scratch1
-    S3: Scratch2
-    S4: Scratch2
+    body: Index1  # (e,) which
+    energy: Index1  # (e,) which of the u energies it has
+    by_one: Array3  # (u, R, P) T3, its last two indices as a pair [N/m^2]
+    by_two: Array3  # (u, P, P) T4 by its first and last two indices [N/m^3]
+    square: Scratch1  # (P,) products of coordinates, twice where these differ
+    S3: Scratch2  # (e, P) contraction at the last residual
+    S4: Scratch2  # (e, P) likewise
 
 
 def pack_quartics(found: Mapping[str, LargeDeflection], places: Places) -> Quartics:
@@ -152,29 +143,17 @@ QUARTICS_FAMILY = Family("bodies of large deflection", LargeDeflection, *KERNELS
 
 @table
 class Samples(Table):
-    """All bodies of sampled elements.
+    """All bodies of sampled elements."""
 
-    Attributes:
-        body: (e,) which.
-        start: (e + 1,) first of its points.
-        gradients: (p, 9, R) displacement gradient per unit of each coordinate [1/m].
-        weights: (p,) [m^3].
-        lame: (p, 2) lam and mu [Pa].
-        K: (e, R, R) stiffness at small deflection [N/m].
-        state: (p, 20) gradient H, inverse of F, ln J, energy density, at the last residual.
-        Y: (9, R) F^-1 G at a point.
-        stress: (9,) P at a point.
-    """
-
-    body: Index1
-    start: Index1
-    gradients: Array3
-    weights: Array1
-    lame: Array2
-    K: Array3
-    state: Scratch2
-    Y: Scratch2
-    stress: Scratch1
+    body: Index1  # (e,) which
+    start: Index1  # (e + 1,) first of its points
+    gradients: Array3  # (p, 9, R) displacement gradient per unit of each coordinate [1/m]
+    weights: Array1  # (p,) [m^3]
+    lame: Array2  # (p, 2) lam and mu [Pa]
+    K: Array3  # (e, R, R) stiffness at small deflection [N/m]
+    state: Scratch2  # (p, 20) gradient H, inverse of F, ln J, energy density, at the last residual
+    Y: Scratch2  # (9, R) F^-1 G at a point
+    stress: Scratch1  # (9,) P at a point
 
 
 def pack_samples(found: Mapping[str, LargeDeflection], places: Places) -> Samples:
@@ -301,11 +280,7 @@ SAMPLES_FAMILY = Family("bodies of sampled elements", LargeDeflection, *OF_SAMPL
 
 
 def deflection_of(part: Part) -> tuple[LargeDeflection, Family]:
-    """The energy of a body of large deflection beyond that of small deflection, and its family.
-
-    Raises:
-        ModelError: for geometric stiffness beside it, or a body that spins in its frame.
-    """
+    """The energy of a body of large deflection beyond that of small deflection, and its family."""
     body = part.flexible
     if body.K_geo:
         raise ModelError(

@@ -43,15 +43,9 @@ def spring_damper(
     """Spring [N/m] and damper [N s/m] along the line between two markers.
 
     Args:
-        name: name of the spring.
-        m1: one end.
-        m2: other end.
         stiffness: [N/m].
         damping: [N s/m].
         free_length: length without force [m]; None for the length at the start.
-
-    Raises:
-        ConfigError: for a name in use, an unknown marker, or a length below zero.
     """
     if free_length is None:
         gap = self.design_point(m2) - self.design_point(m1)
@@ -68,16 +62,11 @@ def doubt(name: str, stiffness: float, damping: float) -> None:
 
 @table
 class Springs(Table):
-    """All springs.
+    """All springs."""
 
-    Attributes:
-        i, j: (s,) markers.
-        law: (s, 3) stiffness [N/m], damping [N s/m], free length [m].
-    """
-
-    i: Index1
-    j: Index1
-    law: Array2
+    i: Index1  # (s,) marker
+    j: Index1  # (s,) other marker
+    law: Array2  # (s, 3) stiffness [N/m], damping [N s/m], free length [m]
 
 
 def pack(springs: Mapping[str, Spring], places: Places) -> Springs:

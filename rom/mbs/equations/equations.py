@@ -191,8 +191,7 @@ def least_multipliers(s, W, rank, lam):
 def accelerate(s, W, q, v, a, lam, rank):
     """Set a and lam to accelerations and multipliers; `factorise_motion` first.
 
-    Friction that depends on the loads of its joint is found by passes with the loads of the pass
-    before.
+    Friction that depends on joint loads is found by passes with the loads of the pass before.
     """
     lam[:] = 0.0
     for _ in range(MAX_PASSES if s.by_multipliers != 0 else 1):

@@ -65,11 +65,8 @@ def forest(groups: list[Group], n_bodies: int) -> tuple[list[int], list[int]]:
 class Ordering:
     """Elimination on paper: which nodes each one is coupled to when its turn comes.
 
-    Attributes:
-        size: unknowns of each node: bodies, then groups of constraint rows.
-        sequence: nodes in the order of elimination.
-        later: nodes coupled to each node when it goes.
-        cost: multiplications and additions of a factorisation.
+    Nodes are bodies, then groups of constraint rows; ``size`` counts their unknowns, and ``cost``
+    the multiplications and additions of a factorisation.
     """
 
     def __init__(self, width: Index, neighbours: list[list[int]], groups: list[Group]):

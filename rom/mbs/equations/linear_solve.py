@@ -14,12 +14,7 @@ import math
 
 from numba import types
 
-from rom.mbs.kernels.algebra import (
-    back_substitute,
-    factorise,
-    range_basis,
-    subtract_row,
-)
+from rom.mbs.kernels.algebra import back_substitute, factorise, range_basis, subtract_row
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.markers import own_corner
 from rom.mbs.kernels.stages import REAL_MATRIX, REAL_VECTOR, stage

@@ -30,39 +30,24 @@ MAX_SHARING_WHOLE = 100
 
 @dataclass(frozen=True)
 class Packed:
-    """A mechanism ready to run.
-
-    Attributes:
-        system: the arrays.
-        seen: the same with the frames of bodies that move in another one as further markers, which
-            answers need and steps do not.
-        names: bodies in the order of the arrays.
-        markers: row of each marker.
-        row_owner: (m,) joint or drive of each constraint row.
-        signals: functions of time, in the order of the arrays.
-        q, v: coordinates and velocities as given by the user.
-        length: size of the mechanism [m].
-        mass: total mass [kg].
-        elements: {family: its table}, in the order of the arrays.
-        element_names: {family: names of its elements}.
-        asked: laws that stay in Python.
-        places: where the arrays have what elements speak of.
-    """
+    """A mechanism ready to run."""
 
     system: System
+    # the same with the frames of bodies that move in another one as further markers, which answers
+    # need and steps do not
     seen: System
-    names: tuple[str, ...]
-    markers: dict[Marker, int]
-    row_owner: tuple[str, ...]
-    signals: tuple[Signal, ...]
-    q: Array
-    v: Array
-    length: float
-    mass: float
-    elements: dict[Family, Any]
-    element_names: dict[Family, tuple[str, ...]]
-    asked: tuple[Asked, ...]
-    places: Places
+    names: tuple[str, ...]  # bodies in the order of the arrays
+    markers: dict[Marker, int]  # row of each marker
+    row_owner: tuple[str, ...]  # (m,) joint or drive of each constraint row
+    signals: tuple[Signal, ...]  # functions of time, in the order of the arrays
+    q: Array  # coordinates as given by the user
+    v: Array  # velocities likewise
+    length: float  # size of the mechanism [m]
+    mass: float  # of all bodies [kg]
+    elements: dict[Family, Any]  # {family: its table}, in the order of the arrays
+    element_names: dict[Family, tuple[str, ...]]  # {family: names of its elements}
+    asked: tuple[Asked, ...]  # laws that stay in Python
+    places: Places  # where the arrays have what elements speak of
 
     @property
     def followed(self) -> int:
@@ -202,11 +187,7 @@ class Packed:
 
 
 def pack(mechanism: Mechanism, *, whole: bool = False) -> Packed:
-    """Write the mechanism into arrays; whole matrices (n, n) if wanted, else blocks where they pay.
-
-    Raises:
-        ConfigError: if there is no body.
-    """
+    """Write the mechanism into arrays; whole matrices if wanted, else blocks where they pay."""
     parts = tuple(mechanism.parts.values())
     if not parts:
         raise ConfigError("the mechanism has no body.", hint="Use add_rigid or add_flexible.")

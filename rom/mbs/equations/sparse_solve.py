@@ -39,10 +39,8 @@ ZERO_RTOL = 1e-15
 class Pattern:
     """Where the entries of the matrices of a mechanism stand, in `Work` and in sparse matrices.
 
-    Attributes:
-        n, m: numbers of velocities and of constraint rows.
-        groups: unknowns of each body and each joint, (n + m,) in all, in the order in which they
-            are eliminated best.
+    The groups are the n velocities and m multipliers of each body and each joint, in the order in
+    which they are eliminated best.
     """
 
     def __init__(self, packed: Packed):
@@ -108,14 +106,9 @@ def _families(graph: Graph, n_bodies: int) -> list[Index]:
 class Constrained:
     """The factorised equations.
 
-    Args:
-        A: (n, n) in units in which the mass matrix has ones on its diagonal.
-        G: (m, n) gradient of the constraints, rows of length one.
-        redundant: whether constraints may repeat others; multipliers are then those of a
-            mechanism whose joints are equally stiff.
-
-    Raises:
-        SolverError: if they are singular.
+    A is (n, n) in units in which the mass matrix has ones on its diagonal, G (m, n) has rows of
+    length one. Where constraints may repeat others (``redundant``), multipliers are those of a
+    mechanism whose joints are equally stiff.
     """
 
     def __init__(self, A: csc_matrix, G: csr_matrix, *, redundant: bool):

@@ -346,17 +346,11 @@ def _prescribed(packed: Packed, W: Work) -> Array:
 
 @dataclass(frozen=True)
 class _Constraints:
-    """Constraints at one position, rows of length one, motions in units that cost the same.
+    """Constraints at one position, rows of length one, motions in units that cost the same."""
 
-    Attributes:
-        rank: number of independent ones.
-        share: (m,) how much each takes part in what repeats others.
-        step: (n,) a motion along free directions, in units of the coordinates.
-    """
-
-    rank: int
-    share: Array
-    step: Array
+    rank: int  # number of independent ones
+    share: Array  # (m,) how much each takes part in what repeats others
+    step: Array  # (n,) a motion along free directions, in units of the coordinates
 
 
 def _constraints(packed: Packed, W: Work, q: Array) -> _Constraints:

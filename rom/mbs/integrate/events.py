@@ -74,23 +74,16 @@ class Instant(Whereabouts):
 
 
 class Noted(NamedTuple):
-    """What a watch knows at one time: last signs, and how often each event happened.
-
-    ``found`` holds what happened if the watch that noted it is gone.
-    """
+    """What a watch knows at one time: last signs, and how often each event happened."""
 
     signs: dict[str, float]
     counts: dict[str, int]
-    found: dict[str, list[tuple[float, Array, Array]]]
+    found: dict[str, list[tuple[float, Array, Array]]]  # if the watch that noted it is gone
 
 
 @dataclass
 class Watch:
-    """The events of one run: the last signs of their functions, and what was found.
-
-    Attributes:
-        stop: name and time of the terminal event that ended the run, or None.
-    """
+    """The events of one run: the last signs of their functions, and what was found."""
 
     events: dict[str, Event]
     instant: Instant
@@ -100,7 +93,7 @@ class Watch:
     def __post_init__(self) -> None:
         self.signs: dict[str, float] = {}
         self.found: dict[str, list[tuple[float, Array, Array]]] = {n: [] for n in self.events}
-        self.stop: tuple[str, float] | None = None
+        self.stop: tuple[str, float] | None = None  # terminal event that ended the run, its time
 
     def begin(self, state: State) -> None:
         """Note the signs at the start."""

@@ -203,10 +203,7 @@ def increment_norm(W, step):
 
 @inner
 def increment_goal(W, step):
-    """Increment that no longer matters: a fraction of what the acceleration moves in a step.
-
-    And the round-off of the positions.
-    """
+    """Increment that no longer matters: a share of what accelerations move, and the round-off."""
     total, reach, h = 0.0, 0.0, step.method[0]
     for i in range(step.vd1.size):
         total += W.weight[i] * step.vd1[i] ** 2
@@ -270,10 +267,7 @@ def may_halve(step):
 
 @inner
 def imbalance(s, W, step):
-    """Increment of free masses under the forces left over, and the largest gap.
-
-    Relative to the size of the mechanism, as `increment_norm`.
-    """
+    """Increment of free masses under the forces left over, and the largest gap, both relative."""
     total, gap, bh2 = 0.0, 0.0, step.method[1] * step.method[0] ** 2
     for i in range(W.residual.size):
         if W.weight[i] > 0.0:

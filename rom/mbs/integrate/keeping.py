@@ -100,9 +100,6 @@ class Keeping:
             origin: time the steps are counted from [s], None for the start of the run.
             taken: steps since then.
             digests: of arguments and mechanism by name.
-
-        Raises:
-            ConfigError: as `check`.
         """
         self.check()
         counted = [None if origin is None else float(origin).hex(), taken]
@@ -148,11 +145,6 @@ class Keeping:
 
     def write(self, blocks: Sequence[Block], state: State, noted: Noted | None) -> None:
         """Write what is new since the last time; the state last, which counts the parts.
-
-        Args:
-            blocks: all pieces of the motion.
-            state: behind them.
-            noted: the events up to there.
 
         Raises:
             ConfigError: if the folder cannot be made.

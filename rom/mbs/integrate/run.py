@@ -183,39 +183,24 @@ def of(state: State) -> Array:
 
 @dataclass
 class Record:
-    """What a run has produced so far.
-
-    Attributes:
-        mechanism, packed, settings: of the run.
-        clock: when the stepping began, assembly and compilation done.
-        blocks: saved pieces (t, q, v, a, lam, work, base).
-        t: time reached.
-        final: last state reached.
-        given: state the run began from.
-        statistics: counts, and seconds in compiled code.
-        progress: what reports it, once it has.
-        watch: over the events of the mechanism, None if it has none.
-        noted: what the watch knew at ``final``.
-        keeping: folder that is written while the run lasts, or None.
-        assemble: see `rom.simulate`.
-    """
+    """What a run has produced so far."""
 
     mechanism: Mechanism
     packed: Packed
     settings: Settings
-    clock: float
-    blocks: list[tuple[Array, ...]] = field(default_factory=list)
-    t: float = 0.0
+    clock: float  # when the stepping began, assembly and compilation done
+    blocks: list[tuple[Array, ...]] = field(default_factory=list)  # (t, q, v, a, lam, work, base)
+    t: float = 0.0  # reached
     final: State = None  # type: ignore[assignment]  # until the start
-    given: State | None = None
-    compiled: float = 0.0
+    given: State | None = None  # the run began from
+    compiled: float = 0.0  # time in compiled code [s]
     counts: dict[str, float] = field(default_factory=dict)
     shown_at: float = 0.0
-    progress: Progress | None = None
-    watch: Watch | None = None
-    noted: Noted | None = None
-    keeping: Keeping | None = None
-    assemble: bool = False
+    progress: Progress | None = None  # what reports it, once it has
+    watch: Watch | None = None  # over the events of the mechanism, None if it has none
+    noted: Noted | None = None  # what the watch knew at ``final``
+    keeping: Keeping | None = None  # folder that is written while the run lasts
+    assemble: bool = False  # see `rom.simulate`
 
     def keep(self, t: Array | float, *arrays: Array) -> None:
         """Add saved instants."""

@@ -51,59 +51,42 @@ weights_of_bdf = inner(bdf_weights)
 
 @table
 class Control(Table):
-    """All that changes from step to step. A second one remembers the beginning of the step.
+    """All that changes from step to step. A second one remembers the beginning of the step."""
 
-    Attributes:
-        step: of the method, prepared for the next length.
-        instant: the last accepted one: v, a, lam and base are consistent velocities,
-            accelerations, multipliers and followed joint coordinates, parts of it.
-        jerk: (n,) rate of the accelerations over the last step.
-        number, count: see the names of their entries.
-        reals, wholes: the memory in which all of these lie, and what the `Work` of the method
-            keeps over a step, but the factor of a whole matrix.
-        lu: this factor, by rows.
-        by_blocks: (1,) whether it is not in use.
-        W_base: of this `Work`.
-    """
-
-    step: Step
+    step: Step  # of the method, prepared for the next length
+    # the last accepted one: v, a, lam and base are consistent velocities, accelerations,
+    # multipliers and followed joint coordinates, parts of it
     instant: Array1
     v: Array1
     a: Array1
     lam: Array1
     base: Array1
-    jerk: Array1
-    number: Array1
-    count: Index1
+    jerk: Array1  # (n,) rate of the accelerations over the last step
+    number: Array1  # see the names of its entries
+    count: Index1  # likewise
+    # in reals and wholes lie all of these, and what the `Work` of the method keeps over a step, but
+    # the factor of a whole matrix
     reals: Array1
     wholes: Index1
-    lu: Array1
-    by_blocks: Index1
-    W_base: Array1
+    lu: Array1  # this factor, by rows
+    by_blocks: Index1  # (1,) whether it is not in use
+    W_base: Array1  # of this `Work`
 
 
 @table
 class Trial(Table):
-    """The instant at the end of the step under way, and the signals ahead.
+    """The instant at the end of the step under way, and the signals ahead."""
 
-    Attributes:
-        instant, v, a, lam, base: as in `Control`.
-        times: (k,) at which signals are known; table: (k, s, 3) there.
-        signal: (1, s, 3) those of the step; the `Work` of the instant has them and base, too.
-        rows: (k, 1 + n_q + 2 n + m + c + 3) time, coordinates, instants and works to be saved.
-        none: (0, 0) what the method is to save.
-    """
-
-    instant: Array1
+    instant: Array1  # this and its parts as in `Control`
     v: Array1
     a: Array1
     lam: Array1
     base: Array1
-    times: Array1
-    table: Array3
-    signal: Array3
-    rows: Array2
-    none: Array2
+    times: Array1  # (k,) at which signals are known
+    table: Array3  # (k, s, 3) there
+    signal: Array3  # (1, s, 3) those of the step; the `Work` of the instant has them and base, too
+    rows: Array2  # (k, 1 + n_q + 2 n + m + c + 3) time, coordinates, instants and works to be saved
+    none: Array2  # (0, 0) what the method is to save
 
 
 @kernel

@@ -34,44 +34,26 @@ WORK = ("drives", "forces", "damping")
 
 @table
 class Bodies(Table):
-    """Inertia, stiffness and damping of all bodies; rigid ones have r = 0.
+    """Inertia, stiffness and damping of all bodies; rigid ones have r = 0."""
 
-    Attributes:
-        q_at, v_at: (b,) first coordinate and velocity of each body.
-        r: (b,) number of elastic coordinates.
-        flex: (b,) row in the tables of flexible bodies.
-        mass: (b,) [kg].
-        first: (b, 3) first moment about the origin [kg m].
-        second: (b, 3, 3) integral of rho X X^T [kg m^2].
-        S: (f, 3, R) integral of rho phi_k.
-        S1: (f, R, 9) integral of rho X_a phi_k,b, entry 3 a + b.
-        S2: (f, R, 9 R) row l, entry 9 k + 3 a + b: integral of rho phi_l,a phi_k,b.
-        M, K, C: (f, R, R) elastic mass, stiffness, damping.
-        stiffened: (b,) 1 for bodies with displacements psi_kl of second order, else 0.
-        H_at: (f,) first entry of a body in H.
-        H: (h,) entry r^2 l + r m + k: share of the shape m in psi_kl.
-        T1: (f, R, 9 R) row l, entry 9 k + 3 a + b: integral of rho X_a psi_kl,b without those.
-        gravity: (3,) [m/s^2].
-    """
-
-    q_at: Index1
-    v_at: Index1
-    r: Index1
-    flex: Index1
-    mass: Array1
-    first: Array2
-    second: Array3
-    S: Array3
-    S1: Array3
-    S2: Array3
-    M: Array3
+    q_at: Index1  # (b,) first coordinate of each body
+    v_at: Index1  # (b,) first velocity of each body
+    r: Index1  # (b,) number of elastic coordinates
+    flex: Index1  # (b,) row in the tables of flexible bodies
+    mass: Array1  # (b,) [kg]
+    first: Array2  # (b, 3) first moment about the origin [kg m]
+    second: Array3  # (b, 3, 3) integral of rho X X^T [kg m^2]
+    S: Array3  # (f, 3, R) integral of rho phi_k
+    S1: Array3  # (f, R, 9) integral of rho X_a phi_k,b, entry 3 a + b
+    S2: Array3  # (f, R, 9 R) row l, entry 9 k + 3 a + b: integral of rho phi_l,a phi_k,b
+    M: Array3  # (f, R, R) elastic mass, as K stiffness and C damping
     K: Array3
     C: Array3
-    stiffened: Index1
-    H_at: Index1
-    H: Array1
-    T1: Array3
-    gravity: Array1
+    stiffened: Index1  # (b,) 1 for bodies with displacements psi_kl of second order, else 0
+    H_at: Index1  # (f,) first entry of a body in H
+    H: Array1  # (h,) entry r^2 l + r m + k: share of the shape m in psi_kl
+    T1: Array3  # (f, R, 9 R) row l, entry 9 k + 3 a + b: integral of rho X_a psi_kl,b without those
+    gravity: Array1  # (3,) [m/s^2]
 
 
 @table
@@ -79,75 +61,49 @@ class Markers(Table):
     """Points with axes on bodies: P = r + A (x + shape q + q bend q / 2), axes A exp(twist q).
 
     Fitted markers have the axes A R, R the rotation nearest to their covariance.
-
-    Attributes:
-        body: (k,) body, -1 for the ground.
-        point: (k, 3) undeformed position in the body frame [m].
-        shape: (k, 3, R) displacement per elastic coordinate.
-        twist: (k, 3, R) small rotation per elastic coordinate.
-        bend: (k, 6, R, R) displacement and rotation of second order, of stiffened bodies.
-        fit: (k,) row of fitted markers in their table, -1 for others.
-        covariance: (f, 9, 1 + R) entry 3 a + b: see `rom.body.records.Marker`.
     """
 
-    body: Index1
-    point: Array2
-    shape: Array3
-    twist: Array3
-    bend: Array4
-    fit: Index1
-    covariance: Array3
+    body: Index1  # (k,) body, -1 for the ground
+    point: Array2  # (k, 3) undeformed position in the body frame [m]
+    shape: Array3  # (k, 3, R) displacement per elastic coordinate
+    twist: Array3  # (k, 3, R) small rotation per elastic coordinate
+    bend: Array4  # (k, 6, R, R) displacement and rotation of second order, of stiffened bodies
+    fit: Index1  # (k,) row of fitted markers in their table, -1 for others
+    covariance: Array3  # (f, 9, 1 + R) entry 3 a + b: see `rom.body.records.Marker`
 
 
 @table
 class Rows(Table):
-    """Scalar constraints between marker i and marker j.
+    """Scalar constraints between marker i and marker j."""
 
-    Attributes:
-        kind: (m,) POINT: world component ``a`` of P_j - P_i; ALONG: component of P_j - P_i along
-            the axis ``a`` of i; NORMAL: axis ``a`` of i times axis ``b`` of j; ANGLE: from axis
-            ``a`` of i to axis ``b`` of j, turning towards axis ``c`` of i; DISTANCE: length of
-            P_j - P_i; COUPLING: sum of two joint coordinates, each times its factor; TOUCH: height
-            of the lowest point of a ball, or of a wheel with the axis ``b`` of j, over the plane
-            through P_i with the normal ``c`` of i; ROLL: velocity with which that point slides
-            over the plane along ``a``.
-        i, j: (m,) markers.
-        k, l: (m,) markers of the second joint of a coupling, -1 for others.
-        a, b, c: (m, 3) unit vectors; b is zero for a ball.
-        at: (m, 2) joint coordinates of a coupling, -1 for others.
-        factor: (m, 2) factors of a coupling; radius of a ball or wheel.
-        offset: (m,) value subtracted.
-        signal: (m,) prescribed value subtracted as well, -1 for none.
-        pair: (m,) joint the row belongs to.
-        joint_i, joint_j: (p,) markers of each joint.
-    """
-
-    kind: Index1
-    i: Index1
-    j: Index1
-    k: Index1
-    l: Index1
-    a: Array2
-    b: Array2
-    c: Array2
-    at: Index2
-    factor: Array2
-    offset: Array1
-    signal: Index1
-    pair: Index1
-    joint_i: Index1
-    joint_j: Index1
+    # POINT: world component ``a`` of P_j - P_i; ALONG: component of P_j - P_i along the axis
+    # ``a`` of i; NORMAL: axis ``a`` of i times axis ``b`` of j; ANGLE: from axis ``a`` of i to axis
+    # ``b`` of j, turning towards axis ``c`` of i; DISTANCE: length of P_j - P_i; COUPLING: sum of
+    # two joint coordinates, each times its factor; TOUCH: height of the lowest point of a ball, or
+    # of a wheel with the axis ``b`` of j, over the plane through P_i with the normal ``c`` of i;
+    # ROLL: velocity with which that point slides over the plane along ``a``
+    kind: Index1  # (m,)
+    i: Index1  # (m,) marker
+    j: Index1  # (m,) other marker
+    k: Index1  # (m,) marker of the second joint of a coupling, -1 for others
+    l: Index1  # (m,) other marker of that joint
+    a: Array2  # (m, 3) unit vector
+    b: Array2  # (m, 3) unit vector; zero for a ball
+    c: Array2  # (m, 3) unit vector
+    at: Index2  # (m, 2) joint coordinates of a coupling, -1 for others
+    factor: Array2  # (m, 2) factors of a coupling; radius of a ball or wheel
+    offset: Array1  # (m,) value subtracted
+    signal: Index1  # (m,) prescribed value subtracted as well, -1 for none
+    pair: Index1  # (m,) joint the row belongs to
+    joint_i: Index1  # (p,) marker of each joint
+    joint_j: Index1  # (p,) other marker
 
 
 @table
 class Coordinates(Table):
-    """Joint coordinates that forces or couplings act on.
+    """Joint coordinates that forces or couplings act on."""
 
-    Attributes:
-        kind: (c,) ALONG or ANGLE; i, j, a, b, c, offset: as in `Rows`.
-    """
-
-    kind: Index1
+    kind: Index1  # (c,) ALONG or ANGLE; the rest as in `Rows`
     i: Index1
     j: Index1
     a: Array2
@@ -162,94 +118,62 @@ class Plan(Table):
 
     The factor is one vector. Of each node it holds the pivot (d, d), the block to its right
     (d, c) and the block below (c, d), all by rows.
-
-    Attributes:
-        position: (n + m,) place of each velocity and multiplier in the order of elimination.
-        size, wide: (k,) numbers d and c of each node; start: (k,) its first place.
-        pivot, right, below: (k,) where its blocks begin in the factor.
-        next_first: (k + 1,), next: later nodes coupled to each node; shift: their first columns.
-        pair_first: (k,), target, stride: where a product of two of them is subtracted, and the
-            distance of its rows.
-        block_to, block_stride: (e,) the same for the blocks of two bodies.
-        corner: (m,) where the entry of a multiplier by itself stands.
-        row_to, row_back, row_stride: (m, 4) where the gradient of a constraint row goes, as a row
-            and as a column, and the distance of the entries of the column.
-        memory: (1,) length of the factor.
     """
 
-    position: Index1
-    size: Index1
-    wide: Index1
-    start: Index1
-    pivot: Index1
-    right: Index1
-    below: Index1
-    next_first: Index1
-    next: Index1
-    shift: Index1
-    pair_first: Index1
-    target: Index1
-    stride: Index1
-    block_to: Index1
-    block_stride: Index1
-    corner: Index1
-    row_to: Index2
-    row_back: Index2
-    row_stride: Index2
-    memory: Index1
+    position: Index1  # (n + m,) place of each velocity and multiplier in the order of elimination
+    size: Index1  # (k,) number d of each node
+    wide: Index1  # (k,) number c
+    start: Index1  # (k,) its first place
+    pivot: Index1  # (k,) where its block (d, d) begins in the factor
+    right: Index1  # (k,) where its block (d, c) does
+    below: Index1  # (k,) where its block (c, d) does
+    next_first: Index1  # (k + 1,) where those of each node begin in next and shift
+    next: Index1  # the later nodes coupled to each node
+    shift: Index1  # and their first columns
+    pair_first: Index1  # (k,) where those of each node begin in target and stride
+    target: Index1  # the places at which a product of two of them is subtracted
+    stride: Index1  # and the distances of its rows
+    block_to: Index1  # (e,) the places for the blocks of two bodies
+    block_stride: Index1  # (e,) and the distances of their rows
+    corner: Index1  # (m,) where the entry of a multiplier by itself stands
+    row_to: Index2  # (m, 4) where the gradient of a constraint row goes, as a row
+    row_back: Index2  # (m, 4) and as a column
+    row_stride: Index2  # (m, 4) distance of the entries of the column
+    memory: Index1  # (1,) length of the factor
 
 
 @table
 class Graph(Table):
-    """Where the entries of two bodies, or of a row and a body, are stored.
+    """Where the entries of two bodies, or of a row and a body, are stored."""
 
-    Attributes:
-        compact: 1 if only blocks are stored and eliminated by the plan, 0 for whole matrices.
-        shares: 1 if constraints in blocks may repeat others: each of them gives way a little.
-        first: (b + 1,), other: (e,) bodies that each body is coupled to, itself included,
-            ascending; x, y: (e,) first row and column of their block in Work.S and Work.Kt.
-        own: (b,) block of each body with itself.
-        body: (m, 4) different bodies that a constraint row moves, -1 for none; at: (m, 4) their
-            first column in Work.G.
-        joint_first: (p + 1,), joint_rows: (m,) constraint rows of each joint.
-        plan: of the elimination; empty for whole matrices.
-    """
-
-    compact: int
-    shares: int
-    first: Index1
-    other: Index1
-    x: Index1
-    y: Index1
-    own: Index1
-    body: Index2
-    at: Index2
-    joint_first: Index1
-    joint_rows: Index1
-    plan: Plan
+    compact: int  # 1 if only blocks are stored and eliminated by the plan, 0 for whole matrices
+    shares: int  # 1 if constraints in blocks may repeat others: each of them gives way a little
+    first: Index1  # (b + 1,) where the pairs of each body begin
+    other: Index1  # (e,) bodies that it is coupled to, itself included, ascending
+    x: Index1  # (e,) first row of their block in Work.S and Work.Kt
+    y: Index1  # (e,) first column
+    own: Index1  # (b,) block of each body with itself
+    body: Index2  # (m, 4) different bodies that a constraint row moves, -1 for none
+    at: Index2  # (m, 4) their first column in Work.G
+    joint_first: Index1  # (p + 1,) where the rows of each joint begin
+    joint_rows: Index1  # (m,) constraint rows of the joints
+    plan: Plan  # of the elimination; empty for whole matrices
 
 
 @table
 class System(Table):
-    """Everything that stays constant during a run.
+    """Everything that stays constant during a run."""
 
-    Attributes:
-        stages: addresses of the stages, first of all.
-        elements: (e, 5) of each family of elements that occurs, see
-            `rom.mbs.kernels.element_calls`.
-        by_multipliers: 1 if forces depend on the loads of joints.
-        memory: (p,) what laws remember from one instant to the next, at the start.
-        renewed: (k, 2) markers i and j of elements whose tangents are renewed within a step,
-            see `rom.mbs.equations.renewal`.
-    """
-
-    stages: Address1
+    stages: Address1  # addresses of the stages, first of all
     bodies: Bodies
     markers: Markers
     rows: Rows
     coordinates: Coordinates
+    # (e, 5) of each family of elements that occurs, see `rom.mbs.kernels.element_calls`
     elements: Address2
-    by_multipliers: int
-    memory: Array1
+    by_multipliers: int  # 1 if forces depend on the loads of joints
+    memory: Array1  # (p,) what laws remember from one instant to the next, at the start
+    # (k, 2) markers i and j of elements whose tangents are renewed within a step, see
+    # `rom.mbs.equations.renewal`
     renewed: Index2
     graph: Graph | None = None

@@ -66,8 +66,7 @@ class Table:
 def table(cls: type[T]) -> type[T]:
     """Make a table of a class whose fields are arrays, other tables and whole numbers.
 
-    Raises:
-        TypeError: when one is made, if an array has another type, or is not in one piece.
+    Making one of wrong types, or of arrays not in one piece, is a TypeError.
     """
     made: Any = dataclass(frozen=True, eq=False, slots=True)(cls)
     made._numba_type_ = TableType(made)

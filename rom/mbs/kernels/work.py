@@ -105,49 +105,37 @@ class Work(Table):
 
 @table
 class Step(Table):
-    """State, the trial state of the step under way, and the method.
+    """State, the trial state of the step under way, and the method."""
 
-    Attributes:
-        q, v, a, vd, lam: coordinates, velocities, algorithmic and true accelerations,
-            multipliers at the last accepted instant.
-        q1, v1, vd1, lam1: the trial values; psi: (n,) increment of the step.
-        work: (3,) work done since the start, by drives, by applied forces, lost in dampers.
-        lost: (3,) the powers at the last accepted instant.
-        count: (12,) steps, iterations, factorisations, iterations of the last step, whether a
-            factorisation is at hand, pass of the present step, steps when the present chunk
-            began, whether Python forces are to be asked for, whether they have been, whether
-            constraints hold for positions and velocities both, corrections with the factorisation
-            at hand, halvings of the last correction.
-        size: (6,) norm of the last increment, length of the mechanism, tolerance, total mass,
-            largest gap in a joint before the last increment, imbalance before it once there were
-            many.
-        method: (5,) h, beta, gamma, alpha_m, alpha_f.
-        bdf: (order + 1,) weights of the present, last and earlier values in the derivative of
-            BDF, three zeros for generalised-alpha. With three weights ``a`` is the last but one
-            velocity, and ``psi`` the last increment until the next step begins.
-        past: (2, order - 1, n) for BDF of other orders: earlier positions as seen from the last
-            accepted instant, see `rom.mbs.integrate.bdf`, and velocities.
-        drift: (n,) part of the increment of such a step that closes gaps.
-    """
-
-    q: Array1
-    v: Array1
-    a: Array1
-    vd: Array1
-    lam: Array1
-    q1: Array1
+    q: Array1  # coordinates at the last accepted instant
+    v: Array1  # velocities then
+    a: Array1  # algorithmic accelerations
+    vd: Array1  # true accelerations
+    lam: Array1  # multipliers
+    q1: Array1  # trial values of the same
     v1: Array1
     vd1: Array1
     lam1: Array1
-    psi: Array1
-    work: Array1
-    lost: Array1
+    psi: Array1  # (n,) increment of the step
+    work: Array1  # (3,) work done since the start, by drives, by applied forces, lost in dampers
+    lost: Array1  # (3,) the powers at the last accepted instant
+    # (12,) steps, iterations, factorisations, iterations of the last step, whether a factorisation
+    # is at hand, pass of the present step, steps when the present chunk began, whether Python
+    # forces are to be asked for, whether they have been, whether constraints hold for positions and
+    # velocities both, corrections with the factorisation at hand, halvings of the last correction
     count: Index1
+    # (6,) norm of the last increment, length of the mechanism, tolerance, total mass, largest gap
+    # in a joint before the last increment, imbalance before it once there were many
     size: Array1
-    method: Array1
+    method: Array1  # (5,) h, beta, gamma, alpha_m, alpha_f
+    # (order + 1,) weights of the present, last and earlier values in the derivative of BDF, three
+    # zeros for generalised-alpha. With three weights ``a`` is the last but one velocity, and
+    # ``psi`` the last increment until the next step begins
     bdf: Array1
+    # (2, order - 1, n) for BDF of other orders: earlier positions as seen from the last accepted
+    # instant, see `rom.mbs.integrate.bdf`, and velocities
     past: Array3
-    drift: Array1
+    drift: Array1  # (n,) part of the increment of such a step that closes gaps
 
 
 def workspace(system: System, n_signals: int) -> Work:

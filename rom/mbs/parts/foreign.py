@@ -32,11 +32,8 @@ class Entry(Protocol):
 def ask(what: str, t: float, function: Function, *arguments: object) -> Any:
     """What a function of the user, by its name in the mechanism, answers at a time [s].
 
-    Raises:
-        ConfigError: if it does not take these arguments.
-        SolverError: if it raised anything else; also for SystemExit and a lack of memory.
-        KeyboardInterrupt: if it was interrupted, or raised this itself.
-        RomError: its own, with the function in front.
+    ConfigError if it does not take these arguments, SolverError if it raised anything else, also
+    SystemExit or for a lack of memory; an interruption passes, and a RomError with it in front.
     """
     try:
         return function(*arguments)
@@ -54,11 +51,7 @@ def compiled_function(
 ) -> Entry | None:
     """What ``make`` compiles a function of the user to; None when it is left to Python.
 
-    True to insist, False to leave it to Python, None for what works; the hint says what it may be
-    made of.
-
-    Raises:
-        ConfigError: if it must be compiled and cannot be.
+    True to insist, False for Python, None for what works; the hint says what it may be made of.
     """
     if wanted is False:
         return None
@@ -77,12 +70,7 @@ def compiled_function(
 
 
 def numbers(what: str, t: float, value: object, shape: tuple[int, ...], needed: str) -> Array:
-    """The answer of a function at a time [s] as finite numbers of a shape, which ``needed`` words.
-
-    Raises:
-        ConfigError: if it is made of something else, or has another shape.
-        SolverError: if a number is not finite.
-    """
+    """What a function answers at a time [s], as finite numbers of a shape; ``needed`` words it."""
     A = real(what, t, value, shape, needed)
     if not np.isfinite(A).all():
         raise SolverError(f"{what} gives {A.tolist()} at t = {t:.9g} s.", hint=KEPT_HINT)

@@ -34,25 +34,16 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class Joint:
-    """A joint between two markers.
-
-    Attributes:
-        name: name of the joint.
-        kind: "revolute", "spherical", ...
-        markers: the two markers; of a coupling those of its second and its first joint.
-        rows: the constraints.
-        coordinate: the row that measures the joint coordinate, or None.
-        turn: the row that measures the angle, or None.
-        displacement: the row that measures the displacement along the axis, or None.
-    """
+    """A joint between two markers."""
 
     name: str
-    kind: str
+    kind: str  # "revolute", "spherical", ..
+    # the two markers; of a coupling those of its second and its first joint
     markers: tuple[Marker, ...]
-    rows: tuple[Row, ...]
-    coordinate: Row | None = None
-    turn: Row | None = None
-    displacement: Row | None = None
+    rows: tuple[Row, ...]  # the constraints
+    coordinate: Row | None = None  # which measures the joint coordinate
+    turn: Row | None = None  # which measures the angle
+    displacement: Row | None = None  # which measures the displacement along the axis
 
     def __repr__(self) -> str:
         ends = " to ".join(f"{m.body}.{m.place}" for m in self.markers)
@@ -123,17 +114,12 @@ def coordinate_of(joints: Mapping[str, Joint], joint: str, which: str | None, wh
 
 
 class Whole(Protocol):
-    """A `rom.mbs.mechanism.Mechanism`, whose methods the functions on it become.
-
-    Attributes:
-        parts, joints, drives: {name: body, joint or drive}.
-        elements: {name: (family, element)}.
-    """
+    """A `rom.mbs.mechanism.Mechanism`, whose methods the functions on it become."""
 
     parts: dict[str, Part]
     joints: dict[str, Joint]
     drives: dict[str, Any]
-    elements: dict[str, tuple[Any, Any]]
+    elements: dict[str, tuple[Any, Any]]  # {name: (family, element)}
 
     @property
     def spherical(self) -> Callable[[str, Marker, Marker], None]:

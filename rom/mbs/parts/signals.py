@@ -94,22 +94,18 @@ def _halved(f: Function, a: float, b: float, width: float) -> tuple[float, float
 
 @dataclass
 class Examined:
-    """A drive and what was found in it so far; never asked for times that the run has not reached.
-
-    It was looked at from ``start`` ``until`` a time [s], where its values and rates reach so far;
-    ``doubted`` once a doubt was said; ``end`` is when it stops to be a motion, and why.
-    """
+    """A drive and what was found in it so far; never asked for times the run has not reached."""
 
     name: str
     function: Function
     rate: Function | None
-    start: float
-    until: float = field(init=False)
-    low: float = np.inf
+    start: float  # of the times at which it was looked at [s]
+    until: float = field(init=False)  # their end [s]
+    low: float = np.inf  # range of its values
     high: float = -np.inf
     top: float = 0.0
-    doubted: bool = False
-    end: tuple[float, ModelError] | None = None
+    doubted: bool = False  # whether a doubt was said
+    end: tuple[float, ModelError] | None = None  # when it stops to be a motion [s], and why
 
     def __post_init__(self) -> None:
         self.until = self.start

@@ -50,12 +50,6 @@ def audit(solution: Solution) -> Report:
     Geometric stiffness enters through the kinetic energy and the work of forces, see
     `rom.mbs.kernels.second_order`: the balance of energy holds with it as it does without.
 
-    Args:
-        solution: what `rom.simulate` returned.
-
-    Returns:
-        Report with a row per check.
-
     Example:
         >>> mech = rom.Mechanism(gravity=(0, 0, -9.81))
         >>> ball = mech.add_rigid("ball", mass=1.0, inertia=(1e-3,) * 3, at=(0, 0, 0))
@@ -338,10 +332,7 @@ def softening(solution: Solution, name: str) -> float:
 
 
 def deformation(solution: Solution, name: str, *, surface: bool = True) -> float:
-    """Largest elastic displacement relative to the size of the body.
-
-    Of all points of the outer surface, or of the interfaces alone.
-    """
+    """Largest elastic displacement, of the outer surface or the interfaces alone, over the size."""
     part = solution.mechanism.parts[name]
     body, q = part.flexible, solution.elastic(name)
     shapes: list[Array] = [np.asarray(m.translation) for m in body.markers.values()]

@@ -28,23 +28,15 @@ class Seen(NamedTuple):
 
 
 class Tracks(NamedTuple):
-    """One row per instant.
+    """One row per instant."""
 
-    Attributes:
-        position, axes, twist: of one marker, see `Seen`.
-        reaction: (n_t, 6) force and moment of some constraint rows on their second marker.
-        energy: (n_t, 3) kinetic, strain, potential [J].
-        momentum: (n_t, 6) linear, and angular about the world origin.
-        gap: (n_t, m) constraint residuals.
-    """
-
-    position: Array
+    position: Array  # of one marker, as axes and twist, see `Seen`
     axes: Array
     twist: Array
-    reaction: Array
-    energy: Array
-    momentum: Array
-    gap: Array
+    reaction: Array  # (n_t, 6) force and moment of some constraint rows on their second marker
+    energy: Array  # (n_t, 3) kinetic, strain, potential [J]
+    momentum: Array  # (n_t, 6) linear, and angular about the world origin
+    gap: Array  # (n_t, m) constraint residuals
 
 
 def follow(solution: AnySolution, marker: int, rows: Index) -> Tracks:
@@ -127,22 +119,15 @@ def axes_of(solution: AnySolution, body: str) -> Array:
 
 @dataclass(frozen=True)
 class JointMotion:
-    """The coordinates of one joint over time, zero as it was described; None what it has not.
+    """The coordinates of one joint over time, zero as it was described; None what it has not."""
 
-    Attributes:
-        t: (n_t,) times [s].
-        angle: (n_t,) by which the second body has turned against the first about the axis,
-            whole turns counted from the first instant [rad].
-        angle_rate: (n_t,) its rate [rad/s].
-        displacement: (n_t,) of the second body along the axis [m].
-        displacement_rate: (n_t,) its rate [m/s].
-    """
-
-    t: Array
+    t: Array  # (n_t,) times [s]
+    # (n_t,) by which the second body has turned against the first about the axis, whole turns
+    # counted from the first instant [rad]
     angle: Array | None
-    angle_rate: Array | None
-    displacement: Array | None
-    displacement_rate: Array | None
+    angle_rate: Array | None  # (n_t,) its rate [rad/s]
+    displacement: Array | None  # (n_t,) of the second body along the axis [m]
+    displacement_rate: Array | None  # (n_t,) its rate [m/s]
 
 
 def angles(row: Row, t: Array, one: Seen, two: Seen) -> tuple[Array, Array]:

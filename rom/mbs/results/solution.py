@@ -102,6 +102,9 @@ class Solution(Whereabouts, Columns, metaclass=Open, kind="columns", bound=typed
         status: one sentence on how the run ended.
         final: the last state, from which a run can go on.
         events: when each event of the mechanism happened, by name.
+
+    Raises:
+        ConfigError: of all methods, for a body, joint, drive or element that is not there.
     """
 
     mechanism: Mechanism
@@ -216,9 +219,6 @@ class Solution(Whereabouts, Columns, metaclass=Open, kind="columns", bound=typed
 
         The moment is about the second marker. A drive is counted apart from its joint.
 
-        Raises:
-            ConfigError: if there is no such joint or drive.
-
         Example:
             >>> mech = rom.Mechanism(gravity=(0, 0, -9.81))
             >>> at = {"at": (0, 0, -1), "markers": {"top": (0, 0, 1)}}
@@ -235,8 +235,7 @@ class Solution(Whereabouts, Columns, metaclass=Open, kind="columns", bound=typed
         """Angle and displacement of a joint over time, with their rates.
 
         Raises:
-            ConfigError: if there is no such joint, or it leaves no angle about an axis and no
-                displacement along one.
+            ConfigError: if it leaves no angle about an axis and no displacement along one.
         """
         coordinate_of(self.mechanism.joints, name, None, "motion of a joint")
         joint = self.mechanism.joints[name]
@@ -247,11 +246,7 @@ class Solution(Whereabouts, Columns, metaclass=Open, kind="columns", bound=typed
         return recomputed.JointMotion(self.t, *angle, *displacement)
 
     def drive_load(self, name: str) -> Array:
-        """(n_t,) torque [N m] or force [N] that a drive supplies along its joint coordinate.
-
-        Raises:
-            ConfigError: if there is no such drive.
-        """
+        """(n_t,) torque [N m] or force [N] that a drive supplies along its joint coordinate."""
         check_known(name, self.mechanism.drives, f"no drive {name!r}; there are")
         return -self.lam[:, self.packed.rows_of(name)[0]]
 
@@ -268,9 +263,6 @@ class Solution(Whereabouts, Columns, metaclass=Open, kind="columns", bound=typed
         Returns:
             {marker: (n_t, 6) force [N] and moment about the marker [N m]}, without markers that
             carry nothing.
-
-        Raises:
-            ConfigError: for an unknown body or frame.
         """
         self.mechanism.part(body)
         one_of("frame", frame, ("body", "world"))
@@ -284,20 +276,12 @@ class Solution(Whereabouts, Columns, metaclass=Open, kind="columns", bound=typed
         return found
 
     def law(self, name: str) -> LawRecord:
-        """What a law of the user said over time: forces, energy, memory and its own outputs.
-
-        Raises:
-            ConfigError: for a name that no law has.
-        """
+        """What a law of the user said over time: forces, energy, memory and its own outputs."""
         check_known(name, self.mechanism.laws, f"no law {name!r}; there are")
         return law_record(self, name)
 
     def element(self, name: str) -> ElementRecord:
-        """Forces, energy and losses of one spring, motor, contact or other force element.
-
-        Raises:
-            ConfigError: if there is no such element, or it acts on no markers.
-        """
+        """Forces, energy and losses of one spring, motor, contact or other element on markers."""
         return element_record(self, name)
 
     @property
@@ -331,13 +315,9 @@ class Solution(Whereabouts, Columns, metaclass=Open, kind="columns", bound=typed
         return tracks.momentum[:, :3], tracks.momentum[:, 3:]
 
     def to_pandas(self, *, every: int = 1) -> Any:
-        """The motion as a table: a DataFrame of `rom.io.history.data_frame`.
-
-        Args:
-            every: take every so many instants.
+        """Every so many instants as a table: a DataFrame of `rom.io.history.data_frame`.
 
         Raises:
-            ConfigError: for a wrong ``every``.
             ResourceError: if pandas is missing.
         """
         return data_frame(self, every=every)

@@ -26,20 +26,13 @@ MEMORY_PREFIX = "memory/"
 
 @dataclass(frozen=True)
 class Memory:
-    """What an implicit method remembers beside the state: with it, a run goes on bit for bit.
-
-    Attributes:
-        method: name of the method.
-        h: length of the last step [s].
-        origin: time from which steps are counted [s].
-        taken: steps since then.
-        arrays: the factorised iteration matrix and what belongs to it.
-    """
+    """What an implicit method remembers beside the state: with it, a run goes on bit for bit."""
 
     method: str
-    h: float
-    origin: float
-    taken: int
+    h: float  # length of the last step [s]
+    origin: float  # time from which steps are counted [s]
+    taken: int  # steps since then
+    # the factorised iteration matrix and what belongs to it
     arrays: dict[str, Array] = field(repr=False)
 
 

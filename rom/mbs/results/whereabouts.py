@@ -16,7 +16,11 @@ from rom.rotation import continuous, matrix, quaternion
 
 
 class Whereabouts:
-    """What `Solution` and the `Instant` of an event answer alike; the latter has no rows n_t."""
+    """What `Solution` and the `Instant` of an event answer alike; the latter has no rows n_t.
+
+    Raises:
+        ConfigError: of all methods, if the body is unknown, or the marker was not one of the run.
+    """
 
     mechanism: Mechanism
     packed: Packed
@@ -28,9 +32,6 @@ class Whereabouts:
         """(n_t, 3) position of a marker, or of the body origin [m].
 
         Of a rod, or another body of frames, (n_t, k, 3) for all of its k frames.
-
-        Raises:
-            ConfigError: if the body is unknown, or the marker was not one of the run.
 
         Example:
             >>> mech = rom.Mechanism(gravity=(0, 0, 0))
@@ -45,11 +46,7 @@ class Whereabouts:
         return self._places(body, 0, 3) if marker is None else self._seen(body, marker).position
 
     def velocity(self, body: str, marker: Any = None) -> Array:
-        """(n_t, 3) velocity of a marker, or of the body origin, world [m/s]; of frames as above.
-
-        Raises:
-            ConfigError: if the body is unknown, or the marker was not one of the run.
-        """
+        """(n_t, 3) velocity of a marker, or of the body origin, world [m/s]; of frames likewise."""
         if self._has_frames(body):
             return self._of_frames(body, marker, self.velocity)
         marker = self._frame(body) if marker is None else marker
@@ -58,22 +55,14 @@ class Whereabouts:
         return self._seen(body, marker).twist[..., :3]
 
     def axes(self, body: str, marker: Any) -> Array:
-        """(n_t, 3, 3) orientation of a marker, to world, elastic rotation included [1].
-
-        Raises:
-            ConfigError: if the body is unknown, or the marker was not one of the run.
-        """
+        """(n_t, 3, 3) orientation of a marker, to world, elastic rotation included [1]."""
         if self._has_frames(body):
             frame = self.mechanism.nonlinear[body].marker(marker).body
             return _of_each(matrix, self.orientation(frame), 1)
         return self._seen(body, marker).axes
 
     def orientation(self, body: str) -> Array:
-        """(n_t, 4) quaternion of the body frame [1], (n_t, k, 4) of k frames.
-
-        Raises:
-            ConfigError: if the body is unknown.
-        """
+        """(n_t, 4) quaternion of the body frame [1], (n_t, k, 4) of k frames."""
         if self._has_frames(body):
             return self._of_frames(body, None, self.orientation)
         if frame := self._frame(body):
@@ -82,11 +71,7 @@ class Whereabouts:
         return self._places(body, 3, 7)
 
     def omega(self, body: str) -> Array:
-        """(n_t, 3) angular velocity of the body frame, body frame [rad/s]; of frames as above.
-
-        Raises:
-            ConfigError: if the body is unknown.
-        """
+        """(n_t, 3) angular velocity of the body frame, body frame [rad/s]; of frames likewise."""
         if self._has_frames(body):
             return self._of_frames(body, None, self.omega)
         if frame := self._frame(body):
@@ -95,11 +80,7 @@ class Whereabouts:
         return self._rates(body, 3, 6)
 
     def elastic(self, body: str) -> Array:
-        """(n_t, r) elastic coordinates, in units of the body's shapes.
-
-        Raises:
-            ConfigError: if the body is unknown.
-        """
+        """(n_t, r) elastic coordinates, in units of the body's shapes."""
         return self._places(body, 7, 7 + self.packed.system.bodies.r[self._number(body)])
 
     def _seen(self, body: str, place: object) -> Seen:

@@ -33,9 +33,6 @@ class AssumedModes:
             of `rom.reduce`: clamped at an interface, simply supported at two, free with mean axes.
         held: dofs that are zero, which `rom.reduce` fills in.
 
-    Raises:
-        ConfigError: if n_modes is no number of modes.
-
     Source:
         O'Shea, Jayakumar, Mechergui, Shabana and Wang, J. Comput. Nonlinear Dynam. 13 (2018)
         041007.

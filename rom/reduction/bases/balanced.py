@@ -21,9 +21,8 @@ class BalancedTruncation(Constrained):
     """Constraint modes, and those combinations of fixed-interface modes that the interfaces know.
 
     Of a pool of fixed-interface modes with modal damping, moved by accelerations of the interfaces
-    and felt by their reactions, the combinations with the largest singular values stay.
-    The projection is one-sided, so that stiffness and mass stay symmetric and frequencies upper
-    bounds.
+    and felt by their reactions, the combinations with the largest singular values stay. The
+    projection is one-sided, so that stiffness and mass stay symmetric and frequencies upper bounds.
 
     Attributes:
         n_modes: number of combinations kept.
@@ -31,7 +30,7 @@ class BalancedTruncation(Constrained):
         damping_ratio: modal damping of the pool [1], for the choice only.
 
     Raises:
-        ConfigError: for numbers of modes or a damping that cannot be.
+        ConfigError: for a pool of fewer than n_modes.
 
     Source:
         Chahlaoui, Lemonnier, Vandendorpe and Van Dooren, Second-order balanced truncation, Linear

@@ -6,13 +6,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve, qr
 
 from rom.arguments import typed, whole
-from rom.eigen.verbs import (
-    Held,
-    Operators,
-    orthonormal,
-    unit_motions,
-    without_dependent,
-)
+from rom.eigen.verbs import Held, Operators, orthonormal, unit_motions, without_dependent
 from rom.errors import InterfaceError
 from rom.model import Array, Basis, Index
 from rom.reduction.bases.fixed_interface import (
@@ -38,9 +32,6 @@ class Rubin(Counted):
 
     Attributes:
         n_modes: number of elastic free-free modes.
-
-    Raises:
-        ConfigError: if n_modes is no number of modes.
 
     Source:
         Rubin, Improved component-mode representation for structural dynamic analysis, AIAA J. 13
@@ -74,9 +65,6 @@ class Herting(Counted, Constrained):
     Attributes:
         n_modes: number of elastic free-free modes.
 
-    Raises:
-        ConfigError: if n_modes is no number of modes.
-
     Source:
         Herting, A general purpose, multi-stage, component modal synthesis method, Finite Elem.
         Anal. Des. 1 (1985) 153.
@@ -102,9 +90,6 @@ class FreeFree(Counted):
 
     Attributes:
         n_modes: number of elastic free-free modes.
-
-    Raises:
-        ConfigError: if n_modes is no number of modes.
 
     Source:
         O'Shea, Jayakumar, Mechergui, Shabana and Wang, J. Comput. Nonlinear Dynam. 13 (2018)

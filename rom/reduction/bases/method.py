@@ -68,8 +68,7 @@ class CraigBampton(Constrained):
         supports: columns of the interfaces that are held for this, which `rom.reduce` fills in.
 
     Raises:
-        ConfigError: if both n_modes and f_max are given, for numbers out of range, or for
-            substructures without f_max or with tol.
+        ConfigError: for both n_modes and f_max, or substructures without f_max or with tol.
 
     Source:
         Craig and Bampton, Coupling of substructures for dynamic analyses, AIAA J. 6 (1968) 1313.
@@ -141,9 +140,6 @@ class EnhancedCraigBampton(Counted, Constrained):
 
     Attributes:
         n_modes: number of fixed-interface modes.
-
-    Raises:
-        ConfigError: if n_modes is no number of modes.
 
     Source:
         Kim and Lee, An enhanced Craig-Bampton method, Int. J. Numer. Meth. Eng. 103 (2015) 79.

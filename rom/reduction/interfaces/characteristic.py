@@ -40,9 +40,6 @@ class Characteristic:
         method: what reduces the body then, for example ``CraigBampton(20)``.
         n: number of functions of every full interface, six rigid motions among them.
 
-    Raises:
-        ConfigError: for fewer functions than rigid motions.
-
     Source:
         Castanier, Tan and Pierre, Characteristic constraint modes for component mode synthesis,
         AIAA J. 39 (2001) 1182.
@@ -52,11 +49,7 @@ class Characteristic:
     n: Annotated[int, Count(6)]
 
     def kinds(self, connection: Connection, interfaces: dict[str, Any]) -> dict[str, object]:
-        """The kinds of all interfaces, functions in the place of "full".
-
-        Args:
-            connection: the model in the coordinates of its interfaces.
-            interfaces: {name: kind} it was made with.
+        """The kinds of all interfaces of a model, {name: kind}, functions in the place of "full".
 
         Raises:
             ConfigError: without a full interface, or if n exceeds the dofs of one.

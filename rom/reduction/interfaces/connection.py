@@ -12,13 +12,7 @@ import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 
 from rom.eigen.connection import Connection, Tie
-from rom.eigen.verbs import (
-    Operators,
-    given_rigid_motions,
-    held_rows,
-    owned,
-    rigid_motions,
-)
+from rom.eigen.verbs import Operators, given_rigid_motions, held_rows, owned, rigid_motions
 from rom.errors import InterfaceError
 from rom.model import FEModel, Index, Interface
 from rom.names import named, offered

@@ -40,9 +40,6 @@ class Polynomial:
             Without a number the lowest one is chosen that meets the band and the tolerance of
             ``CraigBampton(f_max=…, tol=…)``.
 
-    Raises:
-        ConfigError: for an order below one.
-
     Example:
         >>> steel = rom.Material(E=210e9, nu=0.3, rho=7850.0)
         >>> beam = rom.fe.model("meshes/beam.geo", material=steel)
@@ -83,9 +80,6 @@ class FourierLegendre:
     Attributes:
         harmonics: highest harmonic n >= 1 in cos(n theta) and sin(n theta).
         order: highest degree along the axis, >= 0.
-
-    Raises:
-        ConfigError: for a harmonic below one or an order below zero.
 
     Example:
         >>> rom.FourierLegendre(harmonics=4, order=2)  # of a bore that an oil film bends

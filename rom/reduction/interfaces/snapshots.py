@@ -23,8 +23,7 @@ class Snapshots:
     polynomials the functions know the loads the snapshots come from, and no others.
 
     Attributes:
-        values: (3k, s) displacements of the dofs of the surface [m], ``3*i + axis`` for its i-th
-            node.
+        values: (3k, s) displacements of the surface [m], ``3*i + axis`` for its i-th node.
         energy: share [1] of the squared displacement beyond rigid motion that is kept.
         n: alternatively, number of functions, the six rigid motions among them.
 

@@ -15,20 +15,13 @@ from rom.view.canvas.offscreen import checked, styled
 
 
 class Picture(Figure):
-    """A finished figure; notebooks show it, `save` writes it.
+    """A finished figure; notebooks show it, `save` writes it."""
 
-    Attributes:
-        path: where it was written last, or None; the picture may stand for this path.
-    """
-
+    # where it was written last, or None; the picture may stand for this path
     path: Path | None = None
 
     def save(self, path: str | Path) -> Path:
-        """Write it as .png, whole or not at all.
-
-        Raises:
-            ConfigError: for another ending, or a place that is not writable.
-        """
+        """Write it as .png, whole or not at all."""
         self.path = written(self, checked(path, ".png"))
         return self.path
 

@@ -56,10 +56,7 @@ def round_length(largest: float) -> float:
 
 
 def without_round_off(curves: Sequence[Array]) -> list[Array]:
-    """The curves (n,) of one panel and unit; those that vary by round-off alone are constant.
-
-    NaN leaves a gap.
-    """
+    """The curves (n,) of one panel and unit, made constant where they vary by round-off alone."""
     seen = [y[np.isfinite(y)] for y in curves]
     every = np.concatenate([*seen, np.zeros(0)])
     limit = ROUND_OFF * np.abs(every).max(initial=0.0)

@@ -108,15 +108,12 @@ def ring(
 def ellipsoid(
     semi_axes: npt.ArrayLike, centre: npt.ArrayLike = (0.0, 0.0, 0.0), *, sides: int = 32
 ) -> Mesh:
-    """Ellipsoid, or ball, with its axes along x, y and z.
+    """Ellipsoid, or ball, with its axes along x, y and z, and its points on the surface.
 
     Args:
         semi_axes: (3,) half of its lengths [m].
         centre: (3,) its centre [m].
         sides: number of flat faces around; half as many from pole to pole.
-
-    Returns:
-        Points and triangles; the points lie on the surface.
     """
     latitudes = np.pi * np.arange(1, sides // 2) / (sides // 2)
     circle = _circle(np.eye(3)[0], np.eye(3)[1], 1.0, sides)
@@ -170,9 +167,6 @@ def coil(
         wire: diameter of the wire [m].
         turns: number of turns.
 
-    Returns:
-        Points and triangles.
-
     Raises:
         ConfigError: if the wire is thicker than its bends allow.
     """
@@ -188,9 +182,6 @@ def wound(line: npt.ArrayLike, diameter: float, wire: float, *, turns: float = 6
         diameter: of the middle line of the wire [m].
         wire: diameter of the wire [m].
         turns: number of turns.
-
-    Returns:
-        Points and triangles.
 
     Raises:
         ConfigError: if the points are no curve, or the wire is thicker than its bends allow.
@@ -237,9 +228,6 @@ def extruded(outline: npt.ArrayLike, width: float, *, bore: float = 0.0) -> Mesh
         outline: (n, 2) corners, counter-clockwise, all of them in sight of the origin [m].
         width: along z [m].
         bore: diameter of a round hole about the origin [m]; 0 for none.
-
-    Returns:
-        Points and triangles.
 
     Raises:
         ConfigError: if the outline is not seen from the origin, or the bore leaves it.

@@ -171,9 +171,6 @@ def frequencies(
         beside: one or more scenes from top to bottom of what vibrates.
         ax: Axes of matplotlib, and one for each scene; None for a page of its own.
 
-    Returns:
-        The figure; that of ``ax`` where it is given.
-
     Raises:
         ConfigError: without a comparison, or if pictures cannot be made here.
     """
@@ -223,9 +220,6 @@ def convergence(
         beside: one or more scenes from top to bottom to which the errors belong.
         ax: Axes of matplotlib, one for each panel, then each scene; None for a page of its own.
 
-    Returns:
-        The figure; that of ``ax`` where it is given.
-
     Raises:
         ConfigError: if lengths differ, or pictures cannot be made here.
     """
@@ -260,8 +254,7 @@ def campbell(  # noqa: PLR0913  keywords of one picture
 ) -> "Figure":
     """Draw natural frequencies over the speed of rotation, with multiples of the speed.
 
-    A ring marks where a mode meets a multiple of the speed. A second panel shows the damping,
-    unless there is none.
+    A ring marks where a mode meets a multiple of the speed. A second panel shows damping, if any.
 
     Args:
         diagram: what `rom.campbell` returned.
@@ -272,11 +265,7 @@ def campbell(  # noqa: PLR0913  keywords of one picture
         title: heading.
         caption: what a stranger has to know; not written into axes of yours.
         beside: one or more scenes from top to bottom of what vibrates.
-        ax: Axes of matplotlib, two if there is damping, then one for each scene; None for a page
-            of its own.
-
-    Returns:
-        The figure; that of ``ax`` where it is given.
+        ax: Axes of matplotlib, two with damping, then one a scene; None for a page of its own.
 
     Raises:
         ConfigError: if there is not one name per mode, or pictures cannot be made here.

@@ -45,8 +45,7 @@ class Drawing:
         limits: (2,) values at the ends of these colours, in units of the label; None for the
             smallest and the largest.
         polygons: (k, 2) outlines in units of the axes, filled.
-        values: (number of polygons,) what their colours mean, in units of the label, or None for
-            the colour of stone.
+        values: (number of polygons,) for their colours, in units of the label; None for stone.
         curves: {label: list of (k, 2) curves in units of the axes}; labels that start with "_" stay
             out of the legend.
         points: {label: (k, 2) points in units of the axes}.
@@ -93,9 +92,6 @@ def plane(
         columns: drawings in a row.
         height: of each drawing [pixel].
         ax: Axes of matplotlib to draw into, one for each drawing; None for a page of its own.
-
-    Returns:
-        The figure; that of ``ax`` where it is given.
 
     Raises:
         ConfigError: without a drawing, or if pictures cannot be made here.

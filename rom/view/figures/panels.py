@@ -43,11 +43,9 @@ class Panel:
     Attributes:
         title: what it shows.
         xlabel, ylabel: labels of the axes with their units; a sketch has none, and no axes.
-        curves: {name: (x (n,), y (n,))} drawn as lines; thin, without legend, if the name starts
-            with "_".
+        curves: {name: (x (n,), y (n,))} as lines; thin, without legend, if it begins with "_".
         points: {name: (x (n,), y (n,))} drawn as small marks over them, each name with its own.
-        bars: {name: (low, high)} horizontal bars from low to high in units of the axis, from top to
-            bottom.
+        bars: {name: (low, high)} horizontal bars in units of the axis, from top to bottom.
         ends: what the two ends of the bars are; each then has a colour of its own from zero on.
         notes: {words: (x, y)} written beside that place.
         equal: the same scale along both axes.
@@ -89,9 +87,6 @@ def panels(
         title: heading.
         caption: what a stranger has to know; not written into axes of yours.
         ax: Axes of matplotlib, one for each diagram, row by row; None for a page of its own.
-
-    Returns:
-        The figure; that of ``ax`` where it is given.
 
     Raises:
         ConfigError: if lengths differ, or pictures cannot be made here.

@@ -81,11 +81,7 @@ def deformed(  # noqa: PLR0913  keywords of one picture
         title: heading of the page.
         heading: of the diagram of the curves.
         caption: what a stranger has to know; not written into axes of yours.
-        ax: Axes of matplotlib, one for the curves and one for each shape; None for a page of its
-            own.
-
-    Returns:
-        The figure; that of ``ax`` where it is given.
+        ax: Axes of matplotlib, for the curves and each shape; None for a page of its own.
 
     Raises:
         ConfigError: if the shapes do not fit beside the curves, or pictures cannot be made here.
@@ -139,9 +135,6 @@ def flow(
         path: film to write, .gif or .mp4; None to write nothing.
         seconds: how long the film lasts [s].
         caption: what a stranger has to know.
-
-    Returns:
-        The film.
 
     Raises:
         ConfigError: if lengths differ, or pictures cannot be made here.

@@ -147,9 +147,6 @@ def film(
         seconds: how long the film lasts [s].
         caption: what a stranger has to know.
 
-    Returns:
-        The film.
-
     Raises:
         ConfigError: if lengths differ, or pictures cannot be made here.
         ResourceError: for .mp4 without ffmpeg.

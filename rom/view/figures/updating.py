@@ -52,11 +52,7 @@ def updating(  # noqa: PLR0913  keywords of one picture
         label: what the response is, with its unit.
         title: heading.
         caption: what a stranger has to know; not written into axes of yours.
-        ax: four Axes of matplotlib, for responses, changes, their errors and structure; None for a
-            page of its own.
-
-    Returns:
-        The figure; that of ``ax`` where it is given.
+        ax: four Axes of matplotlib, for responses, changes, errors and structure; None for a page.
 
     Raises:
         ConfigError: if lengths differ, or pictures cannot be made here.

@@ -84,9 +84,6 @@ def animate(  # noqa: PLR0913  keywords of one picture, all with defaults
         up: (3,) upright direction [1]; None: against gravity, or across the longest extent without.
         title: what is seen.
 
-    Returns:
-        The film.
-
     Raises:
         ConfigError: for an unknown body, or if pictures cannot be made here.
         ResourceError: for .mp4 without ffmpeg.

@@ -63,9 +63,6 @@ def mesh(
 def meshed(model: FEModel) -> dict[str, Thing]:
     """The outer surface with its elements, and its interfaces by name, as things of a `Scene`.
 
-    Args:
-        model: the model.
-
     Raises:
         ConfigError: if the model has no surface.
     """

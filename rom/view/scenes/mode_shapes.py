@@ -150,8 +150,7 @@ def wheel(
     """A wheel, or some of its sectors, as a thing of a `Scene`.
 
     Args:
-        models: of the sectors, one after the other around the axis, each as if it were the first
-            one.
+        models: of the sectors around the axis in order, each as if it were the first one.
         shape: (3 k,) displacements of the k nodes of each sector drawn, axes of the wheel [m],
             whose sizes the colours show; None for one colour.
         sectors: numbers of those that are drawn; None for all.
@@ -195,10 +194,7 @@ class Around:
 
 
 def _around(
-    models: Sequence[FEModel],
-    hidden: tuple[str, ...],
-    axis: npt.ArrayLike,
-    sectors: Sequence[int],
+    models: Sequence[FEModel], hidden: tuple[str, ...], axis: npt.ArrayLike, sectors: Sequence[int]
 ) -> Around:
     e = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
     outside = {id(m): _outside(m, hidden) for m in models}

@@ -26,8 +26,7 @@ BLOCK_SIZE = 16  # right-hand sides solved together: more bring no speed, but ta
 class ConjugateGradients:
     """A^-1 of a positive definite matrix, for many right-hand sides, by an approximate inverse.
 
-    That is symmetric and positive definite, (n_local, k) -> (n_local, k); ``release`` gives its
-    memory back.
+    That is symmetric and positive definite, (n_local, k) -> (n_local, k); ``release`` frees memory.
     """
 
     ok = True  # an approximate inverse always exists

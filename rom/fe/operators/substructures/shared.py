@@ -90,22 +90,15 @@ class SubstructuredFactor:
 
 @dataclass(frozen=True, slots=True)
 class Split:
-    """Rows of a distributed matrix: insides that no entry joins, one on each rank, and a border.
+    """Rows of a distributed matrix: insides that no entry joins, one on each rank, and a border."""
 
-    Attributes:
-        inside: (n_inside,) rows of this rank's inside, local numbers.
-        mine: (m_local,) the other rows of this rank, local numbers.
-        place: (m_local,) where these stand among the m of the border, which are in order of ranks.
-        touched: (t,) places in the border that this inside is joined to.
-        K_border: (m, m) the rows of K_bb that are this rank's, the others zero.
-        K_inside: (n_inside + t,) * 2 matrix [K_ii, K_ib; ., 0], of K_ii the upper triangle.
-    """
-
-    inside: Index
-    mine: Index
+    inside: Index  # (n_inside,) rows of this rank's inside, local numbers
+    mine: Index  # (m_local,) the other rows of this rank, local numbers
+    # (m_local,) where these stand among the m of the border, which are in order of ranks
     place: Index
-    touched: Index
-    K_border: csr_matrix
+    touched: Index  # (t,) places in the border that this inside is joined to
+    K_border: csr_matrix  # (m, m) the rows of K_bb that are this rank's, the others zero
+    # (n_inside + t,) * 2 matrix [K_ii, K_ib; ., 0], of K_ii the upper triangle
     K_inside: coo_matrix
 
 

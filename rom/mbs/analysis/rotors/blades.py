@@ -32,23 +32,14 @@ MASS_RTOL = 1e-9  # by which identical blades may differ
 
 @dataclass(frozen=True)
 class Blades:
-    """Blades of one rotor.
+    """Blades of one rotor."""
 
-    Attributes:
-        bodies: (N, b) numbers of the bodies.
-        coordinates: (N, m) numbers in `State.v` of the same coordinates of each blade.
-        q_at: where the quaternion of the first body of the first blade stands.
-        v_at: where its angular velocity stands.
-        home: (3, 3) axes of this body where the azimuth counts as zero.
-        axis: (3,) of the rotor, about which the blades follow each other [1].
-    """
-
-    bodies: Index
-    coordinates: Index
-    q_at: int
-    v_at: int
-    home: Array
-    axis: Array
+    bodies: Index  # (N, b) numbers of the bodies
+    coordinates: Index  # (N, m) numbers in `State.v` of the same coordinates of each blade
+    q_at: int  # where the quaternion of the first body of the first blade stands
+    v_at: int  # where its angular velocity stands
+    home: Array  # (3, 3) axes of this body where the azimuth counts as zero
+    axis: Array  # (3,) of the rotor, about which the blades follow each other [1]
 
     @classmethod
     def of(cls, blades: object, packed: Packed, state: State) -> "Blades":

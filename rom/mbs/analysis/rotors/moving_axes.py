@@ -20,15 +20,10 @@ SPIN_RTOL = 1e-3  # of the first frequency of a body, from which on it counts as
 
 @dataclass(frozen=True)
 class Axes:
-    """Axes in which small motions are counted.
+    """Axes in which small motions are counted."""
 
-    Attributes:
-        world: whether those of the world, per body; empty: those of each body.
-        blades: bodies that are counted together, in axes that do not turn with them.
-    """
-
-    world: tuple[bool, ...] = ()
-    blades: Blades | None = None
+    world: tuple[bool, ...] = ()  # whether those of the world, per body; empty: of each body
+    blades: Blades | None = None  # counted together, in axes that do not turn with them
 
 
 IN_BODIES = Axes()

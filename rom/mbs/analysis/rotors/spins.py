@@ -22,34 +22,21 @@ from rom.model import Array
 
 @dataclass(frozen=True)
 class Turning:
-    """Bodies that turn together about the axis of a joint, which what carries it may move.
+    """Bodies that turn together about the axis of a joint, which what carries it may move."""
 
-    Attributes:
-        marker: number of the marker of the joint on what carries it.
-        axis: (3,) of the joint in the axes of that marker [1].
-        speed: [rad/s].
-        bodies: numbers of the bodies.
-    """
-
-    marker: int
-    axis: Array
-    speed: float
-    bodies: tuple[int, ...]
+    marker: int  # number of the marker of the joint on what carries it
+    axis: Array  # (3,) of the joint in the axes of that marker [1]
+    speed: float  # [rad/s]
+    bodies: tuple[int, ...]  # their numbers
 
 
 @dataclass(frozen=True)
 class Spins:
-    """What turns steadily.
+    """What turns steadily."""
 
-    Attributes:
-        whole: (3,) angular velocity of all bodies, world [rad/s].
-        about: (3,) a point on its axis [m].
-        turning: instead, the bodies behind some joints.
-    """
-
-    whole: Array
-    about: Array
-    turning: tuple[Turning, ...] = ()
+    whole: Array  # (3,) angular velocity of all bodies, world [rad/s]
+    about: Array  # (3,) a point on its axis [m]
+    turning: tuple[Turning, ...] = ()  # instead, the bodies behind some joints
 
     @classmethod
     def of(cls, mechanism: Mechanism, now: Instant, spin: object, about: npt.ArrayLike) -> "Spins":

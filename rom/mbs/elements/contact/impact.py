@@ -34,7 +34,8 @@ class Impact:
         tangential_damping: of that spring [N s/m].
 
     Raises:
-        ConfigError: for numbers no contact has.
+        ConfigError: for damping beside restitution, restitution without its speed, or a tangential
+            stiffness without mu.
 
     Source:
         Hunt, Crossley, J. Appl. Mech. 42 (1975) 440; integrated exactly in `damping_of`.

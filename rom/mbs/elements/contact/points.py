@@ -70,29 +70,20 @@ class Contact:
 
 @table
 class Contacts(Table):
-    """A sphere, disc or capsule on marker j that touches something on marker i.
+    """A sphere, disc or capsule on marker j that touches something on marker i."""
 
-    Attributes:
-        kind: (c,) PLANE, SPHERE, CYLINDER, BORE, DISC or CAPSULE.
-        i, j: (c,) markers.
-        e: (c, 3) normal of the plane, or axis of what is on i, in the axes of i.
-        s: (c, 3) axis of what is on j in the axes of j.
-        size: (c, 4) radius on j, and on i, half the length of a capsule on j, and on i [m].
-        law: (c, 5) stiffness, exponent, damping factor [s/m], friction coefficient, speed over
-            which friction changes its sign [m/s].
-        bristle: (c, 2) stiffness [N/m] and damping [N s/m] of friction that holds, zeros for none.
-        remembered: (c,) first of the numbers that it remembers.
-    """
-
-    kind: Index1
-    i: Index1
-    j: Index1
-    e: Array2
-    s: Array2
-    size: Array2
+    kind: Index1  # (c,) PLANE, SPHERE, CYLINDER, BORE, DISC or CAPSULE
+    i: Index1  # (c,) marker
+    j: Index1  # (c,) other marker
+    e: Array2  # (c, 3) normal of the plane, or axis of what is on i, in the axes of i
+    s: Array2  # (c, 3) axis of what is on j in the axes of j
+    size: Array2  # (c, 4) radius on j, and on i, half the length of a capsule on j, and on i [m]
+    # (c, 5) stiffness, exponent, damping factor [s/m], friction coefficient, speed over which
+    # friction changes its sign [m/s]
     law: Array2
+    # (c, 2) stiffness [N/m] and damping [N s/m] of friction that holds, zeros for none
     bristle: Array2
-    remembered: Index1
+    remembered: Index1  # (c,) first of the numbers that it remembers
 
 
 def pack(contacts: Mapping[str, Contact], places: Places) -> Contacts:

@@ -42,16 +42,8 @@ def sphere_on_plane(
     """Sphere about m2 against the plane through m1.
 
     Args:
-        name: name of the contact.
-        m1: point of the plane.
-        m2: centre of the sphere.
-        law: force of the penetration.
         normal: (3,) of the plane towards the sphere, world at the start [1].
         radius: of the sphere [m].
-
-    Raises:
-        ConfigError: for a name in use, an unknown marker, one body twice, a law that is no
-            `rom.mbs.Impact`, or no direction.
     """
     _enter(self, name, points.PLANE, (m1, m2), law, (normal, None), (radius, 0.0))
 
@@ -67,40 +59,22 @@ def disc_on_plane(  # noqa: PLR0913  two surfaces and a law
     axis: Direction,
     radius: Length,
 ) -> None:
-    """Rim of a thin disc about m2 against the plane through m1; two make a cylinder.
+    """Rim of a thin disc about m2, which must not lie flat, against the plane through m1.
+
+    Two of them make a cylinder.
 
     Args:
-        name: name of the contact.
-        m1: point of the plane.
-        m2: centre of the disc, which must not lie flat.
-        law: force of the penetration.
         normal: (3,) of the plane towards the disc, world at the start [1].
         axis: (3,) of the disc, world at the start [1].
         radius: of the disc [m].
-
-    Raises:
-        ConfigError: for a name in use, an unknown marker, one body twice, a law that is no
-            `rom.mbs.Impact`, or no direction.
     """
     _enter(self, name, points.DISC, (m1, m2), law, (normal, axis), (radius, 0.0))
 
 
 def sphere_on_sphere(
-    self: Whole,
-    name: str,
-    m1: Marker,
-    m2: Marker,
-    law: Impact,
-    *,
-    radius1: Length,
-    radius2: Length,
+    self: Whole, name: str, m1: Marker, m2: Marker, law: Impact, *, radius1: Length, radius2: Length
 ) -> None:
-    """Spheres of radius1 about m1 and radius2 about m2 [m].
-
-    Raises:
-        ConfigError: for a name in use, an unknown marker, one body twice, a law that is no
-            `rom.mbs.Impact`, or a radius not above zero.
-    """
+    """Spheres of radius1 about m1 and radius2 about m2 [m]."""
     _enter(self, name, points.SPHERE, (m1, m2), law, (None, None), (radius2, radius1))
 
 
@@ -121,18 +95,13 @@ def sphere_on_cylinder(  # noqa: PLR0913  two surfaces and a law
     A disc across a bore with its radius is a pin with clearance.
 
     Args:
-        name: name of the contact.
-        m1: point of the axis of the cylinder.
-        m2: centre of the sphere.
-        law: force of the penetration.
         axis: (3,) of the cylinder, world at the start [1].
         radius1: of the cylinder [m].
         radius2: of the sphere [m].
         inside: the sphere is in the bore.
 
     Raises:
-        ConfigError: for a sphere that does not fit into the bore, a name in use, an unknown marker,
-            one body twice, a law that is no `rom.mbs.Impact`, or no direction.
+        ConfigError: for a sphere that does not fit into the bore.
     """
     if inside and radius2 >= radius1:
         raise ConfigError(
@@ -157,16 +126,12 @@ def capsule_on_capsule(  # noqa: PLR0913  two bodies and a law
     length1: Annotated[float, NotNegative("m")] = 0.0,
     length2: Annotated[float, NotNegative("m")] = 0.0,
 ) -> None:
-    """Round bars with ends that are half spheres, which touch where they are nearest.
+    """Round bars about m1 and m2, with half spheres as ends, which touch where they are nearest.
 
     A capsule without length is a sphere. While axes are parallel they touch in the middle of where
     they are side by side; as they turn through that the touching point runs to an end.
 
     Args:
-        name: name of the contact.
-        m1: middle of the first one.
-        m2: middle of the second one.
-        law: force of the penetration.
         radius1: of the first one [m].
         radius2: of the second one [m].
         axis1: (3,) of the first one, world at the start [1]; None for a sphere.
@@ -175,8 +140,7 @@ def capsule_on_capsule(  # noqa: PLR0913  two bodies and a law
         length2: of the second one [m].
 
     Raises:
-        ConfigError: for a length without an axis or below zero, axes that cross at the start, a
-            name in use, an unknown marker, one body twice, or a law that is no `rom.mbs.Impact`.
+        ConfigError: for a length without an axis, or axes that cross at the start.
     """
     sizes = ((axis1, length1), (axis2, length2))
     for k, (axis, length) in enumerate(sizes, start=1):
@@ -211,15 +175,11 @@ def surface_on_plane(
     """Surface of a flexible body against the plane through m1.
 
     Args:
-        name: name of the contact.
-        m1: point of the plane.
-        part: what `add_flexible` returned, with a surface.
-        law: per area.
+        part: what `add_flexible` returned.
         normal: (3,) towards the body, world at the start [1].
         where: part of the surface, as in `rom.surface_load`.
 
     Raises:
-        ConfigError: for a wrong argument.
         ModelError: if the body carries no surface.
     """
     _cover(self, name, points.PLANE, m1, part, law, (normal, 0.0, where))
@@ -238,15 +198,11 @@ def surface_on_sphere(
     """Surface of a flexible body against a sphere about m1.
 
     Args:
-        name: name of the contact.
-        m1: centre of the sphere.
-        part: what `add_flexible` returned, with a surface.
-        law: per area.
+        part: what `add_flexible` returned.
         radius: of the sphere [m].
         where: part of the surface, as in `rom.surface_load`.
 
     Raises:
-        ConfigError: for a wrong argument.
         ModelError: if the body carries no surface.
     """
     _cover(self, name, points.SPHERE, m1, part, law, (None, radius, where))
@@ -267,17 +223,13 @@ def surface_on_cylinder(  # noqa: PLR0913  two surfaces and a law
     """Surface of a flexible body against an endless cylinder about m1, or inside its bore.
 
     Args:
-        name: name of the contact.
-        m1: point of the axis.
-        part: what `add_flexible` returned, with a surface.
-        law: per area.
+        part: what `add_flexible` returned.
         axis: (3,) of the cylinder, world at the start [1].
         radius: of the cylinder [m].
         inside: the body is in the bore.
         where: part of the surface, as in `rom.surface_load`.
 
     Raises:
-        ConfigError: for a wrong argument.
         ModelError: if the body carries no surface.
     """
     kind = points.BORE if inside else points.CYLINDER

@@ -15,11 +15,7 @@ FUNCTIONS = {name: (code, *COUNTS[name]) for code, name in enumerate(NAMES, star
 VARIABLES = {"t": T, "x": X, "v": V}
 OF_TWO = (ADD, SUB, MUL, DIV, POW, ATAN2, MIN, MAX)
 # instruction: by how much the stack grows
-STACK_GROWTH = {
-    **dict.fromkeys((NUMBER, T, X, V), 1),
-    **dict.fromkeys(OF_TWO, -1),
-    STEP: -2,
-}
+STACK_GROWTH = {**dict.fromkeys((NUMBER, T, X, V), 1), **dict.fromkeys(OF_TWO, -1), STEP: -2}
 MAX_STACK = 48  # values on the stack of a program
 Code = tuple[tuple[int, float], ...]  # instructions with their numbers
 

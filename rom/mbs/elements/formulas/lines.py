@@ -146,9 +146,6 @@ def line_law(
     """Add a force of t, length x [m] and rate v [m/s] that pushes two markers apart [N] as a law.
 
     Its potential is the integral of the force over x, if it is known [N m].
-
-    Raises:
-        ConfigError: for a name in use, or two markers in one place, which have no direction.
     """
     start = float(np.linalg.norm(mechanism.design_point(m2) - mechanism.design_point(m1)))
     if start == 0.0:
@@ -170,8 +167,7 @@ def through_points(
 ) -> tuple[Formula, Formula]:
     """A curve through points (n,), x ascending, straight beyond its ends, and its integral.
 
-    "monotone" interpolation nowhere leaves the range of neighbours, "cubic" is a spline with
-    continuous curvature.
+    "monotone" nowhere leaves the range of neighbours, "cubic" is a spline of continuous curvature.
 
     Source:
         Fritsch, Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300, for the monotone one.

@@ -46,15 +46,10 @@ def entry() -> Entry:
 
 @dataclass(frozen=True, eq=False)
 class Formula:
-    """A formula of t, x and v.
+    """A formula of t, x and v."""
 
-    Attributes:
-        program: (n,) as `rom.mbs.elements.formulas.taylor.run` takes it.
-        names: the variables that stand in it.
-    """
-
-    program: Array
-    names: frozenset[str]
+    program: Array  # (n,) as `rom.mbs.elements.formulas.taylor.run` takes it
+    names: frozenset[str]  # the variables that stand in it
 
     def __call__(self, t: Value, x: Value = 0.0, v: Value = 0.0) -> Value:
         """Its value; of arrays each to each."""
