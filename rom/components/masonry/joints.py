@@ -72,17 +72,16 @@ def read_joints(path: str | Path) -> tuple[Joint, ...]:
         raise FileFormatError(f"{path} is no file of joints: {error}") from error
     laws = listed.get("joint")
     if set(listed) != {"joint"} or not isinstance(laws, list) or not laws:
-        raise FileFormatError(
-            f"{path} has {sorted(listed)}; laws of joints are tables [[joint]] and nothing else."
-        )
+        text = f"{path} has {sorted(listed)}"
+        raise FileFormatError(f"{text}; laws of joints are tables [[joint]] and nothing else.")
     return tuple(_law(f"{path}, joint {k + 1}", law) for k, law in enumerate(laws))
 
 
 def _law(where: str, law: object) -> Joint:
     if not isinstance(law, Mapping) or not {"friction"} <= set(law) <= LAW_KEYS:
         keys = sorted(law) if isinstance(law, Mapping) else law
-        needed = "It needs friction, and may have between, cohesion and tension."
-        raise FileFormatError(f"{where} has {keys}.", hint=needed)
+        needed = "it needs friction, and may have between, cohesion and tension"
+        raise FileFormatError(f"{where} has {keys}; {needed}.")
     units = {"friction": "1", "cohesion": "Pa", "tension": "Pa"}
     try:
         numbers = {key: _number(law[key], unit) for key, unit in units.items() if key in law}
@@ -171,5 +170,5 @@ def _check_touch(joints: Sequence[Joint], touching: Index) -> None:
     for joint in joints:
         for pair in (joint.between if joint.cohesion or joint.tension else None) or ():
             if tuple(sorted(pair)) not in there:
-                text = f"stones {pair[0]} and {pair[1]} do not touch along an edge at the start."
-                raise ConfigError(text, hint="Name pairs that touch, or lay them closer.")
+                text = f"stones {pair[0]} and {pair[1]} do not touch along an edge at the start"
+                raise ConfigError(f"{text}; name pairs that touch, or lay them closer.")
