@@ -40,12 +40,13 @@ class Quantity:
         words = [f"{forms[len(s)]} {size}".strip() for s, size in shapes]
         unit = "" if self.unit == "1" else f" [{self.unit}]"
         limits = self.must.replace("must not be", "not").removeprefix("must be ")
-        order = f", {self.ascending} or more that ascend" if self.ascending else ""
-        return " or ".join(words) + unit + (f", {limits}" if limits else "") + order
+        return " or ".join(words) + unit + (f", {limits}" if limits else "")
 
     @property
     def must(self) -> str:
         """What the limits ask for, as the rest of a sentence."""
+        if self.ascending:
+            return f"must be {self.ascending} or more numbers that ascend"
         if (self.low, self.high) == (0.0, math.inf):
             sign = "must not be negative" if self.ends[0] == "[" else "must be positive"
             return sign + " or infinite" * self.infinite
@@ -75,8 +76,7 @@ class Quantity:
             shapes = " or ".join(str(shape).replace("None", "n") for shape in self.shapes)
             return f" has shape {array.shape}, needed is {shapes}."
         if array.size < self.ascending or (self.ascending and not (np.diff(array) > 0).all()):
-            numbers = f"{self.ascending} or more numbers"
-            return f" = {reprlib.repr(array.tolist())} must be {numbers} that ascend."
+            return f" = {reprlib.repr(array.tolist())} {self.must}."
         if not array.size or (self.holds(array.min()) and self.holds(array.max())):
             return ""
         wrong = next(x for x in array.flat if not self.holds(x))
@@ -130,9 +130,9 @@ def NotNegative(
     return Quantity(unit, shapes or ((),), 0.0, ends="[)", error=error, infinite=infinite)
 
 
-def Ascending(unit: str = "1", least: int = 2, low: float = -math.inf) -> Quantity:
-    """So many numbers or more from a lowest one on, each above the one before."""
-    return Quantity(unit, ((None,),), low, ends="[)", ascending=least)
+def Ascending(unit: str = "1", least: int = 2) -> Quantity:
+    """So many numbers or more, each above the one before."""
+    return Quantity(unit, ((None,),), ascending=least)
 
 
 def AtLeast(low: float, unit: str = "1") -> Quantity:
