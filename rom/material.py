@@ -53,10 +53,8 @@ class Material:
         positive("rho", self.rho, error=MaterialError)
         number("nu", self.nu, error=MaterialError)
         if not -1.0 < self.nu < 0.5:
-            raise MaterialError(
-                f"nu = {self.nu:g} is outside (-1, 0.5): the strain energy would be negative.",
-                hint="Metals have 0.27 to 0.35.",
-            )
+            text = f"nu = {self.nu:g} is outside (-1, 0.5): the strain energy would be negative"
+            raise MaterialError(f"{text}; metals have 0.27 to 0.35.")
         warn(self.doubt)
 
     @classmethod

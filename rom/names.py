@@ -89,10 +89,8 @@ def check_ending(path: str | Path, what: str, *endings: str) -> Path:
     """The path, if it has one of the endings that such a file is written with, usual one first."""
     path = Path(path)
     if path.suffix.lower() not in endings:
-        raise ConfigError(
-            f"{path}: {what} is written as {', '.join(endings)}.",
-            hint=f"Write {path.stem or 'name'}{endings[0]}.",
-        )
+        text = f"{path}: {what} is written as {', '.join(endings)}"
+        raise ConfigError(f"{text}; write {path.stem or 'name'}{endings[0]}.")
     return path
 
 

@@ -105,7 +105,8 @@ def read_record(path: str | Path, *, scale: float = 1.0) -> Table:
     except (OSError, ValueError) as error:
         raise FileFormatError(f"{path} is no record: {error}") from error
     if columns.shape[1] != 2:
-        raise FileFormatError(f"{path} has {columns.shape[1]} columns; write time and value.")
+        text = f"{path} has {columns.shape[1]} columns."
+        raise FileFormatError(text, hint="Write time and value.")
     return recorded(columns[:, 0], scale * columns[:, 1])
 
 

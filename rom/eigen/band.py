@@ -86,14 +86,14 @@ def modes_up_to(ops: Any, held: Any, f_max: float, tol: float) -> Modes:
     lam = omega[still:] ** 2
     n_found = still + int(np.count_nonzero(lam < rho))
     if n_found != n_below:
-        raise missed(n_found, rho, n_below, "change f_max a little")
+        raise missed(n_found, rho, n_below, "Change f_max a little.")
     lower = lehmann_bounds(lam, _residual(body, lam, Phi[mine, still:]), rho)
     lower -= ROUND_OFF * rho + STIFF_ROUND_OFF * body.largest()
     m = int(np.count_nonzero(lower <= last))
     error = 1.0 - np.sqrt(np.maximum(lower[:m], 0.0) / lam[:m])
     if (worst := error.max(initial=0.0)) > tol:
-        text = f"the frequencies up to {f_max:g} Hz are known within {worst:.2g} only"
-        raise SolverError(f"{text}; allow a larger error than tol = {tol:g}.")
+        text = f"the frequencies up to {f_max:g} Hz are known within {worst:.2g} only."
+        raise SolverError(text, hint=f"Allow a larger error than tol = {tol:g}.")
     return Modes(omega[: still + m], Phi[:, : still + m], error=np.r_[np.zeros(still), error])
 
 

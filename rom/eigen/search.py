@@ -247,7 +247,7 @@ class ModeSearch(Searched):
             lam, Phi = np.concatenate([lam, more]), np.hstack([Phi, Psi])
             order = np.argsort(lam, kind="stable")
             lam, Phi = lam[order], Phi[:, order]
-        raise missed(found, sigma, number, "ask for more modes, or give another shift sigma")
+        raise missed(found, sigma, number, "Ask for more modes, or give another shift sigma.")
 
     def all_modes(self) -> tuple[Array, Array]:
         """All eigenpairs of a small body, solved densely on every rank."""
@@ -341,7 +341,7 @@ def estimated_by_iteration(ops: Searched, factor: Factor, R: Array) -> float:
 def missed(found: int, sigma: float, number: int | None, cure: str) -> ModesMissedError:
     """The error of modes found below a shift [rad^2/s^2] that the inertia counts otherwise."""
     text = f"{found} modes were found below {np.sqrt(abs(sigma)) / (2 * np.pi):.6g} Hz"
-    return ModesMissedError(f"{text}, but the inertia of K - sigma M counts {number}; {cure}.")
+    return ModesMissedError(f"{text}, but the inertia of K - sigma M counts {number}.", hint=cure)
 
 
 def dof_set(dofs: npt.ArrayLike, n: int) -> Index:

@@ -304,7 +304,7 @@ def _refuse_many(n: int, energy: Any) -> None:
         memory, time = foreseen(n, energy.n_points)
         text = f"{n} coordinates of loads, modes and derivatives are above {MAX_COORDINATES}"
         takes = f"{memory / 1e9:.2g} GB and {time / 60:.2g} minutes"
-        raise ResourceError(f"{text}, they would take {takes}; name fewer loads or modes.")
+        raise ResourceError(f"{text}; they take {takes}.", hint="Name fewer loads or modes.")
 
 
 def foreseen(n: int, n_points: int) -> tuple[float, float]:

@@ -229,8 +229,8 @@ def equilibrium(
     first = 1.0 / steps if start is None else 1.0
     share, shape = load_steps(ahead, shape, least=MIN_LOAD_STEP, first=first)
     if share < 1.0:
-        text = f"no equilibrium beyond {100 * share:.4g} % of the load: it buckles or is left free."
-        error = SolverError(text, solution=shape)
+        text = f"no equilibrium beyond {100 * share:.4g} % of the load."
+        error = SolverError(text, hint="The rod buckles or is left free.", solution=shape)
         error.share = share  # type: ignore[attr-defined]
         raise error
     return shape

@@ -60,8 +60,8 @@ def film(
     P, fill, active = (x[0].reshape(shape) for x in (films.P, films.fill, films.active))
     F, dF = films.answer[0, :N_MOTIONS], films.slope[0, :N_MOTIONS, : 2 * N_MOTIONS]
     if n < 0 or not np.isfinite(F).all():
-        text = f"the cavitated region of the film does not settle at {m[:2]} clearances"
-        raise SolverError(f"{text}; use more cells, or cavitation 'reynolds'.")
+        text = f"the cavitated region of the film does not settle at {m[:2]} clearances."
+        raise SolverError(text, hint="Use more cells, or cavitation 'reynolds'.")
     moved = m * bearing.scale, v * bearing.scale * speed
     return Film(bearing, *moved, speed, viscosity, P, fill, active, F, dF, n)
 

@@ -214,8 +214,8 @@ def warm_equilibrium(
         if abs(change) < 1e-6:
             return Warm(now, T, rise, power)
         T += 0.5 * change
-    text = f"the temperature of the film, {T:.1f} degrees Celsius, still changes by {change:.2g} K"
-    raise SolverError(f"{text}; check the flow of oil: little flow, great heat.")
+    text = f"the temperature of the film, {T:.1f} degrees Celsius, still changes by {change:.2g} K."
+    raise SolverError(text, hint="Check the flow of oil: little flow, great heat.")
 
 
 def warm_bearing(

@@ -186,8 +186,8 @@ def isotropic_configurations(
     turn = np.linalg.det(anisotropy_gradient(inertia, q))
     winding = np.where(np.abs(turn) > MIN_JACOBIAN, np.sign(turn), 0).astype(int)
     if there.all() and winding.all() and winding.sum():
-        text = f"the windings of {winding.size} isotropic points add up to {winding.sum()}, not 0"
-        raise SolverError(f"{text}: take a finer grid than {n} cells per turn.")
+        text = f"the windings of {winding.size} isotropic points add up to {winding.sum()}, not 0."
+        raise SolverError(text, hint=f"Take a finer grid than {n} cells per turn.")
     return Isotropic(q, inertia(*q.T)[:, 0, 0], winding)
 
 

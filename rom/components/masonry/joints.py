@@ -80,8 +80,8 @@ def read_joints(path: str | Path) -> tuple[Joint, ...]:
 def _law(where: str, law: object) -> Joint:
     if not isinstance(law, Mapping) or not {"friction"} <= set(law) <= LAW_KEYS:
         keys = sorted(law) if isinstance(law, Mapping) else law
-        needed = "it needs friction, and may have between, cohesion and tension"
-        raise FileFormatError(f"{where} has {keys}; {needed}.")
+        needed = "It needs friction, and may have between, cohesion and tension."
+        raise FileFormatError(f"{where} has {keys}.", hint=needed)
     units = {"friction": "1", "cohesion": "Pa", "tension": "Pa"}
     try:
         numbers = {key: _number(law[key], unit) for key, unit in units.items() if key in law}

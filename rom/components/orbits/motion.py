@@ -139,8 +139,8 @@ class Shooting:
         """Derivatives at the motion that was found."""
         self._say("")
         if self.period is None and not max(map(np.linalg.norm, found.rate)) > REST_TOL:
-            text = "what was found is a state of rest, not a motion"
-            raise SolverError(f"{text}; begin with start= a state that moves, or nearer to it.")
+            hint = "Begin with start= a state that moves, or nearer to the motion."
+            raise SolverError("what was found is a state of rest, not a motion.", hint=hint)
         refuse_other_forces(found)
         return confirmed(found, tangent)
 

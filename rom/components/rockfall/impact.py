@@ -286,8 +286,8 @@ def _refuse(g: Gallery, out: Array, last: Array, step: float, over: bool) -> Non
             reason = f"the boulder is through the cushion of {g.cushion.limit:g} m."
         raise SolverError(reason, solution=before)
     if not over:
-        text = f"the peaks of the impact still grow after {out[-1, 0]:.3g} s; give t_end."
-        raise SolverError(text, solution=_impact(out, last))
+        text = f"the peaks of the impact still grow after {out[-1, 0]:.3g} s."
+        raise SolverError(text, hint="Give t_end.", solution=_impact(out, last))
 
 
 def _impact(out: Array, last: Array) -> Impact:

@@ -260,8 +260,8 @@ class _Search:
         (step, dlam), before, share = correction, self.room(now, state), 1.0
         for name, room in before.items():
             if not room > MIN_ROOM:
-                text = f"nothing keeps the gap of {name!r} open: {room:.2g} of it is left"
-                raise SolverError(f"{text}; lower the load, or start nearer (state=...).")
+                text = f"nothing keeps the gap of {name!r} open: {room:.2g} of it is left."
+                raise SolverError(text, hint="Lower the load, or start nearer (state=...).")
         for _ in range(MAX_HALVINGS):
             ahead = self.spins.steady(self.now, now.moved(state, share * step, share * dlam))
             left = [room / before[name] for name, room in self.room(now, ahead).items()]

@@ -379,6 +379,6 @@ def _gap(squares: Array, n: int) -> tuple[int, float]:
     gaps = (upper - lower) / np.maximum(np.abs(upper), 1e-12 * size)
     j = int(np.argmax(gaps))
     if gaps[j] < MIN_GAP:
-        text = f"modes {n} to {squares.size} have one frequency: they cannot be counted apart"
-        raise SolverError(f"{text}; ask for a few more or less.")
+        text = f"modes {n} to {squares.size} have one frequency: they cannot be counted apart."
+        raise SolverError(text, hint="Ask for a few modes more or less.")
     return n + j, float(0.5 * (upper[j] + lower[j]))

@@ -154,5 +154,5 @@ def _of_body(marker: Marker, body: str, names: list[str]) -> Marker:
     """The marker, if it is one of a body, whose frames have these names."""
     if marker.body in names:
         return marker
-    text = f"the marker {marker.place!r} is of body {marker.body!r}, not of {body!r}"
-    raise ConfigError(f"{text}; write ({marker.body!r}, {marker.place!r}), or another marker.")
+    text = f"the marker {marker.place!r} is of body {marker.body!r}, not of {body!r}."
+    raise ConfigError(text, hint=f"Write ({marker.body!r}, {marker.place!r}), or another marker.")

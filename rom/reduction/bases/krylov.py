@@ -72,5 +72,5 @@ def _refuse_resonance(ops: Operators, held: Held, s: float, f: float) -> None:
         X = X / np.sqrt(ops.gram(X, ops.apply_M(X)).item())
     gap = ops.gram(X, ops.apply_K(X)).item() - s
     if abs(gap) < RESONANCE_RTOL * s:
-        text = f"{f:g} Hz is a natural frequency of the body with its interfaces held"
-        raise SolverError(f"{text}, where its answer is infinite; choose one beside it.")
+        text = f"{f:g} Hz is a natural frequency of the body with its interfaces held."
+        raise SolverError(text, hint="Its answer there is infinite; choose one beside it.")

@@ -157,7 +157,7 @@ tension = 1e5
     ("text", "words"),
     [
         ("[[joint]]\nfriction = 0.6\nglue = 1", r"joint 1 has \['friction', 'glue'\]. It needs"),
-        ("[[joint]]\ncohesion = 1.0", "it needs friction"),
+        ("[[joint]]\ncohesion = 1.0", "It needs friction"),
         ("[[joint]]\nfriction = '0.2 MPa'", "joint 1: "),
         ("[[joint]]\nfriction = true", "True is no number"),
         ("[[joint]]\nfriction = 0.1\nbetween = [[1]]", "joint 1: "),
