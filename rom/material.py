@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import Number, finite, number, positive
+from rom.arguments import Number, finite, number, orthonormal, positive
 from rom.errors import MaterialError, warn
 from rom.plausible import (
     FOAM_SPEED,
@@ -128,9 +128,7 @@ class Orthotropic:
             if name != "nu":
                 positive(name, lowest, error=MaterialError)
         positive("rho", self.rho, error=MaterialError)
-        axes = finite("axes", self.axes, None)
-        if axes.shape != (3, 3) or not np.allclose(axes @ axes.T, np.eye(3), atol=1e-9):
-            raise MaterialError("axes must be a (3, 3) matrix of orthonormal rows.")
+        orthonormal("axes", finite("axes", self.axes, None), error=MaterialError)
         lowest = np.linalg.eigvalsh(self._compliance()).min()
         if lowest <= 0:
             raise MaterialError(

@@ -26,7 +26,7 @@ from rom.body.stiffening import SecondOrder
 from rom.body.surface import Where, point_areas
 from rom.eigen.supports import Fixed, Springs, spring_matrices
 from rom.eigen.verbs import modes_within
-from rom.errors import ModelError, warn
+from rom.errors import ConfigError, ModelError, warn
 from rom.model import Array, Modes
 from rom.notebook import html_table, listed
 from rom.units import unit_system
@@ -310,7 +310,9 @@ class FlexibleBody(BodyData):
         Raises:
             ConfigError: if q has not r columns.
         """
-        q = finite("q", q, (None, self.n_modes))
+        q = np.asarray(q)
+        if q.ndim != 2 or q.shape[1] != self.n_modes:
+            raise ConfigError(f"q of shape {q.shape} must have the shape (s, {self.n_modes}).")
         most = self.certified_energy
         energy = self.energy().energies(q) if np.isfinite(most) else np.zeros(0)
         beyond = energy > (1 + ENERGY_RTOL) * most

@@ -233,7 +233,7 @@ def _blocked(drive: str) -> ModelError:
 
 
 def _checked(frequencies: npt.ArrayLike) -> Array:
-    f = vector("frequencies", frequencies)
+    f = vector("frequencies", np.atleast_1d(frequencies))
     if (f < 0).any():
         raise ConfigError(f"frequencies = {frequencies!r} must be a list of numbers from zero on.")
     return f
