@@ -184,7 +184,7 @@ WRONG = [
     ({"fixed": {"root": ""}}, ConfigError, "is held in ''"),
     ({"fixed": {"root": "xx"}}, ConfigError, "each once"),
     ({"fixed": {"root": "xyz q"}}, ConfigError, "directions are some of x, y, z, rx, ry, rz"),
-    ({"fixed": ("root", "root:y")}, ConfigError, "held twice"),
+    ({"fixed": ("root", "root:y")}, ConfigError, "'root' is given twice"),
     ({"fixed": {"foot": "x"}}, InterfaceError, "no interface 'foot'"),
     ({"fixed": ("root:yz", "foot")}, InterfaceError, "no interface 'foot'"),
 ]

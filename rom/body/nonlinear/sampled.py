@@ -161,5 +161,5 @@ def _refuse_grain(C: Array, lame: Array) -> None:
     expected[:, range(3), range(3)] += 2 * lame[:, 1:]
     expected[:, range(3, 6), range(3, 6)] = lame[:, 1:]
     if np.abs(C - expected).max() > ISOTROPIC_RTOL * np.abs(C).max():
-        text = "sampling makes isotropic neo-Hookean material, and that of the model is not"
-        raise ModelError(f"{text}; leave it out, or give a rom.Material.")
+        text = "neo-Hookean material is isotropic, and that of the model is not"
+        raise ModelError(f"{text}; leave sampling out, or give a rom.Material.")
