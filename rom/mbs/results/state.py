@@ -86,8 +86,8 @@ def check_state(state: State, packed: Packed, *, joints: bool = True) -> None:
     needed = (packed.q.size, packed.v.size, packed.system.rows.kind.size)
     sizes = tuple(np.size(getattr(state, x, 0.0)) for x in ("q", "v", "lam"))
     if not isinstance(state, State) or sizes[: 2 + joints] != needed[: 2 + joints]:
-        text = "the state has {} coordinates, {} velocities and {} constraints; this mechanism has"
-        text = f"{text} {{}}, {{}} and {{}}: their bodies differ.".format(*sizes, *needed)
+        has = "the state has {} coordinates, {} velocities and {} constraints".format(*sizes)
+        text = "{}; this mechanism has {}, {} and {}: their bodies differ.".format(has, *needed)
         raise ConfigError(text, hint="Take one of the same mechanism: sol.final, rom.equilibrium.")
     stiffened = dict(zip(packed.names, packed.system.bodies.stiffened, strict=True))
     moved = [marker.body for marker in packed.frames if not stiffened[marker.body]]

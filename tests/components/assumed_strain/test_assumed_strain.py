@@ -405,7 +405,7 @@ test_messages_name_what_is_wrong = refused(
     (lambda: forces(SMALL, SOFT, SMALL.points[:3]), ConfigError, r"has shape \(3, 2\)"),
     (lambda: tangent(SMALL, SOFT, np.nan * SMALL.points), ConfigError, "is not finite"),
     (lambda: fly(SMALL, SOFT, np.zeros((3, 2)), [0], 1.0), ConfigError, "velocities has"),
-    (lambda: fly(SMALL, SOFT, 0 * SMALL.points, [18], 1.0), ConfigError, "held dofs 18 to 18"),
+    (lambda: fly(SMALL, SOFT, 0 * SMALL.points, [18], 1.0), ConfigError, "held dofs .* 18 must be"),
     (lambda: equilibrium(SMALL, SOFT, np.zeros(3), [0]), ConfigError, "forces of load 0"),
     (lambda: sheet(X, T[:, ::-1]), MeshError, "triangle 0 has the area"),
     (lambda: sheet(np.vstack([X, X[:1] - 1]), [*T, T[0], T[0]]), MeshError, "belongs to 4"),
