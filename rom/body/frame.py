@@ -23,7 +23,7 @@ def on_mean_axes(body: Body) -> Body:
     if rests or body.quartic is not None:
         return body
     if OWN_FRAME in body.markers:
-        raise ConfigError(f"body {body.name!r}: an interface is named {OWN_FRAME!r}; rename it.")
+        raise ConfigError(f"body {body.name!r}: an interface {OWN_FRAME!r} needs another name.")
     still = np.zeros((3, body.n_modes))
     hold = np.hstack([np.eye(6), np.zeros((6, body.n_modes))])
     own = Marker(OWN_FRAME, np.zeros(3), still, still, "rbe2", hold)

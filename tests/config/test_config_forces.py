@@ -452,7 +452,7 @@ def test_an_event_that_ends_the_run_cannot_go_into_an_fmu(tmp_path):
 def test_an_event_of_its_own_follows_what_it_asks_for():
     mech, *_ = block_in_python()
     mech.event("far", lambda t, now: now.joint("guide")[0] - 1)
-    with pytest.raises(ConfigError, match=r"'guide' is not followed\. Add the event with follow="):
+    with pytest.raises(ConfigError, match=r"'guide' is not followed; add the event with follow="):
         rom.simulate(mech, t_end=0.1, dt=0.01)
     mech, *_ = block_in_python()
     with pytest.raises(ConfigError, match="no joint 'guid'"):

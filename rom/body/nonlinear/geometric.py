@@ -302,9 +302,9 @@ def _turnable(F: Array) -> Array:
 def _refuse_many(n: int, energy: Any) -> None:
     if n > MAX_COORDINATES:
         memory, time = foreseen(n, energy.n_points)
-        text = f"{n} coordinates of loads, modes and derivatives are above {MAX_COORDINATES}"
-        takes = f"{memory / 1e9:.2g} GB and {time / 60:.2g} minutes"
-        raise ResourceError(f"{text}; they take {takes}.", hint="Name fewer loads or modes.")
+        text = f"{n} coordinates of loads and modes are more than {MAX_COORDINATES}, and would take"
+        takes = f"{memory / 1e9:.2g} GB and about {time / 60:.2g} minutes"
+        raise ResourceError(f"{text} {takes}.", hint="Name fewer loads, or ask for fewer modes.")
 
 
 def foreseen(n: int, n_points: int) -> tuple[float, float]:

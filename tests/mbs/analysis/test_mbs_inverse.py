@@ -121,7 +121,7 @@ def test_motions_that_nothing_prescribes_are_refused():
     refuses(ConfigError, "no drive 'hinge'.*motor", sol.drive_load, "hinge")
     refuses(ConfigError, "frame = 'marker' is none of", sol.interface_loads, "bar", frame="marker")
     mech.drives.clear()
-    refuses(ModelError, "1 motions are not prescribed.*Add drives", ask, mech, [0.0, 1.0])
+    refuses(ModelError, "1 motions are not prescribed.*add drives", ask, mech, [0.0, 1.0])
 
 
 def linkage(n, seed):
