@@ -189,7 +189,7 @@ class Assembly:
     def _traces(self, n: int, fixed: tuple[Place, ...]) -> list[list[Array]]:
         """Per coupling, the interface motions that the modes of its two bodies ask for."""
         places = [place for coupling in self.couplings for place in coupling]
-        check_once(places, 'level = "local": a place of several couplings,')
+        check_once(places, 'level = "local", unlike "system", takes a place once:')
         coupled = list(dict.fromkeys(body for body, _ in places))
         parts = {name: self._partition(name, fixed) for name in coupled}
         most = max(part.lam.size for part in parts.values())

@@ -98,8 +98,9 @@ def _sectors(low: Interface, high: Interface, axis: Array, at: Array) -> tuple[i
     N = round(share)
     if N < 2 or abs(share - N) > SECTOR_COUNT_ATOL:
         text = f"cyclic faces {low.name!r} and {high.name!r} enclose {np.degrees(abs(angle)):.6g}"
+        why = f"which does not divide the circle: 360 degrees hold {share:.6g} sectors"
         hint = "Check the sector angle of the geometry, and axis=… and at=…."
-        raise InterfaceError(f"{text} degrees: 360 degrees hold {share:.6g} sectors.", hint=hint)
+        raise InterfaceError(f"{text} degrees, {why}.", hint=hint)
     return N, bool(angle > 0)
 
 
