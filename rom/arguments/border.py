@@ -65,7 +65,7 @@ def typed(public: Public) -> Public:
 
 def typed_record(record: type[Record]) -> type[Record]:
     """Check the arguments of a constructor alone, of a record whose methods are asked in loops."""
-    record.__init__ = _typed_function(record.__init__)  # type: ignore[method-assign, misc]
+    setattr(record, "__init__", _typed_function(record.__init__))  # noqa: B010  not of one type
     return record
 
 

@@ -175,7 +175,7 @@ def _limited(kind: Quantity | Whole, taken: Taken | None) -> Taken:
     infinite = isinstance(kind, Quantity) and kind.infinite
 
     def take(value: object) -> object:
-        found = value if infinite and is_endless(value) else one.take(value)
+        found: Any = value if infinite and is_endless(value) else one.take(value)
         if fault := kind.fault(found):
             raise Unfit(value, words, sentence=fault, error=kind.error)
         return float(found) if one is PLAIN_KINDS[float] else found

@@ -157,8 +157,8 @@ class Solution(Whereabouts, Columns, metaclass=Open, kind="columns", bound=typed
         t = vector("t", t)
         outside = ~((t >= self.t[0]) & (t <= self.t[-1]))
         if outside.any():
-            span = f"from {self.t[0]:g} s to {self.t[-1]:g} s"
-            raise ConfigError(f"t = {t[outside][0]:g} s must be within the motion {span}.")
+            text = f"t = {t[outside][0]:g} s must be within the motion from {self.t[0]:g} s to"
+            raise ConfigError(f"{text} {self.t[-1]:g} s.")
         if self.t.size == 1:
             return self
         left = np.clip(np.searchsorted(self.t, t, side="right") - 1, 0, self.t.size - 2)
