@@ -302,9 +302,9 @@ def _turnable(F: Array) -> Array:
 def _refuse_many(n: int, energy: Any) -> None:
     if n > MAX_COORDINATES:
         memory, time = foreseen(n, energy.n_points)
-        text = f"{n} coordinates of loads and modes; more than {MAX_COORDINATES} are refused, they take"
-        takes = f"{memory / 1e9:.2g} GB and about {time / 60:.2g} minutes"
-        raise ResourceError(f"{text} {takes}.", hint="Name fewer loads, or ask for fewer modes.")
+        text = f"{n} coordinates of loads and modes are more than {MAX_COORDINATES} that are taken"
+        takes = f"they take {memory / 1e9:.2g} GB and about {time / 60:.2g} minutes"
+        raise ResourceError(f"{text}: {takes}.", hint="Name fewer loads, or ask for fewer modes.")
 
 
 def foreseen(n: int, n_points: int) -> tuple[float, float]:
