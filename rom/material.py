@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import Number, finite, number, positive
+from rom.arguments import Number, finite, number, orthonormal, positive
 from rom.errors import MaterialError, warn
 from rom.plausible import (
     FOAM_SPEED,
@@ -53,10 +53,8 @@ class Material:
         positive("rho", self.rho, error=MaterialError)
         number("nu", self.nu, error=MaterialError)
         if not -1.0 < self.nu < 0.5:
-            raise MaterialError(
-                f"nu = {self.nu:g} is outside (-1, 0.5): the strain energy would be negative.",
-                hint="Metals have 0.27 to 0.35.",
-            )
+            text = f"nu = {self.nu:g} is outside (-1, 0.5): the strain energy would be negative"
+            raise MaterialError(f"{text}; metals have 0.27 to 0.35.")
         warn(self.doubt)
 
     @classmethod
@@ -130,9 +128,7 @@ class Orthotropic:
             if name != "nu":
                 positive(name, lowest, error=MaterialError)
         positive("rho", self.rho, error=MaterialError)
-        axes = finite("axes", self.axes, None)
-        if axes.shape != (3, 3) or not np.allclose(axes @ axes.T, np.eye(3), atol=1e-9):
-            raise MaterialError("axes must be a (3, 3) matrix of orthonormal rows.")
+        orthonormal("axes", finite("axes", self.axes, None), error=MaterialError)
         lowest = np.linalg.eigvalsh(self._compliance()).min()
         if lowest <= 0:
             raise MaterialError(

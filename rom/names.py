@@ -89,10 +89,8 @@ def check_ending(path: str | Path, what: str, *endings: str) -> Path:
     """The path, if it has one of the endings that such a file is written with, usual one first."""
     path = Path(path)
     if path.suffix.lower() not in endings:
-        raise ConfigError(
-            f"{path}: {what} is written as {', '.join(endings)}.",
-            hint=f"Write {path.stem or 'name'}{endings[0]}.",
-        )
+        text = f"{path}: {what} is written as {', '.join(endings)}"
+        raise ConfigError(f"{text}; write {path.stem or 'name'}{endings[0]}.")
     return path
 
 
@@ -133,9 +131,30 @@ def check_once(names: Iterable[object], what: str, error: type[RomError] = Confi
         raise error(f"{what} {named(twice)} is given twice; use each once.")
 
 
+Error = type[RomError]
+
+
 def check_known(
-    name: object, known: Iterable[object], text: str, error: type[RomError] = ConfigError
+    name: object, known: Iterable[object], text: str, error: Error = ConfigError
 ) -> None:
     """Refuse a name that is not among those known, in a text that goes on with a list of them."""
     if name not in known:
         raise error(f"{text} {offered(known, name)}.")
+
+
+def check_all_known(
+    names: Iterable[object], known: Iterable[object], text: str, error: Error = ConfigError
+) -> None:
+    """Refuse names that are not among those known, in a text that goes on with them."""
+    known = list(known)
+    if unknown := [name for name in names if name not in known]:
+        raise error(f"{text} {named(unknown)}; there are {offered(known, unknown[0])}.")
+
+
+def check_complete(
+    names: Iterable[object], wanted: Iterable[object], text: str, error: Error = ConfigError
+) -> None:
+    """Refuse names without some that are wanted, in a text that goes on with these."""
+    there = list(names)
+    if missing := [name for name in wanted if name not in there]:
+        raise error(f"{text} {named(missing)}.")

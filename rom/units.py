@@ -151,10 +151,8 @@ def in_si(text: str, wanted: str) -> float:
     """
     match = NUMBER.match(text.strip()) if len(text) <= MAX_LETTERS else None
     if not match:
-        raise ConfigError(
-            f"{text[:MAX_LETTERS]!r} does not begin with a number.",
-            hint=f'Write a number and its unit, as in "2.5 {wanted}".',
-        )
+        what = f"{text[:MAX_LETTERS]!r} does not begin with a number"
+        raise ConfigError(f'{what}; write a number and its unit, as in "2.5 {wanted}".')
     symbol = text.strip()[match.end() :].strip()
     if symbol.startswith(","):
         raise ConfigError(f"{text!r}: a decimal point is needed, not a comma.")

@@ -5,12 +5,14 @@ are units and limits in annotations, `values` checks numbers, words, shapes and 
 """
 
 from rom.arguments.border import typed as typed
+from rom.arguments.border import typed_record as typed_record
 from rom.arguments.kinds import AnyBody as AnyBody
 from rom.arguments.kinds import AnyFamily as AnyFamily
 from rom.arguments.kinds import AnyMechanism as AnyMechanism
 from rom.arguments.kinds import AnySector as AnySector
 from rom.arguments.kinds import AnySolution as AnySolution
 from rom.arguments.quantities import Angle as Angle
+from rom.arguments.quantities import Ascending as Ascending
 from rom.arguments.quantities import AtLeast as AtLeast
 from rom.arguments.quantities import Between as Between
 from rom.arguments.quantities import Count as Count
@@ -28,16 +30,21 @@ from rom.arguments.quantities import Share as Share
 from rom.arguments.quantities import Size as Size
 from rom.arguments.quantities import Velocity as Velocity
 from rom.arguments.quantities import Whole as Whole
+from rom.arguments.values import ascending as ascending
 from rom.arguments.values import between as between
+from rom.arguments.values import check_places as check_places
 from rom.arguments.values import finite as finite
 from rom.arguments.values import is_number as is_number
 from rom.arguments.values import lowest as lowest
 from rom.arguments.values import matrix as matrix
 from rom.arguments.values import matrix33 as matrix33
+from rom.arguments.values import not_both as not_both
 from rom.arguments.values import not_negative as not_negative
 from rom.arguments.values import number as number
 from rom.arguments.values import one_each as one_each
+from rom.arguments.values import one_given as one_given
 from rom.arguments.values import one_of as one_of
+from rom.arguments.values import orthonormal as orthonormal
 from rom.arguments.values import positive as positive
 from rom.arguments.values import rows_at as rows_at
 from rom.arguments.values import shortened as shortened

@@ -17,6 +17,7 @@ from rom.errors import ConfigError, UnknownNameError
 from rom.plausible import USUAL, warn_outside
 
 Public = TypeVar("Public", bound=Callable[..., object])
+Record = TypeVar("Record")
 Given = tuple[object, ...]  # arguments by place
 Named = dict[str, object]  # and by name
 MAX_NEAR = 6  # names that are offered for an unknown one
@@ -60,6 +61,12 @@ def typed(public: Public) -> Public:
         elif isinstance(member, classmethod | staticmethod):
             setattr(public, name, type(member)(_typed_function(member.__func__)))
     return public
+
+
+def typed_record(record: type[Record]) -> type[Record]:
+    """Check the arguments of a constructor alone, of a record whose methods are asked in loops."""
+    setattr(record, "__init__", _typed_function(record.__init__))  # noqa: B010  not of one type
+    return record
 
 
 def _unknown(record: object, name: str) -> object:

@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rom.arguments.quantities import Quantity, Whole
-from rom.arguments.values import shortened
+from rom.arguments.values import is_endless, shortened
 from rom.errors import ConfigError, RomError
 
 MAX_NUMBER = 1e150  # the square of it is still a finite number
@@ -172,9 +172,10 @@ def _limited(kind: Quantity | Whole, taken: Taken | None) -> Taken:
     """Numbers of a shape and within limits; one that has a unit is a float."""
     one = taken or ANY_VALUE
     words = kind.words if isinstance(kind, Whole) else one.words
+    infinite = isinstance(kind, Quantity) and kind.infinite
 
     def take(value: object) -> object:
-        found = one.take(value)
+        found: Any = value if infinite and is_endless(value) else one.take(value)
         if fault := kind.fault(found):
             raise Unfit(value, words, sentence=fault, error=kind.error)
         return float(found) if one is PLAIN_KINDS[float] else found

@@ -6,6 +6,7 @@ be missing is ``Annotated[float, Positive("m")] | None``.
 """
 
 import math
+import reprlib
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -27,6 +28,8 @@ class Quantity:
     high: float = math.inf
     ends: str = "()"  # square ones where a limit itself is allowed
     error: type[RomError] = ConfigError  # of what a call raises for a number beyond the limits
+    infinite: bool = False  # whether it may be infinite, beside finite numbers
+    ascending: int = 0  # how many numbers a list has at least, each above the one before
 
     @property
     def summary(self) -> str:
@@ -42,8 +45,11 @@ class Quantity:
     @property
     def must(self) -> str:
         """What the limits ask for, as the rest of a sentence."""
+        if self.ascending:
+            return f"must be {self.ascending} or more numbers that ascend"
         if (self.low, self.high) == (0.0, math.inf):
-            return "must not be negative" if self.ends[0] == "[" else "must be positive"
+            sign = "must not be negative" if self.ends[0] == "[" else "must be positive"
+            return sign + " or infinite" * self.infinite
         low = f"{'at least' if self.ends[0] == '[' else 'above'} {self.low:.6g}"
         high = f"{'at most' if self.ends[1] == ']' else 'below'} {self.high:.6g}"
         words = [low] * math.isfinite(self.low) + [high] * math.isfinite(self.high)
@@ -52,7 +58,8 @@ class Quantity:
     def holds(self, x: float) -> bool:
         """Whether a number is within the limits."""
         above = x >= self.low if self.ends[0] == "[" else x > self.low
-        return above and (x <= self.high if self.ends[1] == "]" else x < self.high)
+        below = x <= self.high if self.ends[1] == "]" else x < self.high
+        return above and (below or (self.infinite and x == math.inf))
 
     def has_shape(self, found: tuple[int, ...]) -> bool:
         """Whether that is one of the shapes."""
@@ -68,6 +75,8 @@ class Quantity:
         if not self.has_shape(array.shape):
             shapes = " or ".join(str(shape).replace("None", "n") for shape in self.shapes)
             return f" has shape {array.shape}, needed is {shapes}."
+        if array.size < self.ascending or (self.ascending and not (np.diff(array) > 0).all()):
+            return f" = {reprlib.repr(array.tolist())} {self.must}."
         if not array.size or (self.holds(array.min()) and self.holds(array.max())):
             return ""
         wrong = next(x for x in array.flat if not self.holds(x))
@@ -107,14 +116,23 @@ def Number(unit: str = "1", *shapes: Shape) -> Quantity:
     return Quantity(unit, shapes or ((),))
 
 
-def Positive(unit: str = "1", *shapes: Shape, error: type[RomError] = ConfigError) -> Quantity:
+def Positive(
+    unit: str = "1", *shapes: Shape, error: type[RomError] = ConfigError, infinite: bool = False
+) -> Quantity:
     """Above zero."""
-    return Quantity(unit, shapes or ((),), 0.0, error=error)
+    return Quantity(unit, shapes or ((),), 0.0, error=error, infinite=infinite)
 
 
-def NotNegative(unit: str = "1", *shapes: Shape) -> Quantity:
+def NotNegative(
+    unit: str = "1", *shapes: Shape, error: type[RomError] = ConfigError, infinite: bool = False
+) -> Quantity:
     """Zero or more."""
-    return Quantity(unit, shapes or ((),), 0.0, ends="[)")
+    return Quantity(unit, shapes or ((),), 0.0, ends="[)", error=error, infinite=infinite)
+
+
+def Ascending(unit: str = "1", least: int = 2) -> Quantity:
+    """So many numbers or more, each above the one before."""
+    return Quantity(unit, ((None,),), ascending=least)
 
 
 def AtLeast(low: float, unit: str = "1") -> Quantity:

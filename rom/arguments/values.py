@@ -11,8 +11,17 @@ import numpy as np
 import numpy.typing as npt
 
 from rom import rotation
-from rom.arguments.quantities import Between, NotNegative, Positive, Quantity, Shape, Whole
+from rom.arguments.quantities import (
+    Ascending,
+    Between,
+    NotNegative,
+    Positive,
+    Quantity,
+    Shape,
+    Whole,
+)
 from rom.errors import ConfigError, QualityGateError, RomError
+from rom.names import named
 
 Array = npt.NDArray[np.float64]  # not from rom.model, whose records are checked here
 SHOWN_LENGTH = 60  # letters of a wrong value in a message
@@ -43,12 +52,15 @@ def lowest(n: int | None) -> slice:
     return slice(None if n is None else whole("n", n))
 
 
-def vector(name: str, value: object, n: int | None = None) -> Array:
+def vector(
+    name: str, value: object, n: int | None = None, *, error: type[RomError] = ConfigError
+) -> Array:
     """The value as (n,) finite numbers; without n as any number of them, one number alone too."""
-    array = finite(name, [value] if n is None and np.isscalar(value) else value, None)
+    given = [value] if n is None and np.isscalar(value) else value
+    array = finite(name, given, None, error=error)
     if array.ndim != 1 or not array.size or n not in (None, array.size):
         needed = "at least one number" if n is None else f"{n} numbers"
-        raise ConfigError(f"{name} has shape {array.shape}, needed is a row of {needed}.")
+        raise error(f"{name} has shape {array.shape}, needed is a row of {needed}.")
     return array
 
 
@@ -80,6 +92,23 @@ def symmetric(
         )
 
 
+def orthonormal(name: str, A: object, *, error: type[RomError] = ConfigError) -> Array:
+    """The value as a (3, 3) matrix whose rows are axes: of length one, at right angles."""
+    axes = finite(name, A, (3, 3), error=error)
+    if not np.allclose(axes @ axes.T, np.eye(3), atol=1e-9):
+        raise error(f"{name} = {axes.tolist()} must be a (3, 3) matrix of orthonormal rows.")
+    return axes
+
+
+def check_places(
+    name: str, at: npt.ArrayLike, n: int, *, error: type[RomError] = ConfigError
+) -> None:
+    """Refuse places, counted from 0, that are beyond those of n things."""
+    places = np.asarray(at).ravel()
+    if beyond := sorted(set(places[(places < 0) | (places >= n)].tolist())):
+        raise error(f"{name} {named(beyond)} must be from 0 to {n - 1}.")
+
+
 def rows_at(name: str, at: object, A: npt.NDArray[Any]) -> npt.NDArray[Any]:
     """(p, k) rows of A (n, k): at places (p,) that count from 0, or combined by (p, n) numbers."""
     wanted, n = finite(name, at, None), A.shape[0]
@@ -91,6 +120,11 @@ def rows_at(name: str, at: object, A: npt.NDArray[Any]) -> npt.NDArray[Any]:
             f"{name} = {shortened(at)} must be places from 0 to {n - 1}, or rows of {n}."
         )
     return A[wanted.astype(np.int64)]
+
+
+def is_endless(value: object) -> bool:
+    """Whether a value is infinite, and positive."""
+    return isinstance(value, Real) and not isinstance(value, bool) and value == math.inf
 
 
 def is_number(value: object) -> TypeGuard[float]:
@@ -109,6 +143,14 @@ def one_of(
     if isinstance(value, str) and value in known:
         return value
     raise error(f"{name} = {shortened(value)} is none of {', '.join(map(repr, known))}.")
+
+
+def ascending(name: str, value: object, least: int = 2) -> Array:
+    """The value as a row of so many finite numbers or more, each above the one before."""
+    x = finite(name, value, (None,))
+    if fault := Ascending(least=least).fault(x):
+        raise ConfigError(name + fault)
+    return x
 
 
 def finite(
@@ -135,6 +177,19 @@ def shape_words(shape: Shape) -> str:
     return str(shape).replace("None", "n")
 
 
+def one_given(of: str, **choices: object) -> None:
+    """Refuse anything but one of some arguments, None where they are not given."""
+    *most, last = choices
+    if sum(x is not None for x in choices.values()) != 1:
+        raise ConfigError(f"{of} needs exactly one of {', '.join(most)} and {last}.")
+
+
+def not_both(of: str, **choices: object) -> None:
+    """Refuse two arguments of which one is enough, None where they are not given."""
+    if sum(x is not None for x in choices.values()) > 1:
+        raise ConfigError(f"{of} takes {' or '.join(choices)}, not both.")
+
+
 def one_each(
     what: str, given: object, each: str, wanted: object, *, error: type[RomError] = ConfigError
 ) -> None:
@@ -149,14 +204,26 @@ def number(name: str, value: object, *, error: type[RomError] = ConfigError) -> 
     return float(finite(name, value, (), error=error))
 
 
-def positive(name: str, value: object, *, error: type[RomError] = ConfigError) -> float:
-    """The value as a finite positive float."""
-    return _limited(name, value, Positive(), error)
+def positive(
+    name: str,
+    value: object,
+    *,
+    error: type[RomError] = ConfigError,
+    infinite: bool = False,
+) -> float:
+    """The value as a positive float, finite or, where that is taken, infinite."""
+    return _limited(name, value, Positive(infinite=infinite), error)
 
 
-def not_negative(name: str, value: object, *, error: type[RomError] = ConfigError) -> float:
-    """The value as a finite float of zero or more."""
-    return _limited(name, value, NotNegative(), error)
+def not_negative(
+    name: str,
+    value: object,
+    *,
+    error: type[RomError] = ConfigError,
+    infinite: bool = False,
+) -> float:
+    """The value as a float of zero or more, finite or, where that is taken, infinite."""
+    return _limited(name, value, NotNegative(infinite=infinite), error)
 
 
 def between(
@@ -173,7 +240,7 @@ def between(
 
 
 def _limited(name: str, value: object, kind: Quantity, error: type[RomError]) -> float:
-    x = number(name, value, error=error)
+    x = math.inf if kind.infinite and is_endless(value) else number(name, value, error=error)
     if fault := kind.fault(x):
         raise error(name + fault)
     return x

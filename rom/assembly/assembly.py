@@ -23,7 +23,7 @@ from rom.body.flexible import FlexibleBody
 from rom.body.records import Marker, n_rigid_motions, still_motions
 from rom.errors import ConfigError, warn
 from rom.model import Array, Modes, Report
-from rom.names import check_known, named
+from rom.names import check_known, check_once, named
 from rom.rows import N_COMPARED, frequency_rows, row
 
 AT_MOST = "coordinates of the coupled interfaces"
@@ -59,15 +59,11 @@ class Assembly:
 
     def __post_init__(self) -> None:
         if self.projection is not None and not hasattr(self.projection, "functions"):
-            raise ConfigError(
-                f"projection = {self.projection!r} gives no functions of a surface.",
-                hint="Use for example rom.Polynomial(4).",
-            )
+            text = f"projection = {self.projection!r} gives no functions of a surface"
+            raise ConfigError(f"{text}; use for example rom.Polynomial(4).")
         if far := [name for name, body in self.bodies.items() if body.quartic is not None]:
-            raise ConfigError(
-                f"{named(far)} has the energy of large deflection, and an assembly is linear.",
-                hint="Reduce without nonlinear.",
-            )
+            text = f"{named(far)} has the energy of large deflection, and an assembly is linear"
+            raise ConfigError(f"{text}; reduce without nonlinear.")
         made = {name: body.provenance.get("reduction", {}) for name, body in self.bodies.items()}
         if own := [n for n, how in made.items() if "EnhancedCraigB" in str(how.get("method"))]:
             warn(
@@ -189,12 +185,7 @@ class Assembly:
     def _traces(self, n: int, fixed: tuple[Place, ...]) -> list[list[Array]]:
         """Per coupling, the interface motions that the modes of its two bodies ask for."""
         places = [place for coupling in self.couplings for place in coupling]
-        twice = sorted({place for place in places if places.count(place) > 1})
-        if twice:
-            raise ConfigError(
-                f"{twice[0]} is coupled {places.count(twice[0])} times.",
-                hint='level="local" needs every interface in one coupling; use level="system".',
-            )
+        check_once(places, 'level = "local", unlike "system", takes a place once:')
         coupled = list(dict.fromkeys(body for body, _ in places))
         parts = {name: self._partition(name, fixed) for name in coupled}
         most = max(part.lam.size for part in parts.values())

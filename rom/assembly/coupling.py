@@ -35,14 +35,11 @@ def coupled_rows(
     """
     rigid, differ = one.patch is None or other.patch is None, len(one.hold) != len(other.hold)
     if one.kind != other.kind or (rigid and differ):
-        raise InterfaceError(
-            f"{coupling[0]} is {one.kind} with {len(one.hold)} coordinates, {coupling[1]} is "
-            f"{other.kind} with {len(other.hold)}: they cannot move together.",
-            hint="Reduce both bodies with the same kind; on meshes that do not match, with "
-            "Polynomial of the same order.",
-        )
+        first = f"{coupling[0]} is {one.kind} with {len(one.hold)} coordinates"
+        text = f"{first}, {coupling[1]} is {other.kind} with {len(other.hold)}"
+        raise unlike(text)
     if rigid:
-        _refuse_gap(coupling, one.point - other.point, SAME_PLACE * size)
+        refuse_gap(coupling, one.point - other.point, SAME_PLACE * size)
         return one.hold, other.hold
     order = _same_nodes(one.patch, other.patch, SAME_PLACE * size)
     if order is None:
@@ -54,17 +51,12 @@ def coupled_rows(
         return projected_rows(one, other, projection)
     n, m = (marker.patch.points.shape[0] for marker in (one, other))
     if order is None:
-        raise InterfaceError(
-            f"{coupling[0]} has {n} nodes, {coupling[1]} has {m}, and they do not coincide: "
-            f"{one.kind} coordinates mean different motions on the two meshes.",
-            hint="Couple moments of common functions: Assembly(…, projection=rom.Polynomial(4)).",
-        )
-    raise InterfaceError(
-        f"{coupling[0]} and {coupling[1]} share {n} nodes, but each is reduced to functions of its "
-        "own: coupled node by node they would lock.",
-        hint="Reduce both with the same functions, or with full interfaces and reduce the "
-        "assembly: Assembly.reduced(…).",
-    )
+        text = f"{coupling[0]} has {n} nodes, {coupling[1]} has {m}, and they do not coincide."
+        hint = "Couple moments of common functions: Assembly(…, projection=rom.Polynomial(4))."
+        raise InterfaceError(text, hint=hint)
+    text = f"{coupling[0]} and {coupling[1]} share {n} nodes, but each is reduced to functions of"
+    hint = "Give both the same functions, or full interfaces to Assembly.reduced(…)."
+    raise InterfaceError(f"{text} its own: coupled node by node they would lock.", hint=hint)
 
 
 def projected_rows(one: Marker, other: Marker, projection: Any) -> tuple[Array, Array]:
@@ -143,13 +135,18 @@ def _equal_coordinates(
     return (one.hold, other.hold) if same else None
 
 
-def _refuse_gap(coupling: Coupling, between: Array, limit: float) -> None:
+def unlike(text: str) -> InterfaceError:
+    """The error of two interfaces of unlike coordinates, in a text that says which."""
+    hint = "Reduce both with the same kind; on meshes that do not match, with one Polynomial."
+    return InterfaceError(f"{text}: they cannot move together.", hint=hint)
+
+
+def refuse_gap(coupling: Coupling, between: Array, limit: float) -> None:
+    """Refuse two places that are farther apart [m] than round-off of their coordinates."""
     gap = float(np.linalg.norm(between))
     if gap > limit:
-        raise InterfaceError(
-            f"{coupling[0]} and {coupling[1]} lie {gap:.3g} m apart.",
-            hint="Model the bodies in the position in which they are assembled.",
-        )
+        text = f"{coupling[0]} and {coupling[1]} lie {gap:.3g} m apart"
+        raise InterfaceError(f"{text}; draw bodies in one frame, as they are assembled.")
 
 
 def _refuse_other_surface(coupling: Coupling, a: Patch, b: Patch) -> None:
@@ -157,14 +154,11 @@ def _refuse_other_surface(coupling: Coupling, a: Patch, b: Patch) -> None:
     extent = max(np.ptp(a.points, axis=0).max(), np.ptp(b.points, axis=0).max())
     weights = [np.asarray(p.surface_mass.sum(axis=1)).ravel() for p in (a, b)]
     centres = [w @ p.points / w.sum() for w, p in zip(weights, (a, b), strict=True)]
-    _refuse_gap(coupling, centres[0] - centres[1], SAME_SURFACE[0] * extent)
+    refuse_gap(coupling, centres[0] - centres[1], SAME_SURFACE[0] * extent)
     areas = [w.sum() for w in weights]
     if abs(areas[0] - areas[1]) > SAME_SURFACE[1] * max(areas):
-        raise InterfaceError(
-            f"{coupling[0]} has an area of {areas[0]:.4g}, {coupling[1]} of {areas[1]:.4g}: they "
-            "do not cover one surface.",
-            hint="Name exactly the surface of contact on both bodies.",
-        )
+        text = f"{coupling[0]} has an area of {areas[0]:.4g}, {coupling[1]} of {areas[1]:.4g}"
+        raise InterfaceError(f"{text}: they do not cover one surface; name it on both bodies.")
 
 
 def rows_of_parts(bodies: Mapping[str, Any]) -> list[Row]:

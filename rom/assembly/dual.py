@@ -29,7 +29,7 @@ import numpy as np
 from scipy.linalg import block_diag, eigh, null_space
 
 from rom.arguments import one_of, typed
-from rom.assembly.coupling import SAME_PLACE, Place, rows_of_parts
+from rom.assembly.coupling import SAME_PLACE, Place, refuse_gap, rows_of_parts, unlike
 from rom.checks.draft import COMPARISON_STAGE, Draft, run, wanted
 from rom.eigen.connection import Connection
 from rom.errors import InterfaceError
@@ -126,17 +126,10 @@ class DualAssembly:
         for one, other in self.couplings:
             sizes = [self._rows(place).size for place in (one, other)]
             if sizes[0] != sizes[1]:
-                raise InterfaceError(
-                    f"{one} has {sizes[0]} coordinates and {other} has {sizes[1]}: they cannot "
-                    "move together.",
-                    hint="Give both the same kind, on conforming meshes or with Polynomial.",
-                )
+                raise unlike(f"{one} has {sizes[0]} coordinates and {other} has {sizes[1]}")
             x, y = (self.bodies[body].origins[name] for body, name in (one, other))
-            if np.linalg.norm(x - y) > SAME_PLACE * max(np.linalg.norm(x), np.linalg.norm(y)):
-                raise InterfaceError(
-                    f"{one} and {other} lie {np.linalg.norm(x - y):.3g} m apart.",
-                    hint="Draw both in one frame, so that interfaces to be coupled coincide.",
-                )
+            size = max(np.linalg.norm(x), np.linalg.norm(y))
+            refuse_gap((one, other), x - y, SAME_PLACE * float(size))
 
     @cached_property
     def certificate(self) -> Report:
@@ -200,11 +193,8 @@ class DualAssembly:
         hard = np.linalg.eigvalsh(Gamma) < FLEXIBILITY_RTOL * whole  # no flexibility beside modes
         if kind == "dual":
             if hard.any():
-                raise InterfaceError(
-                    f"{np.count_nonzero(hard)} interface forces find no residual flexibility: the "
-                    "modes kept describe all of it, or couplings repeat each other.",
-                    hint="Ask for fewer modes.",
-                )
+                text = f"{np.count_nonzero(hard)} interface forces find no residual flexibility"
+                raise InterfaceError(f"{text}; ask for fewer modes, and couple no place twice.")
             K = np.block([[Lam, Psi.T], [Psi, -Gamma]])
             return K, block_diag(np.eye(len(Lam)), H)
         gamma, Q = np.linalg.eigh(Gamma)

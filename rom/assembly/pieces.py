@@ -25,7 +25,7 @@ from rom.body.flexible import FlexibleBody
 from rom.body.nonlinear.ranges import Geometric
 from rom.errors import ConfigError, InterfaceError, ModelError
 from rom.model import Array, FEModel, Mask, Report
-from rom.names import check_known, check_name, named, offered
+from rom.names import check_all_known, check_known, check_name, named
 from rom.reduction.bases.method import Method
 from rom.workflow import ENOUGH_MODES, reduce
 
@@ -85,13 +85,7 @@ class Pieces:
         if not hasattr(mech, "add_flexible"):
             raise ConfigError(f"mech = {mech!r:.60} is no Mechanism; give one of rom.Mechanism.")
         check_name(name, "a body")
-        allowed = ("at", "orientation", "velocity", "omega")
-        if unknown := [key for key in pose if key not in allowed]:
-            raise ConfigError(
-                f"pieces take no {named(unknown)}, but {offered(allowed)}: elastic coordinates "
-                "belong to each piece.",
-                hint="Add the bodies one by one.",
-            )
+        check_all_known(pose, ("at", "orientation", "velocity", "omega"), "pieces take no")
         added, pose_of = mech.add_flexible, self._pose_of
         parts = {k: added(f"{name} {k}", x, **pose_of(k, pose)) for k, x in self.bodies.items()}
         for joint, (one, other) in self.joints.items():
@@ -166,10 +160,8 @@ class Tree:
     def of(cls, models: Mapping[str, FEModel], reference: str) -> "Tree":
         """That of pieces which meet in interfaces of one name."""
         if len(models) < 2:
-            raise ConfigError(
-                f"{len(models)} pieces are no body cut into pieces.",
-                hint='Cut it: rom.fe.pieces("beam.geo", n=4, axis=(1, 0, 0), material=steel).',
-            )
+            hint = 'Cut it: rom.fe.pieces("beam.geo", n=4, axis=(1, 0, 0), material=steel).'
+            raise ConfigError(f"{len(models)} pieces are no body cut into pieces.", hint=hint)
         owners: dict[str, list[str]] = {}
         for key, model in models.items():
             for interface in model.interfaces:
@@ -189,19 +181,14 @@ class Tree:
                     continue
                 (there,) = (key for key in owners[interface] if key != here)
                 if there in found:
-                    raise ModelError(
-                        f"the pieces form a ring that closes at {interface!r}: which loads pass "
-                        "there depends on their stiffness.",
-                        hint="Reduce each by rom.reduce with loads of its own, and weld them.",
-                    )
+                    text = f"the pieces form a ring that closes at {interface!r}"
+                    hint = "Reduce each by rom.reduce with loads of its own, and weld them."
+                    raise ModelError(f"{text}: which loads pass there is unknown.", hint=hint)
                 found[there], joints[interface] = interface, (here, there)
                 waiting.append(there)
         if loose := [key for key in models if key not in found]:
-            raise InterfaceError(
-                f"piece {named(loose)} does not hang on that with {reference!r}: no interface has "
-                "the name of one of another piece.",
-                hint="Give the interfaces that meet one name in both models.",
-            )
+            text = f"piece {named(loose)} does not hang on that with {reference!r}"
+            raise InterfaceError(f"{text}; give interfaces that meet one name in both models.")
         return cls(found, joints)
 
     def beyond(self, joint: str) -> list[str]:
@@ -217,17 +204,11 @@ class Tree:
     ) -> dict[str, Geometric | None]:
         """{piece: the loads of the whole that reach it}, None for a piece that none reaches."""
         if geometric.fixed:
-            raise ConfigError(
-                f"fixed = {geometric.fixed!r}: with supports beside the reference, which loads "
-                "reach a piece depends on their stiffness.",
-                hint="Name as loads what the supports bear at most, and leave fixed out.",
-            )
+            text = f"fixed = {geometric.fixed!r}: not known with supports beside the reference"
+            raise ConfigError(f"{text}; name as loads what they bear at most, and leave fixed out.")
         if np.any(geometric.spin):
-            raise ConfigError(
-                f"spin = {geometric.spin!r}: which centrifugal force pulls at the sections of "
-                "pieces is not known.",
-                hint="Name that force as a load of the interface farthest out.",
-            )
+            text = f"spin = {geometric.spin!r}: which centrifugal force pulls where is not known"
+            raise ConfigError(f"{text}; name it as a load of the interface farthest out.")
         owner = {interface: key for key, model in models.items() for interface in model.interfaces}
         owner = {interface: key for interface, key in owner.items() if interface not in self.joints}
         for name in geometric.loads:

@@ -101,10 +101,7 @@ def _provenance(old: Provenance, f: Factors) -> Provenance:
 
 def _quartic(old: Quartic | Sampled, f: Factors) -> Quartic:
     if isinstance(old, Sampled):
-        raise ConfigError(
-            "a body of sampled elements has one unit system, that of its model.",
-            hint="Give the model its numbers in the units that you want.",
-        )
+        raise ConfigError("sampled elements have one unit system; give their model another one.")
     energy, q = f.force * f.length, f.length / f.shape
     return Quartic(
         old.K * (energy / q**2), old.cubic * (energy / q**3), old.quartic * (energy / q**4)
@@ -140,11 +137,8 @@ def _coordinates(body: BodyData, marker: Marker, f: Factors) -> Array:
         return np.full(n, f.length if marker.patch.shapes is None else f.length**2)
     if n == N_INTERFACE_COORDINATES:
         return np.asarray(f.length**SIX)
-    raise ModelError(
-        f"interface {marker.name!r} of body {body.name!r} has {n} coordinates of kind "
-        f"{marker.kind!r}, whose dimensions are not known: it cannot leave {body.units}.",
-        hint="Make the body in SI.",
-    )
+    text = f"interface {marker.name!r} of body {body.name!r} has {n} coordinates {marker.kind!r}"
+    raise ModelError(f"{text} of unknown dimensions in {body.units}; make the body in SI.")
 
 
 def _stress(stress: StressRecovery | CauchyRecovery, f: Factors) -> StressRecovery | CauchyRecovery:

@@ -336,10 +336,8 @@ class FlexibleBody(BodyData):
             ModelError: for a body of small deflection.
         """
         if self.quartic is None:
-            raise ModelError(
-                f"body {self.name!r} is one of small deflection.",
-                hint="Reduce it with nonlinear=rom.Geometric(...).",
-            )
+            text = f"body {self.name!r} is one of small deflection"
+            raise ModelError(f"{text}; reduce it with nonlinear=rom.Geometric(...).")
         return self.quartic
 
     def full_matrices(self) -> tuple[Array, Array]:

@@ -23,10 +23,7 @@ def on_mean_axes(body: Body) -> Body:
     if rests or body.quartic is not None:
         return body
     if OWN_FRAME in body.markers:
-        raise ConfigError(
-            f"body {body.name!r} has an interface {OWN_FRAME!r}, which is the name of its frame.",
-            hint="Give the interface another name.",
-        )
+        raise ConfigError(f"body {body.name!r}: an interface {OWN_FRAME!r} needs another name.")
     still = np.zeros((3, body.n_modes))
     hold = np.hstack([np.eye(6), np.zeros((6, body.n_modes))])
     own = Marker(OWN_FRAME, np.zeros(3), still, still, "rbe2", hold)
@@ -77,11 +74,8 @@ def _covariance(ops: Operators, interface: Interface, E: Array) -> Array:
 def moved_to(body: Body, reference: object) -> Body:
     """The body in another frame, with the elastic coordinates it has."""
     if body.quartic is not None:
-        raise ModelError(
-            f"body {body.name!r} of large deflection is seen from {body.reference!r} for good: "
-            "its shapes hold the second order of rotations about that.",
-            hint="Give rom.reduce the other reference.",
-        )
+        text = f"body {body.name!r} of large deflection is seen from {body.reference!r} for good"
+        raise ModelError(f"{text}; give rom.reduce the other reference.")
     X = reference_motion(body, reference)
     moved = moved_frame(body, X)
     stress = body.stress.moved(X) if isinstance(body.stress, StressRecovery) else None
@@ -100,11 +94,8 @@ def _on_normal_modes(body: Body) -> tuple[Body, Array]:
     """The body with its normal modes as elastic coordinates, q = V q_new, and V (r, r)."""
     smallest = np.linalg.eigvalsh(body.M).min(initial=np.inf)
     if smallest <= 0:
-        raise ModelError(
-            f"the elastic mass matrix has the eigenvalue {smallest:.3g}: the elastic coordinates "
-            "contain a rigid motion, which the floating frame already describes.",
-            hint="Choose a reference condition that stops all six rigid motions.",
-        )
+        text = f"the elastic mass matrix has the eigenvalue {smallest:.3g}, of a rigid motion"
+        raise ModelError(f"{text}; choose a reference condition that stops all six.")
     lam, V = eigh(body.K, body.M)
     omega = np.sqrt(np.maximum(lam, 0.0))
     V = V * np.sign(V[np.argmax(np.abs(V), axis=0), np.arange(V.shape[1])])

@@ -48,26 +48,19 @@ def elastic_part(ops: Operators, Psi: Array) -> Elastic:
     M, K = (scale[:, None] * A * scale for A in (M, K))
     M, K = (0.5 * (A + A.T) for A in (M, K))
     if np.linalg.eigvalsh(M)[0] < 1e-13:
-        raise ModelError(
-            "the basis has columns that depend on each other.",
-            hint="Ask for fewer modes, or remove an interface that repeats another.",
-        )
+        text = "the basis has columns that depend on each other"
+        raise ModelError(f"{text}; ask for fewer modes, or name each interface once.")
     R = orthonormal(ops, given_rigid_motions(ops))
     B = np.linalg.solve(M, scale[:, None] * ops.gram(Psi, ops.apply_M(R)))
     gap = R - Psi @ (scale[:, None] * B)
     residual = float(np.sqrt(np.diag(ops.gram(gap, ops.apply_M(gap))).max()))
     if residual > RIGID_RESIDUAL:
-        raise ModelError(
-            f"the basis misses a rigid motion by {residual:.1e}: the body could not move freely.",
-            hint="Hold interfaces that stop all rigid motions, or add rigid modes to the basis.",
-        )
+        text = f"the basis misses a rigid motion by {residual:.1e}"
+        raise ModelError(f"{text}; hold interfaces that stop all, or add rigid modes to the basis.")
     lam, V = modes_within(null_space(B.T @ M), K, M)
     if negative := np.count_nonzero(lam < -NEGATIVE_STIFFNESS_RTOL * lam.max(initial=0.0)):
-        raise ModelError(
-            f"{negative} shapes of the free body have negative stiffness: without its supports it "
-            "would buckle under the stress it carries.",
-            hint="Heat it less; rom.modes takes it with its supports held.",
-        )
+        text = f"{negative} shapes have negative stiffness: without its supports it would buckle"
+        raise ModelError(f"{text}; heat it less, or take rom.modes with its supports held.")
     return Elastic(scale[:, None] * V, np.sqrt(np.maximum(lam, 0.0)), scale[:, None] * B, residual)
 
 

@@ -160,11 +160,8 @@ class BodyData:
         """Refuse to hold unknown interfaces, or any of a basis of free-free modes alone."""
         held = supports(fixed, self.markers, f"body {self.name!r}")
         if held and not self.has_static_shapes:
-            raise ModelError(
-                f"body {self.name!r} has free-free modes only; with {named(held)} held its "
-                "frequencies would be tens of per cents too high.",
-                hint="Reduce with CraigBampton or Rubin, which know the interfaces.",
-            )
+            text = f"body {self.name!r} has free-free modes only; with {named(held)} held it is too"
+            raise ModelError(f"{text} stiff: reduce with CraigBampton or Rubin.")
 
     def held_rows(self, fixed: Fixed) -> Array:
         """(h, 6 + r) interface coordinates that supports hold, as in `Marker.hold`."""

@@ -46,10 +46,8 @@ class StressRecovery:
         found: Array = self.operator @ q
         if accelerations is not None:
             if self.inertial is None:
-                raise ConfigError(
-                    "the basis of the body does not tell the stress of the modes it left out.",
-                    hint="Reduce with CraigBampton and stress=True.",
-                )
+                text = "the basis does not tell the stress of the modes it left out"
+                raise ConfigError(f"{text}; reduce with CraigBampton and stress=True.")
             found = found + self.inertial @ np.asarray(accelerations, dtype=float)
         return found.reshape(-1, 6)
 
@@ -91,10 +89,8 @@ class StressRecovery:
 def with_elements(model: FEModel, what: str, otherwise: str = "") -> SurfaceMesh:
     """The surface of a model of finite elements, from which alone something follows."""
     if model.stresses is None or model.surface is None:
-        raise ConfigError(
-            f"the model has no finite elements, from which alone {what} follows.",
-            hint=f"Make it with rom.fe.model{otherwise}.",
-        )
+        text = f"the model has no finite elements, from which alone {what} follows"
+        raise ConfigError(f"{text}; make it with rom.fe.model{otherwise}.")
     return model.surface
 
 

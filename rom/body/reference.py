@@ -18,6 +18,7 @@ import numpy as np
 from rom.body.records import Body, BodyData, Marker, motion_of
 from rom.errors import ConfigError, ModelError
 from rom.model import Array
+from rom.names import named
 from rom.plausible import far_doubt
 from rom.rotation import crossed, skew
 
@@ -36,18 +37,14 @@ def reference_motion(body: BodyData, reference: object) -> Array:
         condition = _pins if len(reference) == 2 else _three_two_one
         from_rigid, from_shapes = condition([body.marker(x) for x in reference], body.n_modes)
     else:
-        raise ConfigError(
-            f"reference = {reference!r} is not a reference condition.",
-            hint=f'Use "mean-axis", "buckens", or one to three of {sorted(body.markers)}.',
-        )
+        known = f'"mean-axis", "buckens", or one to three of {sorted(body.markers)}'
+        raise ConfigError(f"reference = {reference!r} is not a reference condition: use {known}.")
     scale = np.r_[np.ones(3), np.full(3, 1 / body.size)]
     if np.linalg.cond(from_rigid * scale) > 1e12:
         distance = float(np.linalg.norm(body.first_moment)) / body.mass
         away = far_doubt(distance, body.size, "the body")
-        raise ModelError(
-            f"the reference condition {reference!r} leaves the frame undetermined.",
-            hint=away or "Pins must not coincide, three points not lie on one line.",
-        )
+        hint = away or "Pins must not coincide, three points not lie on one line."
+        raise ModelError(f"reference = {reference!r} leaves the frame undetermined.", hint=hint)
     return np.linalg.solve(from_rigid, from_shapes)
 
 
@@ -63,10 +60,7 @@ def _pins(points: list[Marker], r: int) -> tuple[Array, Array]:
     axis = second.point - first.point
     length = np.linalg.norm(axis)
     if length == 0.0:
-        raise ModelError(
-            f"pins {first.name!r} and {second.name!r} lie in the same point: no axis.",
-            hint="Name two pins that are apart, or one interface alone.",
-        )
+        raise ModelError(f"pins {first.name!r} and {second.name!r} lie in the same point.")
     axis = axis / length
     across = np.linalg.svd(axis[None])[2][1:]
     rigid, elastic = (
@@ -83,10 +77,7 @@ def _three_two_one(points: list[Marker], r: int) -> tuple[Array, Array]:
     normal = np.cross(axis, third.point - first.point)
     size = max(np.linalg.norm(axis), np.linalg.norm(third.point - first.point))
     if np.linalg.norm(normal) < 1e-9 * size**2 or size == 0.0:
-        raise ModelError(
-            f"the points {', '.join(repr(p.name) for p in points)} lie on one line.",
-            hint="Choose three interfaces that span a plane.",
-        )
+        raise ModelError(f"{named(p.name for p in points)} lie on one line; span a plane.")
     axis, normal = axis / np.linalg.norm(axis), normal / np.linalg.norm(normal)
     across = np.array([normal, np.cross(normal, axis)])
     rigid, elastic = (

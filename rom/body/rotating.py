@@ -26,19 +26,16 @@ def rotating_frequencies(
 ) -> Array:
     """(k,) frequencies [Hz] of a body in SI, as `FlexibleBody.rotating_frequencies` explains."""
     if body.quartic is not None:
-        raise ModelError(
-            f"body {body.name!r} is one of large deflection, which rotation bends and stretches "
-            "far: its frequencies are those about the state that it turns in.",
-            hint="Put it into a mechanism: rom.linearize(mech, rom.equilibrium(mech, spin=...)).",
-        )
+        text = f"body {body.name!r} is one of large deflection, which rotation bends and stretches"
+        raise ModelError(text, hint="Use rom.linearize(mech, rom.equilibrium(mech, spin=...)).")
     w, arm = speed * unit_vector("axis", axis), finite("at", at, (3,))
     if not fixed:
         raise ConfigError("a rotating body needs a support: name the interfaces in fixed=(...).")
     body.check_support(fixed)
     (first, directions), *others = supports(fixed, body.markers).items()
     if len(rows_held(body.marker(first), directions)) < len(body.marker(first).hold):
-        why = f"interface {first!r} is held in part; the first support turns the body."
-        raise ConfigError(why, hint="Name first what is held wholly.")
+        why = f"interface {first!r} is held in part; name first a support that turns the body."
+        raise ConfigError(why)
     if speed and not body.K_geo:
         warn(f"body {body.name!r} has no geometric stiffness: rotation softens it only.")
     seen = seen_from(body, first)  # in its frame the first support is at rest
@@ -103,10 +100,7 @@ def _frequencies(M: Array, K: Array, G: Array, culprit: str) -> Array:
     one, zero = np.eye(r), np.zeros((r, r))
     lam = eigvals(np.block([[zero, one], [-K, -G]]), np.block([[one, zero], [zero, M]]))
     if not np.isfinite(lam).all():
-        raise ModelError(
-            f"{culprit} has no vibrations: its mass is singular.",
-            hint="Look for a coordinate without mass, such as a node of a massless region.",
-        )
+        raise ModelError(f"{culprit} has a singular mass; look for a node of a massless region.")
     if lam.real.max(initial=0.0) > GROWTH_RATE_RTOL * np.abs(lam).max(initial=0.0):
         warn(
             f"{culprit} is unstable: rotation has used up its stiffness; motions that run away "

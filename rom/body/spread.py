@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import finite, typed
+from rom.arguments import finite, one_given, typed
 from rom.body.flexible import FlexibleBody
 from rom.body.surface import Where, chosen_triangles, surface_of
 from rom.errors import ConfigError, ModelError
@@ -63,8 +63,7 @@ def surface_load(
         ModelError: if the body has no surface, or one whose triangles do not tell inside from
             outside, which a pressure needs.
     """
-    if sum(x is not None for x in (pressure, traction, forces)) != 1:
-        raise ConfigError("exactly one of pressure, traction and forces must be given.")
+    one_given("a load", pressure=pressure, traction=traction, forces=forces)
     surface = surface_of(body)
     shapes = surface.shape.reshape(surface.points.shape[0], 3, -1)
     if forces is not None:
@@ -106,8 +105,5 @@ def _refuse_inside_out(name: str, triangles: Index) -> None:
     ends = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
     once, back = (np.unique(x, axis=0) for x in (ends, ends[:, ::-1]))
     if len(once) != len(ends) or not np.array_equal(once, back):
-        raise ModelError(
-            f"the triangles on body {name!r} do not tell its inside from its outside: a pressure "
-            "has no direction.",
-            hint="Give a traction or forces.",
-        )
+        text = f"the triangles on body {name!r} do not tell its inside from its outside"
+        raise ModelError(f"{text}: pressure has no direction; give a traction or forces.")

@@ -39,6 +39,7 @@ from rom.body.reference import (
 )
 from rom.errors import ConfigError
 from rom.model import Array
+from rom.names import check_known
 from rom.rotation import crossed
 
 ROUND_OFF = 1e-11  # of the largest displacement of second order
@@ -122,11 +123,8 @@ class SecondOrder:
 def _check(body: BodyData) -> None:
     known, r = known_loads(body), body.n_modes
     for load, A in body.K_geo.items():
-        if load not in known:
-            raise ConfigError(
-                f"body {body.name!r} has a geometric stiffness for the unknown load {load!r}.",
-                hint=f"Loads are {', '.join(known)}.",
-            )
+        text = f"body {body.name!r} has a geometric stiffness for the unknown load {load!r}; use"
+        check_known(load, known, text)
         A = np.asarray(A)
         name = f"the geometric stiffness {load!r} of body {body.name!r}"
         symmetric(name, matrix(name, A, (r, r)), 1e-9, error=ConfigError)

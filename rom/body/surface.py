@@ -18,10 +18,7 @@ MAX_TILT = 0.2  # sine of the angle between a strain gauge and the surface; face
 def surface_of(body: BodyData) -> Surface:
     """The surface of a body, which has to carry one."""
     if body.surface is None:
-        raise ModelError(
-            f"body {body.name!r} carries no surface: nothing to spread a load on.",
-            hint="Reduce a model that has one; imported matrices have none.",
-        )
+        raise ModelError(f"body {body.name!r} carries no surface; reduce a model that has one.")
     return body.surface
 
 
@@ -44,10 +41,8 @@ def chosen_triangles(body: BodyData, where: Where) -> tuple[Index, Array]:
     else:
         chosen = np.asarray(where(corners.mean(axis=1)))
     if chosen.shape != (len(corners),) or chosen.dtype != bool or not chosen.any():
-        raise ConfigError(
-            f"`where` chooses no triangle of the {len(corners)} on body {body.name!r}.",
-            hint="It takes (t, 3) points and returns (t,) booleans.",
-        )
+        text = f"`where` chooses no triangle of the {len(corners)} on body {body.name!r}"
+        raise ConfigError(f"{text}; it takes (t, 3) points and returns (t,) booleans.")
     a, b, c = np.moveaxis(corners[chosen], 1, 0)
     return triangles[chosen], 0.5 * np.cross(b - a, c - a)
 
@@ -78,11 +73,9 @@ def strain_rows(
         lies = np.flatnonzero(np.abs(normals @ d) <= MAX_TILT)
         far = _distances(x, corners[lies])
         if not lies.size or far.min() > reach:
-            raise ConfigError(
-                f"{what} {k} at {x.tolist()} along {d.round(4).tolist()} lies on no face of body "
-                f"{body.name!r} within {reach:.3g} m.",
-                hint="Strain is measured along the surface; compare axes and units with the mesh.",
-            )
+            text = f"{what} {k} at {x.tolist()} along {d.round(4).tolist()} lies on no face of body"
+            hint = "Strain is measured along the surface; compare axes and units with the mesh."
+            raise ConfigError(f"{text} {body.name!r} within {reach:.3g} m.", hint=hint)
         t = int(lies[far.argmin()])
         d = d - normals[t] * (normals[t] @ d)
         d = d / np.linalg.norm(d)
@@ -119,10 +112,8 @@ def _on_interface(body: BodyData, name: str) -> Mask:
     """(s,) whether the points of the surface belong to a deformable interface."""
     patch = body.markers[name].patch if name in body.markers else None
     if patch is None:
-        raise ConfigError(
-            f"body {body.name!r} has no deformable interface {name!r}.",
-            hint="Choose the place by a function of points.",
-        )
+        text = f"body {body.name!r} has no deformable interface {name!r}"
+        raise ConfigError(f"{text}; choose the place by a function of points.")
     surface = surface_of(body)
     grid = COINCIDENT_RTOL * max(float(np.ptp(surface.points, axis=0).max()), 1e-300)
     known = {tuple(x) for x in np.round(patch.points / grid / 100).astype(int)}

@@ -100,10 +100,8 @@ def changes(
         elif name in SPECIAL_KEYS and places is PLACES:
             found |= SPECIAL_KEYS[name](value)
         else:
-            raise ConfigError(
-                f"--{name.replace('_', '-')} does not go with a {TOML_SUFFIX} file.",
-                hint="Write it there.",
-            )
+            text = f"--{name.replace('_', '-')} does not go with a {TOML_SUFFIX} file"
+            raise ConfigError(f"{text}; write it there.")
     return found
 
 

@@ -85,10 +85,8 @@ def _sets(args: argparse.Namespace, names: list[str]) -> "dict[str, list[int] | 
         raise ConfigError(f"--set {', '.join(unused)} is no interface; name it by -i or --fixed.")
     remaining = tuple(name for name in names if name not in found)
     if remaining and args.nodes.suffix.lower() != ".inp":
-        raise ConfigError(
-            f"which nodes are the interface {named(remaining)}? {args.nodes} has no node sets.",
-            hint=f"For example --set {remaining[0]}=11-14,20.",
-        )
+        what = f"which nodes are the interface {named(remaining)}? {args.nodes} has no node sets"
+        raise ConfigError(f"{what}; for example --set {remaining[0]}=11-14,20.")
     return found | (read_node_sets(args.nodes, remaining) if remaining else {})
 
 

@@ -17,7 +17,7 @@ from typing import Annotated, Any
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import Number, Positive, is_number, typed
+from rom.arguments import Number, Positive, is_number, positive, typed
 from rom.errors import ConfigError, FileFormatError
 from rom.model import Array
 
@@ -54,11 +54,9 @@ class Table:
         known, values = np.asarray(self.t, dtype=float), np.asarray(self.values, dtype=float)
         for at in (np.min(t), np.max(t)):
             if not known[0] <= at <= known[-1]:
-                raise ConfigError(
-                    f"the history runs from {known[0]:g} s to {known[-1]:g} s; asked is "
-                    f"t = {at:g} s.",
-                    hint="Add points up to the end of the run, zeros after an earthquake.",
-                )
+                text = f"the history runs from {known[0]:g} s to {known[-1]:g} s; asked is"
+                hint = "Add points up to the end of the run, zeros after an earthquake."
+                raise ConfigError(f"{text} t = {at:g} s.", hint=hint)
         return np.interp(t, known, values)
 
 
@@ -74,11 +72,9 @@ def recorded(t: npt.ArrayLike, values: npt.ArrayLike) -> Table:
     times = np.asarray(t, dtype=float)
     usual, longest = float(np.median(np.diff(times))), int(np.argmax(np.diff(times)))
     if times[longest + 1] - times[longest] > MAX_GAP_RATIO * usual:
-        raise ConfigError(
-            f"the record has a gap from {times[longest]:g} s to {times[longest + 1]:g} s; samples "
-            f"are {usual:g} s apart elsewhere.",
-            hint="Fill the gap, or use Table if straight lines over it are meant.",
-        )
+        text = f"the record has a gap from {times[longest]:g} s to {times[longest + 1]:g} s"
+        hint = "Fill the gap, or use Table if straight lines over it are meant."
+        raise ConfigError(f"{text}; samples are {usual:g} s apart elsewhere.", hint=hint)
     return table
 
 
@@ -98,9 +94,8 @@ def read_record(path: str | Path, *, scale: float = 1.0) -> Table:
     except (OSError, ValueError) as error:
         raise FileFormatError(f"{path} is no record: {error}") from error
     if columns.shape[1] != 2:
-        raise FileFormatError(
-            f"{path} has {columns.shape[1]} columns.", hint="Write time and value."
-        )
+        text = f"{path} has {columns.shape[1]} columns."
+        raise FileFormatError(text, hint="Write time and value.")
     return recorded(columns[:, 0], scale * columns[:, 1])
 
 
@@ -123,8 +118,7 @@ def sine(
     Raises:
         ConfigError: if there is no such motion.
     """
-    if not cycles > 0:
-        raise ConfigError(f"cycles = {cycles} must be positive.")
+    positive("cycles", cycles, infinite=True)
 
     def values(t: Array) -> Array:
         turns = np.asarray(t) / period
@@ -154,25 +148,19 @@ def corners_of(name: str, pair: Pair, n: int = 1, *, rows: bool = False) -> tupl
     try:
         t, y = (np.asarray(x, dtype=float) for x in pair)
     except (TypeError, ValueError) as error:
-        raise ConfigError(
-            f"{name}: its history must be a number, a function, or a pair of times and values, "
-            "made of numbers."
-        ) from error
+        text = f"{name}: its history must be a number, a function, or a pair of times and values"
+        raise ConfigError(f"{text}, made of numbers.") from error
     if t.ndim != 1 or not t.size or y.shape[:1] != t.shape:
-        raise ConfigError(
-            f"{name}: times of the shape {t.shape} with values {y.shape}.",
-            hint="One value, or row of values, for each; functions are written for arrays.",
-        )
+        hint = "One value, or row of values, for each; functions are written for arrays."
+        raise ConfigError(f"{name}: times of the shape {t.shape} with values {y.shape}.", hint=hint)
     y = np.repeat(y[:, None], n, axis=1) if y.ndim == 1 and not rows else y
     if y.shape != (len(t), n):
         raise ConfigError(f"{name}: values {y.shape}, needed are {(len(t), n)}.")
     finite_rows = np.isfinite(t) & np.isfinite(y).all(axis=1)
     if not finite_rows.all():
         k = int(finite_rows.argmin())
-        raise ConfigError(
-            f"{name}: value {k} is {y[k].tolist()} at t = {t[k]:g} s, needed are finite numbers.",
-            hint="Records with gaps are not mended; fill them, or cut the record there.",
-        )
+        text = f"{name}: value {k} is {y[k].tolist()} at t = {t[k]:g} s, needed are finite numbers"
+        raise ConfigError(f"{text}; fill gaps of the record, or cut it there.")
     if not (np.diff(t) > 0).all():
         k = int(np.argmin(np.diff(t) > 0))
         raise ConfigError(f"{name}: times must grow: {t[k]} s comes before {t[k + 1]} s.")

@@ -150,7 +150,7 @@ def _points(entry: Entry) -> None:
     from rom.mbs.elements.formulas.lines import line_law, through_points
 
     x, values = entry.values["x"], entry.values["values"]
-    check_points(x, values, entry.place.at("x"), "lengths")
+    check_points(x, values, entry.place.at("x"))
     one, two = entry.ends
     force, potential = through_points(x, values, entry.values["interpolation"])
     line_law(entry.made, entry.name, one, two, force, potential)

@@ -77,7 +77,10 @@ def _quantity(kind: Quantity, value: object, place: Place) -> object:
     found = _shape(value)
     if found is None or not kind.has_shape(found):
         place.refuse(value, f": needed is a {kind.summary}")
-    return _number(kind, value, place)
+    numbers = _number(kind, value, place)
+    if kind.ascending and kind.fault(numbers):
+        place.refuse(value, f" {kind.must}")
+    return numbers
 
 
 def _number(kind: Quantity, value: object, place: Place) -> object:
@@ -90,7 +93,7 @@ def _number(kind: Quantity, value: object, place: Place) -> object:
         x = float(value) if abs(value) <= 1e300 else math.inf
     else:
         place.refuse(value, f" must be a {kind.summary}")
-    if not math.isfinite(x) or not kind.holds(x):
+    if not kind.holds(x):
         must = kind.must if math.isfinite(x) else "must be a finite number"
         place.refuse(value, f" {must}")
     return x

@@ -2,10 +2,9 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 
-from rom.arguments import Positive, Quantity
+from rom.arguments import Ascending, Positive, Quantity
 from rom.config.document import Values
 from rom.config.expressions import formula_kind
 from rom.config.keys import Either, Key, Kind, Place, Table, Variants, raise_mistakes, read_value
@@ -65,7 +64,7 @@ def law_kind(unit: str, variables: tuple[str, ...] = ("t",)) -> Kind:
             Key("mean", value, "Mean.", 0.0),
         ],
         "table": [
-            Key("t", Quantity("s", ((None,),)), "Times, ascending.", ...),
+            Key("t", Ascending("s"), "Times.", ...),
             Key("values", Quantity(unit, ((None,),)), "Values.", ...),
         ],
     }
@@ -135,12 +134,10 @@ def law_of(values: Any, place: Place, *, t_end: float | None = None, trust: bool
         from scipy.interpolate import CubicSpline
 
         t = values["t"]
-        check_points(t, values["values"], place, "times")
+        check_points(t, values["values"], place)
         if t_end is not None and not (t[0] <= 0.0 and t[-1] >= t_end):
-            raise place.error(
-                f"the points of {place.name} cover {t[0]:g} s to {t[-1]:g} s; "
-                f"the run needs 0 s to {t_end:g} s."
-            )
+            text = f"the points of {place.name} cover {t[0]:g} s to {t[-1]:g} s"
+            raise place.error(f"{text}; the run needs 0 s to {t_end:g} s.")
         spline = CubicSpline(np.array(values["t"]), np.array(values["values"]))
         return Law(spline, spline.derivative(1), spline.derivative(2))
     if kind == "harmonic":
@@ -167,9 +164,7 @@ def _harmonic(values: Values) -> Law:
     )
 
 
-def check_points(x: list[float], y: list[float], place: Place, what: str) -> None:
-    """Refuse points of a curve that do not ascend, or lack values."""
-    if len(x) != len(y) or len(x) < 2:
-        raise place.error(f"{place.name} needs two {what} or more, and as many values.")
-    if any(b <= a for a, b in pairwise(x)):
-        raise place.error(f"the {what} of {place.name} must ascend.")
+def check_points(x: list[float], y: list[float], place: Place) -> None:
+    """Refuse points of a curve that lack values."""
+    if len(x) != len(y):
+        raise place.error(f"{place.name} needs as many values, not {len(y)} for {len(x)}.")

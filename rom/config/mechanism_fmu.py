@@ -67,10 +67,8 @@ def write_mechanism_fmu(
     simulation = file.values["simulation"]
     step = simulation.get("dt") if dt is None else dt
     if step is None:
-        raise ConfigError(
-            f"{file.document.path} gives no dt, which an FMU needs.",
-            hint="Add dt to [simulation], or --dt on the command line.",
-        )
+        what = f"{file.document.path} gives no dt, which an FMU needs"
+        raise ConfigError(f"{what}; add dt to [simulation], or --dt on the command line.")
     _refuse_ends(file)
     made = file.mechanism()
     with scratch("fmu") as folder:

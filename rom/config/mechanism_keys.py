@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any, NamedTuple
 
-from rom.arguments import NotNegative, Number, Positive, Quantity, shortened
+from rom.arguments import Ascending, NotNegative, Number, Positive, Quantity, shortened
 from rom.config.declared import Declared
 from rom.config.expressions import FormulaTable, formula_keys, formula_kind
 from rom.config.keys import (
@@ -153,7 +153,7 @@ ALONG_LINE = (
 CURVES = "Nowhere beyond neighbours, or of continuous curvature."
 POINTS = (
     BETWEEN,
-    Key("x", Quantity("m", ((None,),)), "Lengths, ascending.", ...),
+    Key("x", Ascending("m"), "Lengths.", ...),
     Key("values", Quantity("N", ((None,),)), "Forces there.", ...),
     Key("interpolation", Text(("monotone", "cubic")), CURVES, "monotone"),
 )

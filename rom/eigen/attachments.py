@@ -26,10 +26,8 @@ def point_masses(attachment: Attachment, origin: Array) -> tuple[Array, Array]:
     positive(f"mass of the attachment on {attachment.interface!r} [kg]", m, error=MaterialError)
     second, axes = np.linalg.eigh(0.5 * np.trace(J) * np.eye(3) - J)  # integral of rho x x^T
     if J.shape != (3, 3) or second.min() < -1e-9 * max(second.max(), 1e-300):
-        raise MaterialError(
-            f"attachment on {attachment.interface!r}: no body has this inertia; "
-            "each principal moment must be at most the sum of the two others."
-        )
+        text = f"attachment on {attachment.interface!r}: no body has this inertia; each principal"
+        raise MaterialError(f"{text} moment must be at most the sum of the two others.")
     arms = axes * np.sqrt(3 * np.maximum(second, 0.0) / m)
     return at + np.vstack([arms.T, -arms.T]), np.full(6, m / 6)
 

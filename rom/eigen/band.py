@@ -10,11 +10,11 @@ from rom.arguments import between, positive
 from rom.eigen.held import HeldBody
 from rom.eigen.lanczos import capacity
 from rom.eigen.scipy import SciPyOperators, SymmetricLU
-from rom.eigen.search import dof_set
+from rom.eigen.search import dof_set, missed
 from rom.eigen.verbs import Matrix, column_blocks
-from rom.errors import ModesMissedError, ParallelError, ResourceError, SolverError
+from rom.errors import ParallelError, SolverError
 from rom.model import Array, Modes
-from rom.process.memory import free_bytes
+from rom.process.memory import check_memory, free_bytes
 
 COUNT_RATIO = 1.0137  # where eigenvalues are counted, over the last one asked for
 ROUND_OFF = 1e-13  # of the last eigenvalue: what sums over the dofs leave uncertain
@@ -65,10 +65,8 @@ def modes_up_to(ops: Any, held: Any, f_max: float, tol: float) -> Modes:
     between("tol", tol, 0, 1, "()")
     last = (2 * np.pi * positive("f_max", f_max)) ** 2
     if ops.n_local != ops.n:
-        raise ParallelError(
-            "modes up to a frequency are computed in one process.",
-            hint="Ask for a number of modes, or run without mpirun.",
-        )
+        text = "modes up to a frequency are computed in one process"
+        raise ParallelError(f"{text}; ask for a number of modes, or run without mpirun.")
     made = isinstance(held, HeldBody)
     support: Any = held if made else dof_set(held, ops.n)
     still = 0 if made or support.size or ops.rigid is None else ops.rigid.shape[1]
@@ -82,30 +80,20 @@ def modes_up_to(ops: Any, held: Any, f_max: float, tol: float) -> Modes:
             SciPyOperators(K, M, ops.rigid), () if still else support.held, f_max, tol
         )
     need, there = 8.0 * body.n * (2 * capacity(n_below) + 3 * n_below), free_bytes()
-    if need > there:  # of the space of the search
-        raise ResourceError(
-            f"finding {n_below} modes of {body.n} dofs takes {need / 2**30:.3g} GiB; "
-            f"{there / 2**30:.3g} GiB are free.",
-            hint="Ask for modes up to a lower frequency, or use a coarser mesh.",
-        )
+    hint = "Ask for modes up to a lower frequency, or use a coarser mesh."
+    check_memory(f"finding {n_below} modes of {body.n} dofs", need, there, hint)
     omega, Phi = ops.modes(support, n_below, finished=not made)
     lam = omega[still:] ** 2
     n_found = still + int(np.count_nonzero(lam < rho))
     if n_found != n_below:
-        raise ModesMissedError(
-            f"{n_found} modes were found below {np.sqrt(rho) / (2 * np.pi):.6g} Hz, but "
-            f"the inertia of K - sigma M counts {n_below}.",
-            hint="Change f_max a little.",
-        )
+        raise missed(n_found, rho, n_below, "Change f_max a little.")
     lower = lehmann_bounds(lam, _residual(body, lam, Phi[mine, still:]), rho)
     lower -= ROUND_OFF * rho + STIFF_ROUND_OFF * body.largest()
     m = int(np.count_nonzero(lower <= last))
     error = 1.0 - np.sqrt(np.maximum(lower[:m], 0.0) / lam[:m])
     if (worst := error.max(initial=0.0)) > tol:
-        raise SolverError(
-            f"the frequencies up to {f_max:g} Hz are known within {worst:.2g} only.",
-            hint=f"Allow a larger error than tol = {tol:g}.",
-        )
+        text = f"the frequencies up to {f_max:g} Hz are known within {worst:.2g} only."
+        raise SolverError(text, hint=f"Allow a larger error than tol = {tol:g}.")
     return Modes(omega[: still + m], Phi[:, : still + m], error=np.r_[np.zeros(still), error])
 
 

@@ -51,10 +51,8 @@ class Condensed:
             U = U[:, size > LEAST_PART * size[0]]
             S = S + U @ U.T  # rigid motions cost nothing; loads in balance do not feel this
         if free.size and eigh(S, eigvals_only=True, subset_by_index=(0, 0))[0] < LEAST_STIFFNESS:
-            raise InterfaceError(
-                "the supports leave a motion of the interfaces without stiffness.",
-                hint="Hold one interface more, or one that can carry moments.",
-            )
+            text = "the supports leave a motion of the interfaces without stiffness"
+            raise InterfaceError(f"{text}; hold one more, or one that can carry moments.")
         return Supported(self, dofs, free, scale, cho_factor(S) if free.size else None)
 
 

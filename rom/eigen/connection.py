@@ -52,11 +52,8 @@ class Connection:
         dK = csr_matrix((ops.n_local, ops.n))
         for name, k in stiffness.items():
             if self.ties[name].label not in SIX_KINDS:
-                raise InterfaceError(
-                    f"interface {name!r} has the kind {self.ties[name].label!r}; a spring acts on "
-                    "six coordinates.",
-                    hint='Give it the kind "rbe2" or "rbe3".',
-                )
+                text = f"interface {name!r} has the kind {self.ties[name].label!r}; a spring acts"
+                raise InterfaceError(f'{text} on six coordinates: give it "rbe2" or "rbe3".')
             dK = dK + coupled(dK.shape, ops.first, self.boundary[self.parts[name]], k)
         return replace(self, ops=ops.on_springs(dK))
 

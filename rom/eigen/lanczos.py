@@ -60,10 +60,8 @@ class BlockLanczos:
                 if self._converged():
                     return
             self._restart()
-        raise SolverError(
-            f"{self.k} modes did not converge in {MAX_RESTARTS} restarts.",
-            hint="Ask for fewer modes, or check the mesh for cells of extreme shape.",
-        )
+        hint = "Ask for fewer modes, or check the mesh for cells of extreme shape."
+        raise SolverError(f"{self.k} modes did not converge in {MAX_RESTARTS} restarts.", hint=hint)
 
     def pairs(self) -> tuple[Array, Array]:
         """The k eigenvalues next to the shift, ascending, and their mass-normalised modes."""

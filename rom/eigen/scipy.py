@@ -121,11 +121,8 @@ class SciPyOperators(ModeSearch):
             raise ConfigError(f"K is {self.K.shape} and M is {self.M.shape}; they must be equal.")
         diagonal = self.M.diagonal()
         if (massless := np.flatnonzero(diagonal <= 0.0)).size:
-            raise QualityGateError(
-                f"M has {diagonal[massless[0]]:.3g} on the diagonal of dof {massless[0]}; every "
-                "dof needs a positive mass.",
-                hint="Condense dofs without mass statically before you reduce.",
-            )
+            text = f"M has {diagonal[massless[0]]:.3g} on the diagonal of dof {massless[0]}"
+            raise QualityGateError(f"{text}; condense dofs without mass before you reduce.")
         self.n = self.n_local = self.K.shape[0]
         self.rigid, self.T, self.fixed = rigid, T, np.sin(1.0 + np.arange(self.n))
 
@@ -228,8 +225,7 @@ class SciPyOperators(ModeSearch):
 
 def _symmetric(name: str, A: Matrix) -> csr_matrix:
     A = csr_matrix(matrix(name, A), dtype=float)
-    if A.shape[0] != A.shape[1]:
-        raise ConfigError(f"{name} has the shape {A.shape}; it must be square.")
+    matrix(name, A, (A.shape[0], A.shape[0]))
     wrong = np.flatnonzero(~np.isfinite(A.data))
     if wrong.size:
         bad = int(np.searchsorted(A.indptr, wrong[0], side="right")) - 1

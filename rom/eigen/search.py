@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import LinAlgError, eigh, eigvalsh
 
-from rom.arguments import whole
+from rom.arguments import check_places, whole
 from rom.eigen.completeness import gaussian_block
 from rom.eigen.condensed import Supported
 from rom.eigen.held import RIGID_RTOL, HeldBody
@@ -28,9 +28,9 @@ from rom.eigen.verbs import (
     orthonormal,
     own_rows,
 )
-from rom.errors import ConfigError, ModelError, ModesMissedError, QualityGateError, SolverError
+from rom.errors import ModelError, ModesMissedError, QualityGateError, SolverError
 from rom.model import Array, Index, Mask
-from rom.names import named
+from rom.names import check_once
 from rom.process.stopwatch import SEARCH_PIECE, piece
 
 N_SPARE_MODES = 3  # beyond the ones asked for, so that a gap for counting is found
@@ -191,11 +191,9 @@ class ModeSearch(Searched):
     def _refuse_mechanisms(self, lam: Array, Phi: Array, n_rigid: int) -> None:
         loose = self._at_rest(Phi, lam)
         if n_rigid and loose.any():
-            raise ModelError(
-                f"at least {loose.sum()} more motions without stiffness than the six of a "
-                f"connected body.{self.where(Phi[:, loose])}",
-                hint="Parts of the mesh are not connected, or joined at a point or an edge only.",
-            )
+            text = f"at least {loose.sum()} more motions without stiffness than the six"
+            hint = "Parts of the mesh are not connected, or joined at a point or an edge only."
+            raise ModelError(f"{text} of a connected body.{self.where(Phi[:, loose])}", hint=hint)
 
     def _all_at_once(self, m: int, beside: int) -> bool:
         """Whether a space for m modes would be the whole of a small body."""
@@ -249,11 +247,7 @@ class ModeSearch(Searched):
             lam, Phi = np.concatenate([lam, more]), np.hstack([Phi, Psi])
             order = np.argsort(lam, kind="stable")
             lam, Phi = lam[order], Phi[:, order]
-        raise ModesMissedError(
-            f"{found} modes were found below {np.sqrt(sigma) / (2 * np.pi):.6g} Hz, "
-            f"but the inertia of K - sigma M counts {number}.",
-            hint="Ask for more modes, or give another shift sigma.",
-        )
+        raise missed(found, sigma, number, "Ask for more modes, or give another shift sigma.")
 
     def all_modes(self) -> tuple[Array, Array]:
         """All eigenpairs of a small body, solved densely on every rank."""
@@ -344,13 +338,15 @@ def estimated_by_iteration(ops: Searched, factor: Factor, R: Array) -> float:
     return float(elastic.min() if elastic.size else ALL_LOOSE_RATIO * floor.max())
 
 
+def missed(found: int, sigma: float, number: int | None, cure: str) -> ModesMissedError:
+    """The error of modes found below a shift [rad^2/s^2] that the inertia counts otherwise."""
+    text = f"{found} modes were found below {np.sqrt(abs(sigma)) / (2 * np.pi):.6g} Hz"
+    return ModesMissedError(f"{text}, but the inertia of K - sigma M counts {number}.", hint=cure)
+
+
 def dof_set(dofs: npt.ArrayLike, n: int) -> Index:
     """Dof numbers as given, checked: distinct, within 0..n-1."""
     b = np.asarray(dofs, dtype=np.int64).ravel()
-    if b.size and (b.min() < 0 or b.max() >= n):
-        outside = named(b[(b < 0) | (b >= n)].tolist())
-        raise ConfigError(f"boundary dof {outside} must be from 0 to {n - 1}.")
-    if np.unique(b).size != b.size:
-        twice = named(np.flatnonzero(np.bincount(b) > 1).tolist())
-        raise ConfigError(f"boundary dof {twice} must be listed only once.")
+    check_places("boundary dof", b, n)
+    check_once(b.tolist(), "boundary dof")
     return b

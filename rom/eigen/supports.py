@@ -10,7 +10,7 @@ from rom.arguments import finite, shortened
 from rom.eigen.verbs import Operators, held_rows
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, Index, Interface
-from rom.names import named, offered
+from rom.names import check_all_known, check_once
 
 # names of interfaces held wholly or "name:directions"; or {name: directions}
 Fixed = tuple[str, ...] | Mapping[str, str]
@@ -35,19 +35,10 @@ def supports(fixed: Fixed, known: Iterable[str], owner: str = "the model") -> Su
         pairs = [(str(name), str(words)) for name, words in fixed.items()]
     else:
         pairs = [_pair(name, known) for name in fixed]
-    if unknown := [name for name, _ in pairs if name not in known]:
-        raise InterfaceError(
-            f"{owner} has no interface {named(unknown)}; it has {offered(known)}.",
-            hint="Interfaces are the named physical surfaces of the geometry.",
-        )
-    found: Supports = {}
-    for name, words in pairs:
-        if name in found:
-            raise ConfigError(
-                f"fixed: {name!r} is held twice.", hint="Say all its directions once."
-            )
-        found[name] = () if words is WHOLE_WORD else _directions(name, words)
-    return found
+    names = [name for name, _ in pairs]
+    check_all_known(names, known, f"{owner} has no interface", InterfaceError)
+    check_once(names, "fixed:")
+    return {x: () if words is WHOLE_WORD else _directions(x, words) for x, words in pairs}
 
 
 def _pair(word: str, known: list[str]) -> tuple[str, str]:
@@ -59,11 +50,8 @@ def _pair(word: str, known: list[str]) -> tuple[str, str]:
 def _directions(name: str, words: str) -> tuple[str, ...]:
     found = DIRECTION_PATTERN.findall(words)
     if not found or DIRECTION_PATTERN.sub("", words).strip(" ,") or len(set(found)) < len(found):
-        raise ConfigError(
-            f"fixed: {name!r} is held in {shortened(words)}; directions are some of "
-            f"{', '.join(DIRECTIONS)}, each once.",
-            hint='For example {"root": "yz"} for a support that slides along x.',
-        )
+        text = f"fixed: {name!r} is held in {shortened(words)}; directions are some of"
+        raise ConfigError(f'{text} {", ".join(DIRECTIONS)}, each once, as in {{"root": "yz"}}.')
     return tuple(found)
 
 
@@ -76,10 +64,8 @@ def held_coordinates(name: str, kind: str, n: int, directions: tuple[str, ...]) 
     turns = [direction for direction in directions if direction not in "xyz"]
     if turns or not kind.startswith(BY_AXIS):
         what = f"no rotation {turns[0]}" if turns else "coordinates without direction"
-        raise InterfaceError(
-            f"interface {name!r} has the kind {kind!r} and {what} to hold.",
-            hint='Give it six coordinates: interfaces={...: "rbe2"} or "rbe3".',
-        )
+        text = f"interface {name!r} has the kind {kind!r} and {what} to hold"
+        raise InterfaceError(f'{text}; give it the kind "rbe2" or "rbe3".')
     axis = ["xyz".index(direction) for direction in directions]
     return np.flatnonzero(np.isin(np.arange(n) % 3, axis))
 
@@ -98,9 +84,7 @@ def spring_matrices(springs: Springs | None, known: Iterable[str], owner: str) -
     for name, value in (springs or {}).items():
         k = finite(f"springs[{name!r}]", value, None)
         if k.shape not in ((3,), (6,), (6, 6)):
-            raise ConfigError(
-                f"springs[{name!r}] has the shape {k.shape}: it takes 3 or 6 numbers, or 6 x 6."
-            )
+            raise ConfigError(f"springs[{name!r}] {k.shape} must be 3 or 6 numbers, or 6 x 6.")
         k = np.diag(np.pad(k, (0, 6 - k.size))) if k.ndim == 1 else k
         lam = np.linalg.eigvalsh(0.5 * (k + k.T))
         uneven = np.abs(k - k.T).max() > 1e-10 * np.abs(k).max()
@@ -133,11 +117,8 @@ def refuse_loose(ops: Operators, held: Index) -> None:
     squares, V = np.linalg.eigh(ops.gram(R, R))
     free = T @ V[:, squares < LOOSE_RTOL * squares[-1]]
     if free.shape[1]:
-        raise InterfaceError(
-            f"the supports leave {free.shape[1]} of six motions to the body as a whole: it "
-            f"{_described(_simple(free, np.abs(T[3:]).max()))}.",
-            hint="Hold more; a reduced body counts such motions as zeros.",
-        )
+        text = f"supports leave {free.shape[1]} of six motions to the body as a whole; hold more"
+        raise InterfaceError(f"{text}: it {_described(_simple(free, np.abs(T[3:]).max()))}.")
 
 
 def _simple(free: Array, turn: float) -> Array:

@@ -344,10 +344,8 @@ def given_rigid_motions(ops: Operators) -> Array:
         ModelError: if its operators were made without geometry.
     """
     if ops.rigid is None:
-        raise ModelError(
-            "the operators of the model do not know its rigid motions.",
-            hint="Make them with rigid=rom.eigen.verbs.rigid_motions(points).",
-        )
+        hint = "Make them with rigid=rom.eigen.verbs.rigid_motions(points)."
+        raise ModelError("the operators of the model do not know its rigid motions.", hint=hint)
     return ops.rigid
 
 
@@ -386,6 +384,13 @@ def pins(motions: Array) -> Index:
     return np.sort(order[: np.count_nonzero(size > DEPENDENT_RTOL * size[0])]).astype(np.int64)
 
 
+def on_a_line(interface: Interface) -> InterfaceError:
+    """The error of an interface that does not know its rotation."""
+    text = f"the {interface.nodes.size} nodes of interface {interface.name!r} lie on a line"
+    hint = "Choose a surface with an area, or hold another interface."
+    return InterfaceError(f"{text} or in one point: its rotation is undetermined.", hint=hint)
+
+
 def mean_motion(interface: Interface) -> Array:
     """(6, 3k) translation [1] and rotation [1/m] of a surface, least squares over its area.
 
@@ -402,11 +407,7 @@ def mean_motion(interface: Interface) -> Array:
     gram = R.T @ SR
     spectrum = np.linalg.eigvalsh(gram)
     if not spectrum[0] > ON_A_LINE * spectrum[-1]:
-        raise InterfaceError(
-            f"the {interface.nodes.size} nodes of interface {interface.name!r} lie on a line or in "
-            "one point: its rotation is undetermined.",
-            hint="Choose a surface with an area.",
-        )
+        raise on_a_line(interface)
     return np.linalg.solve(gram, SR.T) / np.r_[np.ones(3), np.full(3, size)][:, None]
 
 

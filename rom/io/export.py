@@ -125,10 +125,8 @@ def format_of(path: str | Path, to: str | None = None) -> str:
     ending = Path(path).suffix.lower()
     endings = {known: name for name, (known, _) in FORMATS.items() if known}
     if ending not in endings:
-        raise ConfigError(
-            f"{path} has the ending {ending!r}; known: {', '.join(sorted(endings))}.",
-            hint=f"Or name a format: {', '.join(FORMATS)}.",
-        )
+        text = f"{path} has the ending {ending!r}; known: {', '.join(sorted(endings))}"
+        raise ConfigError(f"{text}; or name a format: {', '.join(FORMATS)}.")
     return endings[ending]
 
 

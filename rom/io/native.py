@@ -83,10 +83,8 @@ def _check_numbers(manifest: dict[str, Any], arrays: dict[str, Array]) -> None:
 def body_arrays(body: FlexibleBody) -> dict[str, Array]:
     """The arrays of a body by their names in the file."""
     if isinstance(body.quartic, Sampled):
-        raise ConfigError(
-            f"body {body.name!r} has the energy of sampled elements, which no file holds.",
-            hint="Reduce it where it is used, or leave sampling out.",
-        )
+        text = f"body {body.name!r} has the energy of sampled elements, which no file holds"
+        raise ConfigError(f"{text}; reduce it where it is used, or leave sampling out.")
     arrays = _parts("", body, (*FIELDS, "mass"))
     arrays |= {f"K_geo/{name}": A for name, A in body.K_geo.items()}
     arrays |= _parts("quartic/", body.quartic, QUARTIC_ARRAYS)

@@ -68,10 +68,8 @@ def check_replaceable(
             if SAME_KIND.get(kind, kind) in FILE_SIGNS
             else f"files of the kind {kind} do not tell who has written them"
         )
-        raise ConfigError(
-            f"{path} is there already, and {what}.",
-            hint="Choose another name, or replace it with --force.",
-        )
+        text = f"{path} is there already, and {what}"
+        raise ConfigError(f"{text}; choose another name, or replace it with --force.")
     return path
 
 

@@ -262,10 +262,8 @@ class Mechanism(Methods, metaclass=Open, kind="methods", bound=bound):
         """
         self.check_new(name)
         if not isinstance(element, family.record):
-            raise ConfigError(
-                f"element = {element!r} of {name!r} must be of type {family.record.__name__}, as "
-                f"all {family.name}."
-            )
+            wanted = f"of type {family.record.__name__}, as all {family.name}"
+            raise ConfigError(f"element = {element!r} of {name!r} must be {wanted}.")
         ends = family.ends(element)
         self.check_markers(name, *ends)
         for marker in ends if len(ends) > 1 else ():  # a load acts at a place in space
@@ -374,7 +372,5 @@ class Mechanism(Methods, metaclass=Open, kind="methods", bound=bound):
         """
         self.check_markers(name, m1, m2)
         if m1.body == m2.body:
-            raise ConfigError(
-                f"{name!r} connects body {m1.body!r} with itself.",
-                hint="Give a marker of another body, such as mech.ground.marker((0, 0, 0)).",
-            )
+            text = f"{name!r} connects body {m1.body!r} with itself"
+            raise ConfigError(f"{text}; give another one, such as mech.ground.marker((0, 0, 0)).")

@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
+from rom.errors import ResourceError
+
 NO_LIMIT = 1 << 60
 CONTROL_GROUPS = Path("/sys/fs/cgroup")
 GROUP_FILES = (  # limit, use, and the line of memory.stat with what is given back when asked for
@@ -29,6 +31,13 @@ def free_bytes() -> float:
     on address space leaves.
     """
     return min(machine_free_bytes(), *map(group_bytes, _groups()), address_bytes())
+
+
+def check_memory(what: str, need: float, there: float, hint: str) -> None:
+    """Refuse what takes more memory than there is [bytes], in a text that begins with it."""
+    if need > there:
+        text = f"{what} takes {need / 2**30:.4g} GiB; {there / 2**30:.3g} GiB are free."
+        raise ResourceError(text, hint=hint)
 
 
 def peak_bytes() -> int:

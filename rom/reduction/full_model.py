@@ -5,13 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from rom.arguments import typed, whole
+from rom.arguments import one_given, typed, whole
 from rom.eigen.attachments import added_mass
 from rom.eigen.band import modes_up_to
 from rom.eigen.scipy import SciPyOperators
 from rom.eigen.supports import Fixed, Springs, refuse_loose, spring_matrices, supports
 from rom.eigen.verbs import Operators, column_blocks, held_rows, own_points, rigid_motions
-from rom.errors import ConfigError
 from rom.model import Array, FEModel, Index, Modes
 from rom.process.progress import MANY_DOFS, stages
 from rom.reduction.interfaces.connection import connect
@@ -105,8 +104,7 @@ def modes(
         >>> round(float(found[0]))
         25
     """
-    if (n is None) == (f_max is None):
-        raise ConfigError("modes takes n, a number of modes, or f_max, the last frequency [Hz].")
+    one_given("modes", n=n, f_max=f_max)
     if n is not None:
         whole("n", n, 1)
     kinds = by_name(interfaces or {})

@@ -146,10 +146,8 @@ def _compared(rest: _AtRest, solid: GluedSolid, full: HeldSolid, at: tuple[Array
 def _refuse(pieces: Pieces, models: Mapping[str, FEModel], nonlinear: Geometric) -> str:
     """The interface on which the pieces are held; see `certify_pieces` for what is refused."""
     if set(models) != set(pieces.bodies):
-        raise ConfigError(
-            f"the models are {named(models)}, the pieces {named(pieces.bodies)}.",
-            hint="Give the models of which the pieces were made.",
-        )
+        text = f"the models are {named(models)}, the pieces {named(pieces.bodies)}"
+        raise ConfigError(f"{text}; give the models of which the pieces were made.")
     if without := [key for key, model in models.items() if model.stresses is None]:
         raise ConfigError(
             f"the models {named(without)} have no finite elements, from which alone large strain "

@@ -295,7 +295,7 @@ def test_what_cannot_be_is_refused_by_name(bent, monkeypatch, homogeneous):
     with pytest.raises(ModelError, match=r"'body' is that of large deflection"):
         stress_rows(body, Channels([body.stress.points[0]], [[1, 0, 0]]), "gauge")
     monkeypatch.setattr("rom.body.nonlinear.cauchy.MAX_BYTES", 1e5)
-    with pytest.raises(ResourceError, match=r"takes [\d.e-]+ GB for \d+ points"):
+    with pytest.raises(ResourceError, match=r"\d+ points at large deflection takes [\d.e-]+ GiB"):
         reduced(model, (0, 1.0, 0, 0, 0, 0), n_shapes=2, stress=True)
 
 

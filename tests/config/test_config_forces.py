@@ -404,8 +404,8 @@ MISTAKES = {
         LINE.replace('"ground.wall"', "{ ground = [1.1, 0, 0] }") + 'expression = "x"\n',
         "are in one place at the start",
     ),
-    "falling lengths": (LINE + "x = [2, 1]\nvalues = [1, 2]\n", "must ascend"),
-    "lengths and values": (LINE + "x = [2, 1]\nvalues = [1]\n", "needs two lengths"),
+    "falling lengths": (LINE + "x = [2, 1]\nvalues = [1, 2]\n", "that ascend"),
+    "lengths and values": (LINE + "x = [1, 2]\nvalues = [1]\n", "needs as many values"),
     "event of nothing": (EVENT.replace("value = 1\n", ""), "has no value it passes"),
     "event of two": (EVENT + 'expression = "x"\n', "has both a value and an expression"),
     "unknown joint": (EVENT.replace("guide", "guid"), "no joint 'guid'. Did you mean guide?"),
@@ -452,7 +452,7 @@ def test_an_event_that_ends_the_run_cannot_go_into_an_fmu(tmp_path):
 def test_an_event_of_its_own_follows_what_it_asks_for():
     mech, *_ = block_in_python()
     mech.event("far", lambda t, now: now.joint("guide")[0] - 1)
-    with pytest.raises(ConfigError, match=r"'guide' is not followed\. Add the event with follow="):
+    with pytest.raises(ConfigError, match=r"'guide' is not followed; add the event with follow="):
         rom.simulate(mech, t_end=0.1, dt=0.01)
     mech, *_ = block_in_python()
     with pytest.raises(ConfigError, match="no joint 'guid'"):

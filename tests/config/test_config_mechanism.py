@@ -231,7 +231,7 @@ MISTAKES = {  # what stands in the file, or nothing; what instead, or behind it;
     ),
     "a way for an angle": ("", DRIVE + '"1 m"\n', 21, "drives.m.law: '1 m' is a length; an angle"),
     "short table": ("", TABLE % "0.05, 0.1", 21, "of drives.m.law cover 0 s to 0.1 s; the run"),
-    "table that falls": ("", TABLE % "2, 1", 21, "the times of drives.m.law must ascend"),
+    "table that falls": ("", TABLE % "2, 1", 21, "law.t = [0, 2, 1] must be 2 or more numbers"),
     "name twice": ("", DRIVE.replace(".m", ".pivot") + "1\n", 19, "'pivot' is used twice"),
     "stop": ("", '[stops.m]\njoint = "pivot"\nstiffness = 1\n', 19, "stop 'm' has no limit"),
     "missing file": ("", '[bodies.x]\nfile = "nope.rom.npz"\n', 19, "nope.rom.npz"),

@@ -125,7 +125,7 @@ def test_a_hollow_shaft_has_the_frequencies_of_timoshenko(bore):
 
 
 test_what_cannot_whirl_is_named = refused(
-    (lambda: shaft_whirl(rotor(), {7: Support(1e6)}, 0.0), "bearing must be 0 to 6"),
+    (lambda: shaft_whirl(rotor(), {7: Support(1e6)}, 0.0), "bearing 7 must be from 0 to 6"),
     (lambda: shaft_whirl(rotor(), {3: Support(1e6)}, 0.0), "leave a rigid motion"),
     (lambda: shaft_whirl(rotor(), ends([1.0, 2.0]), 0.0), "number or"),
     (lambda: critical_speeds(rotor(), ends([[1e6, 5e5], [-5e5, 1e6]])), "not symmetric"),

@@ -91,7 +91,7 @@ PHYSICS = {
     "units": (5, "modes BEAM STEEL --E 210 --strict", "0.1636 m/s"),
     "degree": (2, "modes BEAM STEEL --degree 7", "degree = 7"),
     "no modes": (2, "modes BEAM STEEL -n 0", "n = 0"),
-    "interface misspelt": (4, "modes BEAM STEEL --fixed rot", "'rot'; it has"),
+    "interface misspelt": (4, "modes BEAM STEEL --fixed rot", "'rot'; there are"),
     "kind misspelt": (2, "modes BEAM STEEL -i root=rbe4", "rbe4"),
     "frame misspelt": (4, "REDUCE --reference tipp -m 2 -o x.npz", "'tipp'"),
 }  # fmt: skip

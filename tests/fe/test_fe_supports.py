@@ -174,7 +174,7 @@ def test_a_body_on_soft_springs_swings_as_a_rigid_one(model, body):
 
 
 WRONG = [
-    ({"springs": {"tip": [1.0, 2.0]}}, ConfigError, r"shape \(2,\): it takes 3 or 6"),
+    ({"springs": {"tip": [1.0, 2.0]}}, ConfigError, r"\(2,\) must be 3 or 6 numbers"),
     ({"springs": {"tip": [1.0, -2.0, 0.0]}}, ConfigError, "and positive or zero"),
     ({"springs": {"tip": np.eye(6) + np.eye(6, k=1)}}, ConfigError, "must be symmetric"),
     ({"springs": {"tip": np.zeros(3)}}, ConfigError, r"springs\['tip'\] must not be zero"),
@@ -184,7 +184,7 @@ WRONG = [
     ({"fixed": {"root": ""}}, ConfigError, "is held in ''"),
     ({"fixed": {"root": "xx"}}, ConfigError, "each once"),
     ({"fixed": {"root": "xyz q"}}, ConfigError, "directions are some of x, y, z, rx, ry, rz"),
-    ({"fixed": ("root", "root:y")}, ConfigError, "held twice"),
+    ({"fixed": ("root", "root:y")}, ConfigError, "'root' is given twice"),
     ({"fixed": {"foot": "x"}}, InterfaceError, "no interface 'foot'"),
     ({"fixed": ("root:yz", "foot")}, InterfaceError, "no interface 'foot'"),
 ]

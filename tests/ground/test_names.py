@@ -248,9 +248,9 @@ def test_every_format_takes_every_name_that_may_be_given(to, name, body, tmp_pat
 
 def test_all_that_is_missing_is_named(body, tmp_path):
     model = block(cells=(1, 1, 1))
-    with pytest.raises(InterfaceError, match="'a', 'b'; the model has"):
+    with pytest.raises(InterfaceError, match="'a', 'b'; there are"):
         rom.reduce(model, method=rom.Guyan(), interfaces={"a": "rbe2", "root": "rbe2", "b": "full"})
-    with pytest.raises(InterfaceError, match="'a', 'b'; it has"):
+    with pytest.raises(InterfaceError, match="'a', 'b'; there are"):
         body.frequencies(3, fixed=("a", "root", "b"))
     arrays = body_arrays(body)
     for gone in (("K", "D"), ("marker/0/hold", "marker/1/point", "surface/shape")):

@@ -165,7 +165,7 @@ def test_labels_count_from_one_and_matrices_come_back(body, tmp_path):
 def test_what_openradioss_does_not_take_is_named(model, body, tmp_path):
     path = tmp_path / "b.pch"
     modal = rom.reduce(model, method=rom.CraigBampton(2), interfaces=KINDS, certify=False)
-    with pytest.raises(ConfigError, match=r"has 2 modes; .*Reduce it with rom\.Guyan"):
+    with pytest.raises(ConfigError, match=r"has 2 modes; .*reduce it with rom\.Guyan"):
         rom.export(modal, path)
     two = {name: KINDS[name] for name in ("root", "tip")}
     with pytest.raises(ConfigError, match="has 2 interfaces"):

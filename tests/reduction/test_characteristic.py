@@ -133,7 +133,7 @@ def test_messages_for_functions_that_cannot_be(assembly):
         assembly.reduced(28, level="local")
     refuses(ConfigError, "nothing is coupled", rom.Assembly(assembly.bodies, ()).reduced, 6)
     twice = rom.Assembly(assembly.bodies, (*COUPLED, *COUPLED))
-    refuses(ConfigError, r"\('left', 'tip'\) is coupled 2 times", twice.reduced, 6, level="local")
+    refuses(ConfigError, r"\('left', 'tip'\).* is given twice", twice.reduced, 6, level="local")
     assert_allclose(twice.reduced(9).frequencies(9), assembly.reduced(9).frequencies(9), atol=1e-6)
     refuses(InterfaceError, "no interface 'side'", assembly.reduced, 6, fixed=(("left", "side"),))
 

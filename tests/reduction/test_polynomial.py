@@ -291,8 +291,8 @@ test_messages_for_wrong_snapshots = refused(
     (lambda: rom.Snapshots(np.ones((48, 0)), n=6), r"shape \(48, 0\)"),
     (lambda: rom.Snapshots(np.zeros((48, 3)), n=6), "all 3 snapshots are zero"),
     (lambda: rom.Snapshots(np.diag([1.0, 1.0, np.nan]), n=6), r"values = .* is not finite"),
-    (lambda: rom.Snapshots(RANDOM), "either energy or n"),
-    (lambda: rom.Snapshots(RANDOM, n=8, energy=0.9), "either energy or n"),
+    (lambda: rom.Snapshots(RANDOM), "exactly one of energy and n"),
+    (lambda: rom.Snapshots(RANDOM, n=8, energy=0.9), "exactly one of energy and n"),
     (lambda: tie(ROOT, rom.Snapshots(RANDOM[:45], n=6)), "45 dofs do not fit .*'root' with 48"),
     (
         lambda: tie(ROOT, rom.Snapshots(RANDOM[:, :4], n=11)),

@@ -268,7 +268,7 @@ def test_messages_for_wrong_interfaces(model, body):
 
     for call, error, words in (
         (lambda: rom.modes(model, 3, fixed="tipp"), InterfaceError,
-         r"model has no interface 'tipp'; it has \['root', 'tip'\]"),
+         r"model has no interface 'tipp'; there are \['root', 'tip'\]"),
         (between("rbe2"), ConfigError, "interfaces = 'rbe2' must be a dictionary"),
         (between({"root": "rbe4"}), ConfigError, "kind 'rbe4'; known kinds"),
         (lambda: body.frequencies(fixed="toe"), InterfaceError, "'body' has no interface 'toe'"),

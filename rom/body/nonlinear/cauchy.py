@@ -7,8 +7,9 @@ import numpy as np
 
 from rom.arguments import finite
 from rom.body.recovery import von_mises
-from rom.errors import ConfigError, ModelError, ResourceError
+from rom.errors import ConfigError, ModelError
 from rom.model import PAIRS, Array, Index
+from rom.process.memory import check_memory
 
 MAX_BYTES = 2e9  # of the gradients of a body; as much again is taken while they are found
 
@@ -49,20 +50,16 @@ class CauchyRecovery:
         Axes are those of its frame; no correction by accelerations is known at large deflection.
         """
         if accelerations is not None:
-            raise ConfigError(
-                "no stress of modes left out is known at large deflection.",
-                hint="Leave accelerations out, and keep as many modes as the loads excite.",
-            )
+            text = "accelerations: no stress of modes left out is known at large deflection"
+            raise ConfigError(f"{text}; keep as many modes as the loads excite.")
         H = self._gradient(q)
         F = np.eye(3) + H
         J = np.linalg.det(F)
         if J.min(initial=1.0) <= 0:
             place = self.points[self.node[np.argmin(J)]].tolist()
-            raise ModelError(
-                f"the elastic coordinates turn the material at {place} inside out: its volume is "
-                f"{J.min():.3g} of that at rest.",
-                hint="Stay within the range of loads that the body was reduced for.",
-            )
+            text = f"the coordinates turn the material at {place} inside out: its volume is"
+            hint = "Stay within the range of loads that the body was reduced for."
+            raise ModelError(f"{text} {J.min():.3g} of that at rest.", hint=hint)
         sigma = F @ self._second_piola(H) @ F.swapaxes(1, 2) / J[:, None, None]
         return self._at_points(sigma)
 
@@ -120,9 +117,6 @@ class CauchyRecovery:
 def refuse_many(n_points: int, r: int) -> None:
     """Say what the gradients of r coordinates at so many points would take, if that is too much."""
     needed = 9 * 8 * n_points * r
-    if needed > MAX_BYTES:
-        raise ResourceError(
-            f"the stress of {r} coordinates at large deflection takes {needed / 1e9:.3g} GB for "
-            f"{n_points} points of the surface; more than {MAX_BYTES / 1e9:g} GB are refused.",
-            hint="Ask for fewer shapes, mesh the surface coarser, or reduce with stress=False.",
-        )
+    what = f"the stress of {r} coordinates at {n_points} points at large deflection"
+    hint = "Ask for fewer shapes, mesh the surface coarser, or reduce with stress=False."
+    check_memory(what, needed, MAX_BYTES, hint)

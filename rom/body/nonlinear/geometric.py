@@ -47,7 +47,7 @@ from rom.eigen.verbs import (
 )
 from rom.errors import ConfigError, InterfaceError, ModelError, ResourceError, warn
 from rom.model import Array, Basis, FEModel, Index, Interface
-from rom.names import check_known, offered
+from rom.names import check_known
 
 DEPENDENT_RTOL = 1e-10  # energy of a derivative, of the largest, that the others explain
 # energy of a derivative over those of its two shapes, of the largest such, from which it is none;
@@ -166,18 +166,11 @@ def _refuse(bent: Bent) -> None:
         expected = np.diag(basis.omega**2)
         modes_held = bool(np.abs(K - expected).max() <= HELD_RTOL * expected.max())
     if not modes_held:
-        raise ConfigError(
-            "large deflection takes constraint modes and modes with the interfaces held, which "
-            "this method has not.",
-            hint="Use rom.CraigBampton or rom.Guyan.",
-        )
+        text = "large deflection needs modes with the interfaces held, which this method has not"
+        raise ConfigError(f"{text}; use rom.CraigBampton or rom.Guyan.")
     others = [name for name in connection.parts if name != reference]
-    if reference not in connection.parts:
-        raise ConfigError(
-            f"reference = {reference!r}: large deflection is seen from an interface, here one of "
-            f"{offered(others)}.",
-            hint="Name the interface at which the body is held, or that turns least.",
-        )
+    text = f"reference = {reference!r}: large deflection is seen from an interface, one of"
+    check_known(reference, connection.parts, text)
     for name in geometric.loads:
         known = (
             f"the range of loads names {name!r}; beside the reference {reference!r} the body has"
@@ -186,20 +179,15 @@ def _refuse(bent: Bent) -> None:
     held = held_motions(geometric, others)
     for load in geometric.components():
         if replace(load, largest=1.0) in held:
-            raise ConfigError(
-                f"the range has a load {load.name} where the body is held: it deflects nothing.",
-                hint="Leave the load out, or that direction of fixed.",
-            )
+            text = f"the range has a load {load.name} where the body is held"
+            raise ConfigError(f"{text}; leave it out, or that direction of fixed.")
     for name in others:
         tie = connection.ties[name]
         if not _turns(tie, model.interfaces[name]):
             rigid = tie.label == "rbe2"
             what = "is rigid" if rigid else f"has functions ({tie.label}) that hold it"
-            raise InterfaceError(
-                f"interface {name!r} {what}, and a section that turns by a linear rotation "
-                "grows: at a slope of 0.03 the body would be several per cent too stiff.",
-                hint='Give it the kind "rbe3" or rom.Polynomial(1).',
-            )
+            text = f"interface {name!r} {what}, and grows as it turns: far too stiff"
+            raise InterfaceError(f'{text}; give it the kind "rbe3" or rom.Polynomial(1).')
 
 
 def _turns(tie: Tie, interface: Interface) -> bool:
@@ -276,11 +264,9 @@ def _snapshots(bent: Bent) -> Array:
     for case, share in product(geometric.load_cases(), SNAPSHOT_SHARES):
         a = full.state(np.zeros(len(units)), share * units @ case)
         if a is None:
-            raise ModelError(
-                "the full model has no equilibrium that is found.",
-                where=f"load {np.round(case, 3).tolist()} of the range",
-                hint="Ask for smaller loads, or leave snapshots out.",
-            )
+            where = f"load {np.round(case, 3).tolist()} of the range"
+            text = "the full model finds no equilibrium; ask for smaller loads, or no snapshots."
+            raise ModelError(text, where=where)
         static = bent.basis.Psi[:, :n_b] @ a[connection.boundary]
         found.append(own_rows(connection.ops, a) - static)
     return np.array(found).T
@@ -302,12 +288,9 @@ def _turnable(F: Array) -> Array:
 def _refuse_many(n: int, energy: Any) -> None:
     if n > MAX_COORDINATES:
         memory, time = foreseen(n, energy.n_points)
-        raise ResourceError(
-            f"the loads and modes have derivatives that make {n} coordinates; more than "
-            f"{MAX_COORDINATES} are refused. Their tensors would take {memory / 1e9:.2g} GB and "
-            f"about {time / 60:.2g} minutes.",
-            hint="Name fewer components of the load, or ask for fewer fixed-interface modes.",
-        )
+        text = f"{n} coordinates of loads and modes are more than {MAX_COORDINATES} that are taken"
+        takes = f"they take {memory / 1e9:.2g} GB and about {time / 60:.2g} minutes"
+        raise ResourceError(f"{text}: {takes}.", hint="Name fewer loads, or ask for fewer modes.")
 
 
 def foreseen(n: int, n_points: int) -> tuple[float, float]:
@@ -328,12 +311,10 @@ def _refuse_collapse(geometric: Geometric, stretches: Array, counts: list[int]) 
     case, step = divmod(load, geometric.n_steps)
     signs = zip(geometric.load_cases()[case], geometric.components(), strict=True)
     parts = [f"{x:+.2g} {load.name}" for x, load in signs if x]
-    raise ModelError(
-        f"load {', '.join(parts)} of the range compresses the material to {stretches[k]:.3f} of "
-        f"its length at {(step + 1) / geometric.n_steps:.2g} of it; from {ELLIPTIC_STRETCH:.3f} on "
-        "St. Venant-Kirchhoff material loses ellipticity and gives way.",
-        hint="Ask for smaller loads, or a law that stiffens in compression.",
-    )
+    text = f"load {', '.join(parts)} of the range compresses the material to {stretches[k]:.3f} of"
+    when = f"its length at {(step + 1) / geometric.n_steps:.2g} of it"
+    why = f"from {ELLIPTIC_STRETCH:.3f} on St. Venant-Kirchhoff material loses ellipticity"
+    raise ModelError(f"{text} {when}; {why}.", hint="Ask for smaller loads, or sampling.")
 
 
 def _derivatives(

@@ -96,10 +96,8 @@ class Geometric:
                 raise ConfigError(f"the range of loads at {name!r} is {load!r}: it needs a force.")
         spins = finite("spin", self.spin, (3,)).any()
         if not self.loads and not spins:
-            raise ConfigError(
-                "no range of loads is given, for which the shapes would be.",
-                hint='Name an interface: loads={"tip": (0, 200.0, 0, 0, 0, 0)}.',
-            )
+            text = "no range of loads is given; name an interface"
+            raise ConfigError(f'{text}, as in loads={{"tip": (0, 200.0, 0, 0, 0, 0)}}.')
         if self.about is not None:
             finite("about", self.about, (3,))
             if not spins:

@@ -101,10 +101,7 @@ def sampled_energy(
     if energy.mesh.comm.size > 1:
         raise ParallelError("elements are sampled on one process only; leave mpirun out.")
     if np.any(geometric.spin):
-        raise ConfigError(
-            "sampling and spin do not go together: centrifugal force is not among the states.",
-            hint="Leave sampling out; St. Venant-Kirchhoff material turns.",
-        )
+        raise ConfigError("sampling and spin do not go together; leave sampling out of what turns.")
     G, w, cell, C = energy.at_points(E)
     every = Sampled(body.K, G, w, np.column_stack([C[:, 0, 1], C[:, 3, 3]]))
     _refuse_grain(C, every.lame)
@@ -158,7 +155,5 @@ def _refuse_grain(C: Array, lame: Array) -> None:
     expected[:, range(3), range(3)] += 2 * lame[:, 1:]
     expected[:, range(3, 6), range(3, 6)] = lame[:, 1:]
     if np.abs(C - expected).max() > ISOTROPIC_RTOL * np.abs(C).max():
-        raise ModelError(
-            "neo-Hookean material is isotropic, and that of the model is not.",
-            hint="Leave sampling out, or give a rom.Material.",
-        )
+        text = "neo-Hookean material is isotropic, and that of the model is not"
+        raise ModelError(f"{text}; leave sampling out, or give a rom.Material.")

@@ -97,11 +97,9 @@ def _found_beyond(done: float) -> Iterator[None]:
     try:
         yield
     except SolverError as error:
-        raise ModelError(
-            f"no stable equilibrium was found beyond {done:.4g} of a step of load.",
-            hint="Ask for smaller loads: the body buckles before, or gives way. A piece of a "
-            "slender body that is cut (rom.fe.pieces) has more of them to share the turning with.",
-        ) from error
+        text = f"no stable equilibrium was found beyond {done:.4g} of a step of load"
+        hint = "Ask for smaller loads, or cut a slender body into more pieces (rom.fe.pieces)."
+        raise ModelError(f"{text}: the body buckles or gives way.", hint=hint) from error
 
 
 @dataclass(frozen=True)

@@ -107,10 +107,8 @@ def _keeping(args: argparse.Namespace, made_from: dict[str, str]) -> "Keeping | 
 
     keep = Keeping(args.output / PARTS_FOLDER, args.resume, made_from)
     if args.resume and not keep.state.exists() and (args.output / "run.json").exists():
-        raise ConfigError(
-            f"there is nothing to resume: the run in {args.output} came to its end.",
-            hint="Leave out --resume to run it anew.",
-        )
+        text = f"there is nothing to resume: the run in {args.output} came to its end"
+        raise ConfigError(f"{text}; leave out --resume to run it anew.")
     keep.check()
     return keep if ranks()[0] == 0 else None
 

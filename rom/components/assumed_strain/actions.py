@@ -11,12 +11,22 @@ from typing import Annotated
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import Count, Length, Number, finite, is_number, shortened, typed, whole
-from rom.components.assumed_strain.triangles import Sheet, endless, sides_of, whole_numbers
+from rom.arguments import (
+    Count,
+    Length,
+    Number,
+    check_places,
+    finite,
+    not_negative,
+    number,
+    typed,
+    whole,
+)
+from rom.components.assumed_strain.triangles import Sheet, sides_of, whole_numbers
 from rom.components.histories import History, straightened
 from rom.errors import ConfigError, MeshError
 from rom.model import Array, Index
-from rom.names import check_text
+from rom.names import check_once, check_text
 
 SHEAR_RATIO = 0.1  # stiffness along a face before a node slides, over that across
 TOUCH_RTOL = 1e-6  # depth over the longest side of the outline that counts as touching at the start
@@ -227,8 +237,7 @@ def prepared(body: Sheet, actions: Actions, span: tuple[float, float] = (0.0, 1.
 def _driven(held: Index, moved: list[Index], first: int) -> tuple[Index, Index]:
     """Dofs of all drives, then held ones; their columns of the table, -1 for held ones."""
     by_drives = np.concatenate([*moved, np.zeros(0, dtype=np.int64)])
-    if np.unique(by_drives).size < by_drives.size:
-        raise ConfigError("a dof is driven twice.", hint="One drive for each dof.")
+    check_once(by_drives.tolist(), "drives: dof")
     driven = np.concatenate([by_drives, np.setdiff1d(held, by_drives)])
     columns = np.full(driven.size, -1)
     columns[: by_drives.size] = first + np.arange(by_drives.size)
@@ -243,26 +252,20 @@ def nodal(name: str, values: npt.ArrayLike, body: Sheet) -> Array:
 def dofs_of(held: npt.ArrayLike, body: Sheet, name: str = "held") -> Index:
     """Numbers of dofs, 2 * node + axis."""
     dofs = whole_numbers(f"{name} dofs", held).ravel()
-    if dofs.size and (dofs.min() < 0 or dofs.max() >= body.points.size):
-        raise ConfigError(
-            f"{name} dofs {dofs.min()} to {dofs.max()}; the sheet has 0 to {body.points.size - 1}.",
-            hint="A dof is 2 * node + axis.",
-        )
+    check_places(f"{name} dofs (2 * node + axis)", dofs, body.points.size)
     return dofs
 
 
 def _outer(body: Sheet, k: int, traction: Traction) -> Index:
     """Sides of a traction; each must be at the edge, and turned as there."""
     wanted = whole_numbers(f"traction {k}: sides", traction.sides, (None, 2))
-    if not (is_number(traction.pressure) and is_number(traction.shear)):
-        raise ConfigError(f"traction {k} needs finite pressure and shear.")
+    for what in ("pressure", "shear"):
+        number(f"traction {k}: {what}", getattr(traction, what))
     there = {tuple(side) for side in outer_sides(body).tolist()}
     if strange := [side for side in wanted.tolist() if tuple(side) not in there]:
         a, b = strange[0]
-        raise ConfigError(
-            f"traction {k}: the side {a}-{b} is not an outer one; take rows of outer_sides, which "
-            "have the solid on the left."
-        )
+        text = f"traction {k}: the side {a}-{b} is not an outer one with the solid on the left"
+        raise ConfigError(f"{text}; take rows of outer_sides.")
     return wanted
 
 
@@ -271,9 +274,7 @@ def _faces(tool: Tool) -> Array:
     name = f"tool {check_text(tool.name, 'a tool')!r}"
     X = finite(f"{name}: the outline", tool.outline, (None, 2))
     whole(f"{name}: corners of the outline", len(X), 3)
-    if not (endless(tool.friction) or (is_number(tool.friction) and tool.friction >= 0)):
-        given = shortened(tool.friction)
-        raise ConfigError(f"{name}: the friction {given} must be 0 or more, or infinite.")
+    not_negative(f"{name}: friction", tool.friction, infinite=True)
     along = np.roll(X, -1, axis=0) - X
     length = np.linalg.norm(along, axis=1)
     if not length.min() > 0:
@@ -281,10 +282,8 @@ def _faces(tool: Tool) -> Array:
     t = along / length[:, None]
     turn = np.roll(t, -1, axis=0)
     if np.any(t[:, 0] * turn[:, 1] - t[:, 1] * turn[:, 0] < -1e-9):
-        raise ConfigError(
-            f"{name}: the outline is not convex, or clockwise.",
-            hint="Order the corners counter-clockwise; make a hollow tool of several.",
-        )
+        text = f"{name}: the outline is not convex, or clockwise"
+        raise ConfigError(f"{text}; make a hollow tool of several, counter-clockwise ones.")
     return np.column_stack([X, t, t[:, 1], -t[:, 0], length])
 
 
@@ -308,15 +307,11 @@ def _refuse_overlap(body: Sheet, made: Prepared) -> None:
         faces = made.faces_of(k)
         gap = np.einsum("nfa,fa->nf", X[:, None] - offset - faces[:, :2], faces[:, 4:6]).max(axis=1)
         if gap.min() < -TOUCH_RTOL * faces[:, 6].max():
-            raise MeshError(
-                f"tool {name!r} starts {-gap.min():.3g} m inside the sheet at node {gap.argmin()}.",
-                hint="Move the tool until it only touches.",
-            )
+            text = f"tool {name!r} starts {-gap.min():.3g} m inside the sheet"
+            raise MeshError(f"{text} at node {gap.argmin()}; move it until it only touches.")
         corner = _covered(body, faces[:, :2] + offset)
         if corner >= 0:
-            raise MeshError(
-                f"corner {corner} of the tool {name!r} starts inside the sheet; move it."
-            )
+            raise MeshError(f"corner {corner} of tool {name!r} starts inside the sheet; move it.")
 
 
 def _covered(body: Sheet, places: Array) -> int:

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from scipy.sparse import csr_matrix
 from scipy.sparse.linalg import spsolve
 
-from rom.arguments import Count, Share, finite, typed
+from rom.arguments import Count, Share, ascending, typed
 from rom.components.assumed_strain import kernels
 from rom.components.assumed_strain.actions import Actions, Load, Prepared, nodal, prepared, touch
 from rom.components.assumed_strain.motion import Metal, depth_of, forces, mass, tangent
@@ -146,9 +146,8 @@ def implicit_motion(
             ``error.solution`` holds the instants before.
     """
     if actions.tools and rho_inf > MAX_RHO_OF_IMPACTS:
-        raise ConfigError(
-            f"rho_inf = {rho_inf} with tools: impacts gain energy above {MAX_RHO_OF_IMPACTS}."
-        )
+        text = f"rho_inf = {rho_inf} must be at most {MAX_RHO_OF_IMPACTS} with tools"
+        raise ConfigError(f"{text}: impacts gain energy above.")
     start = np.zeros_like(body.points) if v is None else nodal("velocities", v, body)
     t, acts = _over(times, body, actions)
     return _Way(body, metal, acts, mass(body, metal), rho_inf).run(t, start)
@@ -391,17 +390,13 @@ def _refuse_free(body: Sheet, driven: Index) -> None:
         if not np.any(driven % 2):
             raise ConfigError("the solid can slide along its axis; hold the second dof of a node.")
     elif stopped < 3:
-        raise ConfigError(
-            f"{driven.size} held and driven dofs leave {3 - stopped} of three rigid motions.",
-            hint="Hold two dofs of one node and one of another, or more.",
-        )
+        text = f"{driven.size} held and driven dofs leave {3 - stopped} of three rigid motions"
+        raise ConfigError(f"{text}; hold two dofs of one node and one of another, or more.")
 
 
 def _over(times: npt.ArrayLike, body: Sheet, actions: Actions) -> tuple[Array, Prepared]:
     """Instants (k,) [s], and what acts from the first to the last."""
-    t = finite("times", times, None)
-    if t.ndim != 1 or len(t) < 2 or not np.all(np.diff(t) > 0):
-        raise ConfigError(f"times of the shape {t.shape}: two or more that grow are needed.")
+    t = ascending("times", times)
     return t, prepared(body, actions, (t[0], t[-1]))
 
 

@@ -12,7 +12,16 @@ import numpy as np
 import numpy.typing as npt
 from scipy.sparse import csr_matrix, identity, kron
 
-from rom.arguments import Count, Positive, finite, is_number, shortened, typed
+from rom.arguments import (
+    Count,
+    Positive,
+    between,
+    finite,
+    not_negative,
+    positive,
+    shortened,
+    typed,
+)
 from rom.components.assumed_strain import kernels
 from rom.components.assumed_strain.actions import Actions, dofs_of, nodal, prepared
 from rom.components.assumed_strain.triangles import (
@@ -20,7 +29,6 @@ from rom.components.assumed_strain.triangles import (
     Sheet,
     constant_gradients,
     each_side,
-    endless,
     placed,
 )
 from rom.errors import ConfigError, MaterialError, SolverError
@@ -51,16 +59,13 @@ class Metal:
     linear: bool = False
 
     def __post_init__(self) -> None:
-        for name in ("E", "nu", "rho", "yield_stress", "hardening"):
-            value = getattr(self, name)
-            if not is_number(value) and not (name == "yield_stress" and endless(value)):
-                raise MaterialError(f"{name} = {shortened(value)} must be a finite number.")
+        positive("E", self.E, error=MaterialError)
+        between("nu", self.nu, -1.0, 0.5, "()", error=MaterialError)
+        positive("rho", self.rho, error=MaterialError)
+        positive("yield_stress", self.yield_stress, error=MaterialError, infinite=True)
+        not_negative("hardening", self.hardening, error=MaterialError)
         if not isinstance(self.linear, bool):
             raise MaterialError(f"linear = {shortened(self.linear)} must be True or False.")
-        plastic = self.yield_stress > 0 and self.hardening >= 0
-        if not (self.E > 0 and -1 < self.nu < 0.5 and self.rho > 0 and plastic):
-            hint = "E, rho, yield_stress > 0; -1 < nu < 0.5; hardening >= 0."
-            raise MaterialError(f"no solid is {self}.", hint=hint)
 
     @property
     def numbers(self) -> Array:

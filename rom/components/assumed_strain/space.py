@@ -15,7 +15,7 @@ Source:
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix, eye, identity, kron, vstack
 
-from rom.arguments import typed
+from rom.arguments import check_places, typed
 from rom.components.assumed_strain.motion import Metal, mass, tangent
 from rom.components.assumed_strain.triangles import Sheet, each_side, placed
 from rom.errors import ConfigError, InterfaceError
@@ -59,16 +59,11 @@ def _placed(A: csr_matrix, axes: tuple[int, ...]) -> csr_matrix:
 
 
 def _interface(name: str, nodes: Index, body: Sheet, points: Array) -> Interface:
-    if nodes.size and not 0 <= nodes[0] <= nodes[-1] < len(points):
-        raise InterfaceError(
-            f"interface {name!r} names the nodes {nodes[0]} to {nodes[-1]}; there are 0 to "
-            f"{len(points) - 1}."
-        )
+    check_places(f"nodes of interface {name!r}:", nodes, len(points), error=InterfaceError)
     inside = np.isin(body.triangles, nodes).all(axis=1)
     if not inside.any():
-        raise InterfaceError(
-            f"interface {name!r} has no triangle among its {nodes.size} nodes; add the next row."
-        )
+        text = f"interface {name!r} has no triangle among its {nodes.size} nodes"
+        raise InterfaceError(f"{text}; add the next row.")
     T, area = np.searchsorted(nodes, body.triangles[inside]), body.area[inside]
     S = placed(area[:, None, None] / 12 * (1 + np.eye(3)), T, T, nodes.size)
     origin = S.sum(axis=0) @ points[nodes] / S.sum()

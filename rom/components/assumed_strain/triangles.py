@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.sparse import coo_matrix, csr_matrix
 
-from rom.arguments import Count, Length, Number, finite, shortened, typed
+from rom.arguments import Count, Length, Number, check_places, finite, shortened, typed
 from rom.errors import ConfigError, MeshError
 from rom.model import Array, Index, Mask
 
@@ -94,35 +94,24 @@ def sheet(
     return Sheet(X, T, patch, np.ascontiguousarray(G), weights, area, state, thickness)
 
 
-def endless(value: object) -> bool:
-    """Whether a value is infinite, as friction or a yield stress may be."""
-    return isinstance(value, float) and value == np.inf
-
-
 def whole_numbers(
     name: str, value: npt.ArrayLike, shape: tuple[int | None, ...] | None = None
 ) -> Index:
     """Whole numbers, which counts of nodes or dofs are, of a shape; True and False are none."""
     found = finite(name, value, shape)
     if np.any(found % 1) or np.abs(found).max(initial=0.0) > LARGEST_WHOLE:
-        raise ConfigError(
-            f"{name} = {shortened(value)}: numbers of nodes or dofs are whole, 2^53 at most.",
-            hint="np.flatnonzero makes numbers of a condition.",
-        )
+        text = f"{name} = {shortened(value)}: numbers of nodes or dofs are whole, 2^53 at most"
+        raise ConfigError(f"{text}; np.flatnonzero makes them of a condition.")
     return found.astype(np.int64)
 
 
 def _refuse_no_mesh(X: Array, T: Index, state: str) -> None:
     if X.ndim != 2 or X.shape[1] != 2 or T.ndim != 2 or T.shape[1] != 3 or not len(T):
         raise MeshError(f"points {X.shape} and triangles {T.shape} must be (n, 2) and (t, 3).")
-    if T.min() < 0 or T.max() >= len(X):
-        raise MeshError(
-            f"triangles name the nodes {T.min()} to {T.max()}; there are 0 to {len(X) - 1}."
-        )
-    if state == "axisymmetric" and X[:, 0].min() < 0:
-        raise MeshError(
-            f"the first coordinate, {X[:, 0].min():.3g} m of node {X[:, 0].argmin()}, is a radius."
-        )
+    check_places("triangles: nodes", T, len(X), error=MeshError)
+    r = X[:, 0]
+    if state == "axisymmetric" and r.min() < 0:
+        raise MeshError(f"the first coordinate, {r.min():.3g} m of node {r.argmin()}, is a radius.")
 
 
 def constant_gradients(X: Array, T: Index) -> tuple[Array, Array]:

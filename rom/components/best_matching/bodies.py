@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from rom.arguments import one_each
+from rom.arguments import finite, one_each
 from rom.components.best_matching.projection import configuration, match
 from rom.components.compiled import kernel
 from rom.errors import ConfigError, ModelError, SolverError
@@ -61,8 +61,8 @@ class Bodies:
     degree: float = -1.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "mass", np.array(self.mass, dtype=float))
-        if self.mass.ndim != 1 or self.mass.size < 2 or not (self.mass > 0).all():
+        object.__setattr__(self, "mass", finite("mass", self.mass, (None,)))
+        if self.mass.size < 2 or not (self.mass > 0).all():
             raise ConfigError(f"mass = {self.mass.tolist()}: needed are two or more masses > 0.")
         if not self.degree < 0:
             raise ConfigError(f"degree = {self.degree:g}: it must be negative, to attract.")
@@ -181,10 +181,8 @@ def integrated(rates: Callable[[float, Array], Array], y: Array, t: Array) -> Ar
     found = solve_ivp(rates, (t[0], t[-1]), y, t_eval=t, method="DOP853", rtol=1e-12, atol=1e-14)
     if not found.success or not np.isfinite(found.y).all():
         last = found.t[-1] if found.t.size else t[0]
-        raise SolverError(
-            f"two bodies come too close soon after {last:.6g}: {found.message}",
-            hint="Collisions are not regularised; stop earlier.",
-        )
+        text = f"two bodies come too close soon after {last:.6g}: {found.message}"
+        raise SolverError(text, hint="Collisions are not regularised; stop earlier.")
     return found.y.T
 
 

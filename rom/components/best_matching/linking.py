@@ -91,10 +91,8 @@ class Linking:
 
     def __post_init__(self) -> None:
         if not self.bodies.degree > -2.0:
-            raise ConfigError(
-                f"degree = {self.bodies.degree:g}: with -2 growth stays as it is, and below it "
-                "does not count time; a degree above -2 is needed."
-            )
+            text = f"degree = {self.bodies.degree:g} must be above -2"
+            raise ConfigError(f"{text}: below it growth does not count time.")
 
     def state(self, x: Array, v: Array) -> Extended:
         """Newton's configuration (n, 3) [1] and velocities (n, 3) [1], with phi = 0 and Q = 0.

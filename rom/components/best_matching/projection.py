@@ -121,10 +121,8 @@ def _turn(C: Array) -> Array:
     U, sigma, Vt = np.linalg.svd(C)
     sign = np.sign(np.linalg.det(U @ Vt))
     if sigma[1] + sign * sigma[2] <= ON_ITSELF * sigma[0]:
-        raise ModelError(
-            f"no rotation is better than all others: singular values {sigma.round(9).tolist()}.",
-            hint="Particles on a line, or mirrored ones, turn about it for nothing.",
-        )
+        text = f"no rotation is better than all others: singular values {sigma.round(9).tolist()}."
+        raise ModelError(text, hint="Particles on a line, or mirrored ones, turn for nothing.")
     return U @ np.diag([1.0, 1.0, sign]) @ Vt
 
 

@@ -143,8 +143,8 @@ def body(rod: Rod, start: Shape | None = None) -> RodBody:
     """
     shape = reference(rod) if start is None else start
     if rod.mass.min() <= 0.0 or rod.inertia[1:-1].min() <= 0.0:
-        text = "a rod without mass or inertia cannot move in a mechanism."
-        raise ModelError(text, hint="Give rod(...) mass and inertia of its sections.")
+        text = "a rod without mass or inertia cannot move in a mechanism"
+        raise ModelError(f"{text}; give rod(...) both of its sections.")
     mass = np.append(rod.mass, 0.5 * rod.mass[-1])
     mass[-2] *= 0.5
     frames = Frames(np.vstack([shape.x, shape.x[-1:]]), shape.p.copy(), mass, _inertia(rod))

@@ -52,8 +52,8 @@ class HelicalSpring:
         if self.diameter <= wire:
             raise ModelError(f"wire = {wire:g} m must be below diameter = {self.diameter:g} m.")
         if self.length <= solid:
-            text = f"free length {self.length:g} m is not above the solid length {solid:g} m."
-            raise ModelError(text, hint="Take fewer coils.")
+            text = f"free length {self.length:g} m is not above the solid length {solid:g} m"
+            raise ModelError(f"{text}; take fewer coils.")
 
     @property
     def G(self) -> float:

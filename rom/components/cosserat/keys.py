@@ -81,9 +81,7 @@ def _rigidities(values: Values, place: Place) -> Values:
     kind, given = section.pop("kind"), "material" in values
     if given == (kind == "numbers"):
         what = "takes no material" if given else "needs a material"
-        raise place.at("section").error(
-            f"a section of kind {kind} {what}.", "Shapes have one, numbers have none."
-        )
+        raise place.at("section").error(f"a section of kind {kind} {what}.")
     if kind == "numbers":
         return section
     material = Material(**values["material"])
@@ -115,10 +113,8 @@ def _ring(section: dict[str, float], place: Place, nu: float) -> tuple[float, ..
     outer = section["diameter"] / 2
     inner = outer - section.get("thickness", outer)
     if inner < 0.0:
-        raise place.at("section").error(
-            f"thickness = {section['thickness']:g} m is more than the radius {outer:g} m.",
-            'A full section has kind = "circle".',
-        )
+        text = f"thickness = {section['thickness']:g} m is more than the radius {outer:g} m."
+        raise place.at("section").error(text, 'A full section has kind = "circle".')
     I, square = np.pi / 4 * (outer**4 - inner**4), (inner / outer) ** 2
     full = (1 + square) ** 2
     share = 6 * (1 + nu) * full / ((7 + 6 * nu) * full + (20 + 12 * nu) * square)

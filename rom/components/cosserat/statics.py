@@ -163,9 +163,8 @@ def fitting(
     found, needed = (force.shape, moment.shape), (rod.x.shape, (len(rod.p), 3))
     n = 6 * rod.h.size + 9
     if found != needed or free.shape != (n,):
-        raise ConfigError(
-            f"loads of shapes {found} and {free.size} dofs; needed are {needed} and {n} dofs."
-        )
+        text = f"loads of shapes {found} and {free.size} dofs"
+        raise ConfigError(f"{text}; needed are {needed} and {n} dofs.")
     return (force, moment), free
 
 
@@ -220,9 +219,7 @@ def equilibrium(
     share, shape = load_steps(ahead, shape, least=MIN_LOAD_STEP, first=first)
     if share < 1.0:
         text = f"no equilibrium beyond {100 * share:.4g} % of the load."
-        error = SolverError(
-            text, hint="The rod buckles or a mechanism is left free.", solution=shape
-        )
+        error = SolverError(text, hint="The rod buckles or is left free.", solution=shape)
         error.share = share  # type: ignore[attr-defined]
         raise error
     return shape

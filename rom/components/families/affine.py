@@ -134,10 +134,8 @@ class StretchedModel(AffineModel):
         axis = "xyz".index(thin[0].axis)
         self.regions = dict(model.regions)
         if not self.regions or any(part.stretched is None for part in self.regions.values()):
-            raise ParameterError(
-                "the regions of the model do not tell how they are stretched.",
-                hint="Models of rom.fe do; others need rom.Region(stretched=...).",
-            )
+            text = "the regions of the model do not tell how they are stretched"
+            raise ParameterError(f"{text}; models of rom.fe do.")
         self.layered: dict[str, Layered] = {n: r.stretched(axis) for n, r in self.regions.items()}
         names = tuple(dict.fromkeys(p.region for p in thin if p.region is not None))
         for name in names:
@@ -149,11 +147,10 @@ class StretchedModel(AffineModel):
             for low, high in layered.layers if other != name else ():
                 for a, b in self.layered[name].layers:
                     if min(b, high) - max(a, low) > OVERLAP_RTOL * extent:
-                        raise ParameterError(
-                            f"region {name!r} is no layer of its own: {other!r} lies beside it "
-                            f"from {max(a, low):g} to {min(b, high):g} m.",
-                            hint="Choose another axis, or change both with one parameter.",
-                        )
+                        text = f"region {name!r} is no layer of its own: {other!r} lies beside it"
+                        where = f"from {max(a, low):g} to {min(b, high):g} m"
+                        hint = "Choose another axis, or change both with one parameter."
+                        raise ParameterError(f"{text} {where}.", hint=hint)
 
     @property
     def moving(self) -> list[str]:
@@ -189,10 +186,8 @@ class StretchedModel(AffineModel):
         """All motions that are rigid at some thickness, for interfaces that are rigid."""
         for name, kind in interfaces.items():
             if not isinstance(kind, str) or kind != "rbe2":
-                raise ParameterError(
-                    f"interface {name!r} has the kind {kind!r}; with a parameter of thickness it "
-                    'must be "rbe2".'
-                )
+                text = f"interface {name!r} has the kind {kind!r}"
+                raise ParameterError(f'{text}; with a parameter of thickness it must be "rbe2".')
         faces = self.model.interfaces
         return {n: self._functions(faces[n]) if n in faces else "rbe2" for n in interfaces}
 
@@ -255,10 +250,8 @@ class StretchedModel(AffineModel):
             np.sqrt(np.diag(ops.gram(A, ops.apply_M(A))).max()) for A in (R - Phi @ C, ops.rigid)
         )
         if gap > RIGID_RTOL * size:
-            raise ModelError(
-                f"the basis misses a rigid motion of a stretched body by {gap:.1e}.",
-                hint="Ask for more modes, or a narrower range of the thickness.",
-            )
+            text = f"the basis misses a rigid motion of a stretched body by {gap:.1e}"
+            raise ModelError(f"{text}; ask for more modes, or a narrower range of the thickness.")
         return C
 
     def _refuse_more(self, E: Array, shares: list[Share]) -> None:
@@ -269,7 +262,5 @@ class StretchedModel(AffineModel):
         for A, found in ((ops.apply_K(E), K), (ops.apply_M(E), M)):
             whole = np.trace(ops.gram(E, A))
             if abs(whole - found) > OUTSIDE_RTOL * whole:
-                raise ParameterError(
-                    f"the regions {sorted(self.regions)} are not the whole model, whose thickness "
-                    "is to change; name all of them."
-                )
+                text = f"the regions {sorted(self.regions)} are not the whole model"
+                raise ParameterError(f"{text}, whose thickness is to change; name all of them.")

@@ -34,17 +34,13 @@ class FamilyAssembly:
     def __post_init__(self) -> None:
         other = [name for name, family in self.families.items() if family.body.units != "SI"]
         if other or not self.families:
-            raise ConfigError(
-                f"families {named(other)} are not in SI units." if other else "there is no family.",
-                hint="Reduce the models of all parts in SI units.",
-            )
+            text = f"families {named(other)} are not in SI units" if other else "there is no family"
+            raise ConfigError(f"{text}; reduce the models of all parts in SI units.")
         for name in self.families:
             check_text(name, "a family")
         if len(self.parameters) < sum(len(f.parameters) for f in self.families.values()):
-            raise ConfigError(
-                f"two parameters have one name among {named(self.parameters)}.",
-                hint="Give families names without a dot.",
-            )
+            text = f"two parameters have one name among {named(self.parameters)}"
+            raise ConfigError(f"{text}; give families names without a dot.")
         _ = self.nominal  # refuses couplings that cannot be
 
     @cached_property

@@ -126,8 +126,7 @@ def _verify(family: BodyFamily, path: Path) -> None:
         found.append(("rigid", stretch.rigid, (2 + len(stretch.regions), 6 + r, 6)))
     for name, A, shape in found:
         if A is not None and np.shape(A) != shape:
-            raise FileFormatError(
-                f"{name} has the shape {np.shape(A)}, expected {shape}.", where=str(path)
-            )
+            text = f"{name} has the shape {np.shape(A)}, expected {shape}."
+            raise FileFormatError(text, where=str(path))
     if not family.shares or not family.parameters:
         raise FileFormatError("the family has no terms or no parameters.", where=str(path))

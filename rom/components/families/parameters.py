@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from rom.arguments import between, number, one_of, typed
+from rom.arguments import between, number, one_of, positive, typed
 from rom.errors import ParameterError, warn
 from rom.model import Array
-from rom.names import check_text, named
+from rom.names import check_all_known, check_text
 from rom.plausible import FACTOR, warn_outside
 
 MAX_CORNER_PARAMETERS = 3  # all corners of the range are visited up to here
@@ -111,10 +111,8 @@ def checked_parameters(parameters: dict[str, Parameter]) -> dict[str, Parameter]
     """The parameters by name, if they are such."""
     for name, value in parameters.items():
         if type(value) not in KINDS.values():
-            raise ParameterError(
-                f"parameter {name!r} is {value!r}; known are {sorted(KINDS)}.",
-                hint='For example rom.YoungsModulus("web", 0.5, 2.0).',
-            )
+            text = f"parameter {name!r} is {value!r}; known are {sorted(KINDS)}."
+            raise ParameterError(text, hint='For example rom.YoungsModulus("web", 0.5, 2.0).')
         if not str(name).isidentifier() or name == "extrapolate":
             raise ParameterError(f"{name!r} names no parameter; use letters, as in at(web=1.0).")
     if not parameters:
@@ -134,23 +132,18 @@ def complete(
 
     Those outside a range are refused, or announced where one extrapolates.
     """
-    if unknown := sorted(set(values) - set(parameters)):
-        text = f"there is no parameter {named(unknown)}; the family has {sorted(parameters)}."
-        raise ParameterError(text)
+    check_all_known(sorted(values), parameters, "there is no parameter", ParameterError)
     each = parameters.items()
     return {name: _checked(name, p, values.get(name, 1.0), extrapolate) for name, p in each}
 
 
 def _checked(name: str, parameter: Parameter, value: float, extrapolate: bool) -> float:
-    number = np.ndim(value) == 0 and not isinstance(value, bool | str)
-    if not (number and np.isfinite(value) and value > 0):
-        raise ParameterError(f"{name} = {value!r} must be a positive factor.")
+    positive(name, value, error=ParameterError)
     low, high = parameter.low, parameter.high
     if not low * (1 - RANGE_RTOL) <= value <= high * (1 + RANGE_RTOL):
         message = f"{name} = {value:g} is outside {low:g} to {high:g}, where the basis was made."
         if not extrapolate:
-            cure = "Reduce again with a wider range, or ask with extrapolate=True."
-            raise ParameterError(message, hint=cure)
+            raise ParameterError(message, hint="Reduce it wider, or ask with extrapolate=True.")
         warn(f"{message} Errors there are unknown.")
     return float(value)
 

@@ -129,8 +129,7 @@ def reduce_parametric(  # noqa: PLR0913  one keyword per choice
     parameters = checked_parameters(parameters)
     thick = any(isinstance(p, Thickness) for p in parameters.values())
     if thick and stress:
-        text = "stress is not recovered from bodies with a parameter of thickness."
-        raise ParameterError(text, hint="Reduce with stress=False.")
+        raise ParameterError("no stress is known with a parameter of thickness; leave it out.")
     affine = (StretchedModel if thick else AffineModel)(model, parameters)
     middle = centre(affine.parameters)
     draft = FamilyDraft(
@@ -268,11 +267,9 @@ def first_sample(ops: Operators, basis: Basis, boundary: Index, small: float) ->
     n_b = boundary.size
     moved = ops.rows(basis.Psi[:, :n_b], boundary) if basis.Psi.shape[1] >= n_b > 0 else None
     if moved is None or np.abs(moved - np.eye(n_b)).max() > 1e-9:
-        raise ConfigError(
-            "the bases of several parameters join in their interface coordinates, which this "
-            "method does not keep.",
-            hint="Use CraigBampton, Guyan or MomentMatching, and name an interface.",
-        )
+        text = "the bases of several parameters join in interface coordinates"
+        hint = "Use CraigBampton, Guyan or MomentMatching, and name an interface."
+        raise ConfigError(f"{text}, which this method does not keep.", hint=hint)
     X = basis.Psi
     K, M = (np.diag(ops.gram(X, AX)) for AX in (ops.apply_K(X), ops.apply_M(X)))
     elastic = K > 1e-9 * (K / M).max() * M

@@ -14,7 +14,7 @@ from functools import cached_property, partial
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import one_each, positive
+from rom.arguments import one_each, positive, vector
 from rom.components.gear_mesh.gears.corrections import Correction
 from rom.components.gear_mesh.gears.geometry import GearPair, path_of_contact
 from rom.components.gear_mesh.gears.meshes import GEAR_MESHES_FAMILY
@@ -90,13 +90,12 @@ class Mesh:
     cells: int = 21
 
     def __post_init__(self) -> None:
-        k = np.atleast_1d(np.asarray(self.stiffness, dtype=float))
+        k = vector("stiffness of the teeth [N/m^2]", self.stiffness, error=ModelError)
         if not isinstance(self.pair, GearPair) or self.pair.internal:
             raise ModelError("internal gears and racks are for elements; use Mechanism.gear_mesh.")
         if self.correction.measured:
             raise ModelError("maps and run-out are for elements; use Mechanism.gear_mesh.")
-        if not (k.size and np.isfinite(k).all() and (k > 0).all()):
-            raise ModelError(f"stiffness {k} of the teeth must be positive [N/m^2].")
+        positive("stiffness of the teeth [N/m^2]", k.min(), error=ModelError)
         for errors, z in zip(self.correction.pitch, self.pair.teeth, strict=True):
             if len(errors):
                 one_each("pitch errors", len(errors), "teeth", z, error=ModelError)
@@ -129,8 +128,8 @@ class Mesh:
         now, q = self._wheels, np.asarray(q, dtype=float)
         apart = float(np.hypot(self.pair.distance + q[6] - q[0], q[7] - q[1]))
         if not apart > self.pair.rb.sum():
-            text = f"the wheels are {apart * 1e3:.4f} mm apart: their base circles overlap."
-            raise ModelError(text, hint="Motions are in metres and radians.")
+            text = f"the wheels are {apart * 1e3:.4f} mm apart: their base circles overlap"
+            raise ModelError(f"{text}; motions are in metres and radians.")
         W, teeth, still = now.W, now.packed.elements[GEAR_MESHES_FAMILY], np.zeros(12)
         teeth.size[0, PHASE], none = theta, np.zeros(0)
         W.base[-2:] = q[[5, 11]]  # turns are followed from there

@@ -49,8 +49,8 @@ def gear_pair(name: str, pair: Values) -> "GearPair | RackPair":
         return GearPair(**given)
     (pinion, _), (shift, of_rack) = given.pop("teeth"), given.pop("shift")
     if of_rack != 0.0:
-        text = f"the rack of {name!r} has a profile shift of {of_rack:g}."
-        raise ConfigError(text, hint="Write 0 and move its reference line by centre_distance.")
+        text = f"the rack of {name!r} has a profile shift of {of_rack:g}"
+        raise ConfigError(f"{text}; write 0 and move its reference line by centre_distance.")
     return RackPair(**given, pinion_teeth=pinion, shift=shift)
 
 

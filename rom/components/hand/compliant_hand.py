@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rom import rotation
-from rom.arguments import NotNegative, between, typed
+from rom.arguments import NotNegative, between, not_both, typed
 from rom.components.cosserat import Rod, Shape, clamped, linearised, loads, reference, rod
 from rom.components.cosserat.helical_spring import HelicalSpring
 from rom.components.cosserat.statics import newton
@@ -65,8 +65,8 @@ class Finger:
 
     def __post_init__(self) -> None:
         if len(self.springs) != len(self.phalanges) or not self.springs:
-            text = f"{len(self.springs)} springs and {len(self.phalanges)} phalanges."
-            raise ModelError(text, hint="Each spring carries one phalanx.")
+            both = f"{len(self.springs)} springs and {len(self.phalanges)} phalanges"
+            raise ModelError(f"{both}: each spring carries one phalanx.")
         if min(self.phalanges[:-1], default=1.0) <= 0 or self.phalanges[-1] < 0:
             raise ModelError(f"phalanges of {self.phalanges} m: they must be > 0, the last >= 0.")
 
@@ -225,8 +225,7 @@ def close(
         ConfigError: for both tension and pull, a tension below zero, a pull beyond the springs.
         SolverError: if no posture was found; ``error.solution`` is the last good one.
     """
-    if tension is not None and pull is not None:
-        raise ConfigError("both tension and pull are given; one follows from the other.")
+    not_both("close", tension=tension, pull=pull)
     if pull is not None:
         limit = 0.9 * sum(s.length for s in finger.springs)
         between("pull [m] of springs so long", pull, 0, limit, "[)")

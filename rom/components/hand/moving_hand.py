@@ -15,7 +15,7 @@ from functools import partial
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import finite, not_negative, number, positive
+from rom.arguments import finite, not_negative, number, one_given, positive
 from rom.components.cosserat import RodBody, body
 from rom.components.cosserat.coils import with_coils
 from rom.components.cosserat.helical_spring import HelicalSpring
@@ -194,8 +194,7 @@ def _palm(mech: Mechanism, build: Build, seats: list[Seat]) -> Part:
 def _finger(mech: Mechanism, build: Build, name: str, finger: Finger, seat: Seat) -> list[Marker]:
     """Springs and phalanges in turn; the holes of the cable."""
     if finger.phalanges[-1] <= 0.0:
-        text = f"finger {name!r} ends in a bare plate, which has no mass."
-        raise ModelError(text, hint="Give its last phalanx a length.")
+        raise ModelError(f"finger {name!r} ends in a bare plate; give its last phalanx a length.")
     A, palm = seat.axes, mech.parts["palm"]
     at, hole = np.asarray(seat.at, dtype=float), np.array([finger.offset, 0.0, 0.0])
     before = _on_palm(palm, at)
@@ -258,8 +257,8 @@ def _cables(
         joint = f"{name} joint {k}"
         if joint in drives:
             if drives[joint].conduit:
-                text = f"the cable of {joint!r} alone runs in a sleeve, not in a conduit."
-                raise ConfigError(text, hint="Give its sleeve a length.")
+                text = f"the cable of {joint!r} alone runs in a sleeve, not in a conduit"
+                raise ConfigError(f"{text}; give its sleeve a length.")
             _cable(mech, joint, drives[joint], holes[2 * k - 2 : 2 * k], (0.0, length))
 
 
@@ -267,8 +266,7 @@ def _cable(
     mech: Mechanism, name: str, drive: Drive, path: list[Marker], limits: tuple[float, float]
 ) -> None:
     """One tendon; limits are the friction in its holes [1] and the length of its springs [m]."""
-    if (drive.tension is None) == (drive.pull is None):
-        raise ConfigError(f"the drive of {name!r} needs either a tension or a pull.")
+    one_given(f"the drive of {name!r}", tension=drive.tension, pull=drive.pull)
     friction, springs = limits
     sliding = drive.transition_speed if friction else None
     cable = partial(mech.tendon, f"{name} cable", path, friction=friction, transition_speed=sliding)

@@ -44,16 +44,13 @@ def film(
     """
     m, v = four(motion) / bearing.scale, four(rate) / (bearing.scale * speed)
     if not (speed > 0 and viscosity > 0):
-        text = f"speed {speed} rad/s and viscosity {viscosity} Pa s must be positive."
-        hint = "A shaft that turns the other way is described from its other end."
-        raise ModelError(text, hint=hint)
+        text = f"speed {speed} rad/s and viscosity {viscosity} Pa s must be positive"
+        raise ModelError(f"{text}; see a shaft that turns otherwise from its other end.")
     if bearing.aligned and np.any([m[2:], v[2:]]):
         raise ModelError("the journal tilts, but the bearing is aligned; give it aligned=False.")
     if not bearing.thinnest(motion) > 0:
-        raise ModelError(
-            f"the journal touches the bush at {np.asarray(motion) * 1e6} (micrometres, "
-            f"microradians); it must stay within {bearing.clearance * 1e6:.3g} micrometres."
-        )
+        text = f"the journal touches the bush at {np.asarray(motion) * 1e6} (micrometres, -radians"
+        raise ModelError(f"{text}); its clearance is {bearing.clearance * 1e6:.3g} micrometres.")
     shape = bearing.grid.fixed.shape
     films = cells_of([bearing])
     films.state[0, : 2 * N_MOTIONS + 1] = *m, *v, 1.0

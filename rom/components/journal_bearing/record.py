@@ -30,8 +30,8 @@ def film_pressures(solution: Solution, name: str) -> Array:
     check_known(name, names, f"no journal bearing {name!r}; there are")
     k, table = names.index(name), solution.packed.elements[JOURNAL_BEARINGS_FAMILY]
     if table.number[k] >= 0:
-        text = f"the film of {name!r} is read from a table, which has no pressure in cells."
-        raise ConfigError(text, hint="Leave out tabulated=True.")
+        text = f"the film of {name!r} is read from a table, which has no pressure in cells"
+        raise ConfigError(f"{text}; leave out tabulated=True.")
     films, (nt, nz) = table.films, table.films.shape[k]
     ratio2 = (films.size[k, RADIUS] / films.size[k, CLEARANCE]) ** 2
     pressure = [table.viscosity[k] * ratio2 * films.P[k] for _ in at_instants(solution)]

@@ -88,12 +88,10 @@ def _settled(bearing: JournalBearing, W: Array, x: Array, speed: float, viscosit
     where = ", ".join(f"{np.degrees(g.angle):.0f}" for g in bearing.grooves)
     there = f" with oil from grooves at {where} degrees" if bearing.grooves else ""
     cures = {"jfo": "Move the inlet out of the loaded arc, upstream of it, or lower the load."}
-    raise SolverError(
-        f"no film carries {size:.4g} N{there}: at {now.eccentricity:.3f} clearances, "
-        f"{bearing.thinnest(now.motion) * 1e6:.3g} micrometres thin, it carries "
-        f"{np.hypot(*now.force[:2]):.4g} N.",
-        hint=cures.get(bearing.cavitation, "Lower the load, or raise speed, viscosity or length."),
-    )
+    hint = cures.get(bearing.cavitation, "Lower the load, or raise speed, viscosity or length.")
+    thin = f"{bearing.thinnest(now.motion) * 1e6:.3g} micrometres thin"
+    text = f"no film carries {size:.4g} N{there}: at {now.eccentricity:.3f} clearances, {thin}, it"
+    raise SolverError(f"{text} carries {np.hypot(*now.force[:2]):.4g} N.", hint=hint)
 
 
 @dataclass(frozen=True, slots=True)
@@ -233,9 +231,7 @@ def warm_bearing(
     """
     growth = bearing.radius * (expansion[0] * bush * free - expansion[1] * shaft)
     if bearing.clearance + growth <= 0:
-        raise ModelError(
-            f"the shaft seizes: {shaft} K on the shaft and {bush} K on the bush change the "
-            f"clearance of {bearing.clearance * 1e6:.3g} micrometres by {growth * 1e6:.3g}.",
-            hint="Warm the bush too, or fit with more clearance.",
-        )
+        text = f"the shaft seizes: {shaft} K on the shaft and {bush} K on the bush change the"
+        change = f"clearance of {bearing.clearance * 1e6:.3g} micrometres by {growth * 1e6:.3g}"
+        raise ModelError(f"{text} {change}; warm the bush too, or fit with more clearance.")
     return replace(bearing, clearance=bearing.clearance + growth)

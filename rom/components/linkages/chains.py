@@ -7,14 +7,14 @@ from typing import Annotated, Literal
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import one_of, positive, typed
-from rom.arguments.quantities import Positive, Quantity
+from rom.arguments import NotNegative, one_of, positive, typed
+from rom.arguments.quantities import Positive
 from rom.errors import ModelError
 from rom.model import Array, Index
 
 Elastic = Literal["held", "free"] | float  # see `Linkage.inertia`
-Mass = Annotated[float, Quantity("kg", low=0.0, ends="[)", error=ModelError)]
-Inertia = Annotated[float, Quantity("kg m^2", low=0.0, ends="[)", error=ModelError)]
+Mass = Annotated[float, NotNegative("kg", error=ModelError)]
+Inertia = Annotated[float, NotNegative("kg m^2", error=ModelError)]
 MovedMass = Annotated[float, Positive("kg", error=ModelError)]  # without which nothing resists
 MIN_HEIGHT = 1e-6  # of the tip over the way between the elbows: flatter, and it counts as one line
 CHUNK_SIZE = 8192  # configurations at once: elastic links need (3 + r) (2 + sum r) numbers for each
@@ -178,11 +178,9 @@ class ClosedLinkage(Linkage):
             worst = np.argmin(np.where(np.isnan(height), -np.inf, height))
             k = np.unravel_index(worst, height.shape)
             a, b = (coupler.length for coupler in self.couplers)
-            raise ModelError(
-                f"at q = ({q1[k]:.4g}, {q2[k]:.4g}) the elbows are {np.sqrt(square[k]):.4g} m "
-                f"apart; couplers of {a:.4g} m and {b:.4g} m do not meet or lie in one line.",
-                hint="Lengthen the couplers or shorten the cranks.",
-            )
+            far = f"the elbows are {np.sqrt(square[k]):.4g} m apart; couplers of {a:.4g} m and"
+            text = f"at q = ({q1[k]:.4g}, {q2[k]:.4g}) {far} {b:.4g} m do not meet"
+            raise ModelError(f"{text}; lengthen the couplers or shorten the cranks.")
         return left + along[..., None] * gap + self.side * np.sqrt(height)[..., None] * left_of(gap)
 
     def assembles(self, q1: npt.ArrayLike, q2: npt.ArrayLike) -> npt.NDArray[np.bool_]:

@@ -145,10 +145,8 @@ def _there(assembles: Assembles | None, q1: Array, q2: Array, n: int) -> Array:
     """(n, n) where the mechanism can be assembled, if there is such a place."""
     there = np.ones(q1.shape, bool) if assembles is None else np.asarray(assembles(q1, q2), bool)
     if not there.any():
-        raise ModelError(
-            f"none of {n} by {n} positions of the cranks can be assembled.",
-            hint="Lengthen the couplers, or bring the pivots closer.",
-        )
+        text = f"none of {n} by {n} positions of the cranks can be assembled"
+        raise ModelError(f"{text}; lengthen the couplers, or bring the pivots closer.")
     return there
 
 
@@ -181,11 +179,8 @@ def isotropic_configurations(
     turn = np.linalg.det(anisotropy_gradient(inertia, q))
     winding = np.where(np.abs(turn) > MIN_JACOBIAN, np.sign(turn), 0).astype(int)
     if there.all() and winding.all() and winding.sum():
-        raise SolverError(
-            f"the windings of {winding.size} isotropic points add up to {winding.sum()}, not 0: "
-            f"a grid of {n} cells per turn misses some.",
-            hint="Take a finer grid.",
-        )
+        text = f"the windings of {winding.size} isotropic points add up to {winding.sum()}, not 0."
+        raise SolverError(text, hint=f"Take a finer grid than {n} cells per turn.")
     return Isotropic(q, inertia(*q.T)[:, 0, 0], winding)
 
 
@@ -225,11 +220,8 @@ def inertia_at(inertia: Inertia, q1: Array, q2: Array) -> Array:
     """(..., 2, 2) what a function returns at coordinates (...), if it is one inertia for each."""
     A, wanted = inertia(q1, q2), (*np.shape(q1), 2, 2)
     if np.shape(A) != wanted or np.asarray(A).dtype.kind not in "iuf":
-        raise ModelError(
-            f"inertia returns {shortened(A)}; for arrays of angles {np.shape(q1)} it must return "
-            f"numbers of the shape {wanted}, not {np.shape(A)}.",
-            hint="Write it for arrays of angles.",
-        )
+        text = f"inertia returns {shortened(A)}; for arrays of angles {np.shape(q1)} it must return"
+        raise ModelError(f"{text} numbers of the shape {wanted}, not {np.shape(A)}.")
     return np.asarray(A, dtype=float)
 
 

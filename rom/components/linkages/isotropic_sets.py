@@ -193,10 +193,8 @@ def tool_isotropy(
 def _place(tip: Tip, q: Array) -> Array:
     """(k, 2) the tool at coordinates (k, 2), if the function gives one place for each."""
     if np.shape(x := tip(*q.T)) != q.shape:
-        raise ModelError(
-            f"tip returns the shape {np.shape(x)} for {len(q)} postures, not {q.shape}.",
-            hint="Write it for arrays of coordinates; a place is two numbers.",
-        )
+        text = f"tip returns the shape {np.shape(x)} for {len(q)} postures, not {q.shape}"
+        raise ModelError(f"{text}; write it for arrays, a place is two numbers.")
     return x
 
 

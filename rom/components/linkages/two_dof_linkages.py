@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import null_space
 
-from rom.arguments import one_of, typed
+from rom.arguments import NotNegative, one_of, typed
 from rom.arguments.quantities import Quantity, Size
 from rom.body.flexible import FlexibleBody
 from rom.components.linkages.chains import (
@@ -151,7 +151,7 @@ class FiveBar(ClosedLinkage):
         ModelError: for an unknown side.
     """
 
-    base: Annotated[float, Quantity("m", low=0.0, ends="[)", error=ModelError)]
+    base: Annotated[float, NotNegative("m", error=ModelError)]
     cranks: tuple[Link, Link]
     couplers: tuple[Link, Link]
     payload: Mass = 0.0
@@ -311,8 +311,6 @@ class Driven:
         E = W.G[self._rows] @ N
         mobility = E @ np.linalg.solve(N.T @ W.S @ N, E.T)
         if (self._is_held and N.shape[1] != 2) or np.linalg.cond(mobility) > 1e12:
-            raise ModelError(
-                f"with elastic coordinates held the joints leave {N.shape[1]} motions to the two "
-                f"drives {self.drives!r}: needed are two, and no singular position."
-            )
+            text = f"with elastic coordinates held the joints leave {N.shape[1]} motions to drives"
+            raise ModelError(f"{text} {self.drives!r}: needed are two, and no singular position.")
         return np.linalg.inv(mobility)

@@ -21,6 +21,7 @@ from rom.components.masonry.discontinuous_deformation import Drive
 from rom.components.masonry.stones import Masonry, touching
 from rom.errors import ConfigError
 from rom.model import Array, Index
+from rom.names import check_once
 
 ON_EDGE_RTOL = 1e-6  # of the size of a stone: how far from its edge a point is still on it
 
@@ -188,8 +189,7 @@ class SupportMotion:
             if stone not in touched:
                 raise ConfigError(f"{self.name} moves stone {stone}, which must support another.")
         if values_at(self.name, self.history, np.zeros(1))[0] != 0.0:
-            text = f"{self.name} begins away from where its stones lie."
-            raise ConfigError(text, hint="Let its history be 0 at t = 0.")
+            raise ConfigError(f"{self.name} begins away from where its stones lie; be 0 at t = 0.")
         chosen = np.isin(np.arange(len(masonry.stones)), self.stones)[:, None]
         moved = chosen * np.array([*self.shift, self.turn])
         return lambda t: np.diff(values_at(self.name, self.history, t))[:, None, None] * moved
@@ -258,8 +258,7 @@ def facing(masonry: Masonry, direction: tuple[float, float]) -> tuple[tuple[int,
 def driver(masonry: Masonry, actions: Sequence[Action]) -> Callable[[Array], Drive]:
     """What acts in the steps between times (n + 1,); a support that jumps in one is refused."""
     moved = [s for a in actions if isinstance(a, SupportMotion) for s in a.stones]
-    if twice := sorted({s for s in moved if moved.count(s) > 1}):
-        raise ConfigError(f"supports {twice} are moved by two actions; only one may move each.")
+    check_once(moved, "a support moved by an action,")
     loads = [a.begin(masonry) for a in actions if isinstance(a, PointLoad | MovingLoad | Wind)]
     supports = [a.begin(masonry) for a in actions if isinstance(a, SupportMotion)]
     grounds = [a.begin(masonry) for a in actions if isinstance(a, BaseMotion)]
@@ -279,10 +278,9 @@ def driver(masonry: Masonry, actions: Sequence[Action]) -> Callable[[Array], Dri
         if jump.size and jump.max() > 0.5 * reach:
             k, stone = np.unravel_index(np.argmax(jump), jump.shape)
             how = f"moves by {jump.max():.3g} m in the step before t = {t[k + 1]:g} s"
-            raise ConfigError(
-                f"support {stone} {how}; corners watch edges within {reach:.3g} m.",
-                hint="Let its history be smooth, the step shorter, or reach longer.",
-            )
+            hint = "Let its history be smooth, the step shorter, or reach longer."
+            text = f"support {stone} {how}; corners watch edges within {reach:.3g} m."
+            raise ConfigError(text, hint=hint)
         return Drive(block, corner, share, force, turns, ground, shift)
 
     return at
@@ -334,10 +332,8 @@ def _place(name: str, masonry: Masonry, stone: int, x: Array) -> tuple[Index, Ar
         o = (k + 1) % len(corners)
         return first + np.array([k, o, o]), np.array([1 - w[k], w[k], 0.0])
     if not is_inside(corners, x):
-        raise ConfigError(
-            f"{name} at {x.tolist()} lies {far[k]:.4g} m outside of stone {stone}.",
-            hint="Give a point in or on the stone, where it lies at the start.",
-        )
+        text = f"{name} at {x.tolist()} lies {far[k]:.4g} m outside of stone {stone}"
+        raise ConfigError(f"{text}; give a point in or on it, where it lies at the start.")
     triangles = Delaunay(corners)
     simplex = triangles.simplices[triangles.find_simplex(x)]
     share = np.linalg.solve(np.vstack([corners[simplex].T, np.ones(3)]), np.r_[x, 1.0])

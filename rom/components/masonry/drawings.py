@@ -54,8 +54,8 @@ def drawn(
     outlines = [x[_outline(name, x, T[chosen])] for name, chosen in rows.items()]
     fixed = {k for name in held for k in _numbers(name, names)}
     if len(fixed) == len(names):
-        text = f"all stones are held: {', '.join(names) or 'there is none'}."
-        raise ConfigError(text, hint="Leave one free to move, or draw it.")
+        text = f"all stones are held: {', '.join(names) or 'there is none'}"
+        raise ConfigError(f"{text}; leave one free to move, or draw it.")
     masonry = rock.masonry([rock.stone(o) for o in outlines], tuple(sorted(fixed)))
     _check_apart(names, outlines, x[T].mean(axis=1), list(rows.values()))
     _check_joints(names, masonry)
@@ -90,11 +90,9 @@ def _outline(name: str, x: Array, T: Index) -> Index:
     while len(loop) <= len(after) and after.get(loop[-1], loop[0]) != loop[0]:
         loop.append(after[loop[-1]])
     if not outer or len(loop) != outer:
-        raise ModelError(
-            f"stone {name!r} of {len(T)} triangles is not one piece without holes: a walk around "
-            f"it meets {len(loop)} of {outer} sides.",
-            hint="Draw one plane surface a stone, and cut those with holes in two.",
-        )
+        text = f"stone {name!r} of {len(T)} triangles is not one piece without holes"
+        hint = "Draw one plane surface a stone, and cut those with holes in two."
+        raise ModelError(f"{text}: around it are {len(loop)} of {outer} sides.", hint=hint)
     nodes = np.array(loop)
     u = x[nodes] - x[np.roll(nodes, 1)]
     v = np.roll(u, -1, axis=0)

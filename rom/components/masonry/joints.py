@@ -69,9 +69,8 @@ def read_joints(path: str | Path) -> tuple[Joint, ...]:
         raise FileFormatError(f"{path} is no file of joints: {error}") from error
     laws = listed.get("joint")
     if set(listed) != {"joint"} or not isinstance(laws, list) or not laws:
-        raise FileFormatError(
-            f"{path} has {sorted(listed)}; laws of joints are tables [[joint]] and nothing else."
-        )
+        text = f"{path} has {sorted(listed)}"
+        raise FileFormatError(f"{text}; laws of joints are tables [[joint]] and nothing else.")
     return tuple(_law(f"{path}, joint {k + 1}", law) for k, law in enumerate(laws))
 
 
@@ -161,5 +160,5 @@ def _check_touch(joints: Sequence[Joint], touching: Index) -> None:
     for joint in joints:
         for pair in (joint.between if joint.cohesion or joint.tension else None) or ():
             if tuple(sorted(pair)) not in there:
-                text = f"stones {pair[0]} and {pair[1]} do not touch along an edge at the start."
-                raise ConfigError(text, hint="Name pairs that touch, or lay them closer.")
+                text = f"stones {pair[0]} and {pair[1]} do not touch along an edge at the start"
+                raise ConfigError(f"{text}; name pairs that touch, or lay them closer.")

@@ -143,17 +143,16 @@ def wall(
     for opening in openings:
         left, right, low, top = opening
         if not (0 < left < right < length and 0 <= low <= top < courses):
-            raise ConfigError(
-                f"the opening {opening} is not in a wall of {length} m and {courses} courses.",
-                hint="Left end, right end [m], first course, course of the lintel.",
-            )
+            text = f"the opening {opening} is not in a wall of {length} m and {courses} courses."
+            hint = "Left end, right end [m], first course, course of the lintel."
+            raise ConfigError(text, hint=hint)
     stones = [rock.stone(_box(-b, length + b, -h, 0.0))]
     for r in range(courses):
         here = [(x, y, r == top) for x, y, low, top in openings if low <= r <= top]
         holes = sorted((x - b / 2 * lintel, y + b / 2 * lintel, lintel) for x, y, lintel in here)
         if any(one[1] > other[0] + 1e-9 for one, other in pairwise(holes)):
-            text = f"in course {r} of the wall two of the openings {openings} meet."
-            raise ConfigError(text, hint="Leave a brick between two lintels.")
+            text = f"in course {r} of the wall two of the openings {openings} meet"
+            raise ConfigError(f"{text}; leave a brick between two lintels.")
         cuts = np.r_[0.0, np.arange(b / 2 if r % 2 else b, length - 1e-9, b), length]
         spans = list(pairwise(cuts))
         for x, y, _ in holes:

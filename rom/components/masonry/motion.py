@@ -138,12 +138,10 @@ def simulate(  # noqa: PLR0913  all that a run needs
         energy[k] = advance(B, law, C, old, W, dt, driven, float(damping), cuts)
         Q[k], V[k], broken[k] = W.q, W.v, np.sum(law.bonds.intact == 0)
         if not np.isfinite(energy[k]):
-            raise SolverError(
-                f"contacts do not settle near t = {found.t[k]:.6g} s, even in steps of "
-                f"{dt / 3**8:.2g} s.",
-                hint="Use softer contacts, or a smaller dt.",
-                solution=_first(found, k, int(cuts[0])),
-            )
+            least, before = f"{dt / 3**8:.2g} s", _first(found, k, int(cuts[0]))
+            text = f"contacts do not settle near t = {found.t[k]:.6g} s, even in steps of {least}."
+            hint = "Use softer contacts, or a smaller dt."
+            raise SolverError(text, hint=hint, solution=before)
     return _first(found, len(kept), int(cuts[0]))
 
 

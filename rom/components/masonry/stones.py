@@ -15,7 +15,7 @@ import numpy.typing as npt
 from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-from rom.arguments import Between, Length, NotNegative, Positive, finite, typed
+from rom.arguments import Between, Length, NotNegative, Positive, check_places, finite, typed
 from rom.body.flexible import FlexibleBody
 from rom.body.surface import surface_of
 from rom.components.masonry.block_contact import (
@@ -107,8 +107,8 @@ def _corners(outline: npt.ArrayLike) -> Array:
         raise ModelError(f"corner {int(sides.argmin())} is listed twice in turn; leave one out.")
     area = float((x[:, 0] * y[:, 1] - x[:, 1] * y[:, 0]).sum() / 2)
     if not area > 0:
-        text = f"an outline of {len(x)} corners encloses {area:.4g} m2."
-        raise ModelError(text, hint="List at least three corners, counterclockwise.")
+        text = f"an outline of {len(x)} corners encloses {area:.4g} m2"
+        raise ModelError(f"{text}; list at least three corners, counterclockwise.")
     return x
 
 
@@ -141,10 +141,8 @@ def reduced_stone(body: FlexibleBody, outline: npt.ArrayLike) -> Stone:
     at = far < 1e-6 * body.size
     if not at.any(axis=1).all():
         k = int(np.argmin(at.any(axis=1)))
-        raise ModelError(
-            f"no node of body {body.name!r} lies at the corner {corners[k].tolist()}; the nearest "
-            f"is {far[k].min():.3g} m away. Give outlines through nodes, in metres."
-        )
+        text = f"no node of body {body.name!r} lies at the corner {corners[k].tolist()}; one"
+        raise ModelError(f"{text} is {far[k].min():.3g} m away. Give outlines through nodes.")
     shapes = np.array([shape[nodes, :2].mean(axis=0) for nodes in at])
     centre = body.first_moment[:2] / body.mass
     M = np.diag(np.r_[body.mass, body.mass, 0.0, np.zeros(body.n_modes)])
@@ -185,11 +183,9 @@ class Masonry:
     thickness: Length = 1.0
 
     def __post_init__(self) -> None:
-        if not set(self.held) <= set(range(len(self.stones))):
-            raise ConfigError(f"held = {self.held} must be of stones 0 to {len(self.stones) - 1}.")
+        check_places("held: stone", self.held, len(self.stones))
         if len(set(self.held)) == len(self.stones):
-            text = f"all of {len(self.stones)} stones are held."
-            raise ConfigError(text, hint="Leave one free to move.")
+            raise ConfigError(f"all of {len(self.stones)} stones are held; leave one free to move.")
 
     @property
     def law(self) -> Law:

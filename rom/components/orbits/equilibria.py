@@ -305,11 +305,9 @@ class _March:
                 if leaves or len(self.states) == n:
                     return
         except SolverError as error:
-            raise SolverError(
-                f"the path of equilibria was lost behind t = {self.states[-1].t:.6g} s: "
-                f"{error.message}",
-                hint="Take shorter steps, or begin behind what happens there.",
-            ) from error
+            text = f"the path of equilibria was lost behind t = {self.states[-1].t:.6g} s"
+            hint = "Take shorter steps, or begin behind what happens there."
+            raise SolverError(f"{text}: {error.message}", hint=hint) from error
 
     def add(self, point: Point) -> None:
         """Keep a point."""

@@ -132,10 +132,8 @@ class Shooting:
         """Derivatives at the motion that was found."""
         self._say("")
         if self.period is None and not max(map(np.linalg.norm, found.rate)) > REST_TOL:
-            raise SolverError(
-                "what was found is a state of rest, not a motion.",
-                hint="Begin with start= a state that moves, or nearer to the motion.",
-            )
+            hint = "Begin with start= a state that moves, or nearer to the motion."
+            raise SolverError("what was found is a state of rest, not a motion.", hint=hint)
         refuse_other_forces(found)
         return confirmed(found, tangent)
 
@@ -367,8 +365,6 @@ def _guessed(mechanism: Mechanism, state: State | None) -> float:
     linear = linearize(mechanism, state)
     turning = linear.eigenvalues[linear.eigenvalues.imag > 0.0]
     if not turning.size:
-        raise ConfigError(
-            "no small motion about the start oscillates: its period cannot be guessed.",
-            hint="Give guess= a period near the one looked for, or period= that of the drives.",
-        )
+        text = "no small motion about the start oscillates: its period cannot be guessed."
+        raise ConfigError(text, hint="Give guess= a period near it, or period= that of the drives.")
     return float(2 * np.pi / turning[np.argmax(turning.real)].imag)

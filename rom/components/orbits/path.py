@@ -187,10 +187,9 @@ class _March:
                 if leaves or len(self.motions) == n:
                     return
         except SolverError as error:
-            raise SolverError(
-                f"the path of motions was lost behind {self.p[-1]:.6g}: {error.message}",
-                hint="Take shorter steps (step=), or more of them per period (steps=).",
-            ) from error
+            text = f"the path of motions was lost behind {self.p[-1]:.6g}: {error.message}"
+            hint = "Take shorter steps (step=), or more of them per period (steps=)."
+            raise SolverError(text, hint=hint) from error
         finally:
             if self.progress:
                 line("")

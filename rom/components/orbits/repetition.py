@@ -52,12 +52,9 @@ def _refuse_parts(one: dict[str, float], two: dict[str, float]) -> None:
     for name, phase in one.items():
         passed = two[name] - phase
         if abs(passed - round(passed)) > PHASE_TOL:
-            raise ModelError(
-                f"mesh {name!r} has gone on by {passed:.6g} teeth after the period: "
-                "no whole number.",
-                where=name,
-                hint="Give the period of the teeth, or a multiple; turns= of whole teeth.",
-            )
+            text = f"mesh {name!r} has gone on by {passed:.6g} teeth, not by whole ones."
+            hint = "Give the period of the teeth, or a multiple; turns= of whole teeth."
+            raise ModelError(text, where=name, hint=hint)
 
 
 def _refuse_signal(flow: Flow, turns: Turns, signal: Signal, shift: float, driven: bool) -> None:
@@ -151,13 +148,9 @@ def refuse_other_forces(found: Return) -> None:
     size = max(np.abs(one).max(), np.abs(two).max(), flow.pressed)
     if abs(two[k] - one[k]) > LATER_RTOL * size:
         name = _body(flow, k)
-        raise ModelError(
-            f"after the period other forces act on {name!r} in the same place: "
-            f"{two[k]:.4g} for {one[k]:.4g} N or N m.",
-            where=name,
-            hint="An element knows how far it has turned: turns must fit each other, as those of "
-            "two wheels do, and springs about an axis must not be wound up.",
-        )
+        text = f"after the period other forces act on {name!r} in the same place: {two[k]:.4g} for"
+        hint = "Turns must fit each other, as those of two wheels do, and springs not be wound up."
+        raise ModelError(f"{text} {one[k]:.4g} N or N m.", where=name, hint=hint)
 
 
 def _body(flow: Flow, k: int) -> str:

@@ -166,11 +166,9 @@ def _own_axis(part: Part, spin: Array) -> Array:
     size = SYMMETRY_RTOL * values.max()
     equal = [abs(values[k - 2] - values[k - 1]) <= size for k in range(3)]
     if not any(equal) or not spin.any():
-        raise ModelError(
-            f"no axis of its own is known about which {part.name!r} advances.",
-            where=part.name,
-            hint="Name the joint it turns in, or let it spin at the start.",
-        )
+        text = f"no axis of its own is known about which {part.name!r} advances"
+        cure = "name the joint it turns in, or let it spin at the start"
+        raise ModelError(f"{text}; {cure}.", where=part.name)
     axis = spin / np.linalg.norm(spin) if all(equal) else axes[:, equal.index(True)]
     return axis if axis @ spin > 0.0 else -axis
 
@@ -187,11 +185,9 @@ def _refuse_unequal(name: str, part: Part, axis: Array, point: Array, angle: flo
     if part.r:
         what = "it is flexible, and its elastic coordinates describe other shapes"
     if what:
-        raise ModelError(
-            f"turns: after {how} of {name!r} the body {part.name!r} is another one: {what}.",
-            where=part.name,
-            hint="Take a period of whole revolutions of this body.",
-        )
+        text = f"turns: after {how} of {name!r} the body {part.name!r} is another one: {what}."
+        hint = "Take a period of whole revolutions of this body."
+        raise ModelError(text, where=part.name, hint=hint)
 
 
 @dataclass(frozen=True)

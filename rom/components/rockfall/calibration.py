@@ -15,7 +15,7 @@ from rom.components.histories import Table
 from rom.components.rockfall.impact import Gallery, Impact, scaled, strike
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.model import Array
-from rom.names import check_known
+from rom.names import check_known, check_once
 
 CHANNELS: dict[str, Callable[[Gallery, Impact], Array]] = {
     "acceleration of the boulder": lambda g, i: i.forces[:, 0] / g.boulder,  # as a sensor reads it
@@ -119,8 +119,9 @@ def calibrate(
     """
     pieces = _pieces(measured, t_end)
     scaled(g, dict.fromkeys(names, 1.0))
-    if len(set(names)) != len(names) or not names:
-        raise ConfigError(f"names = {tuple(names)} must be at least one parameter, each once.")
+    check_once(names, "names:")
+    if not names:
+        raise ConfigError("names = () must be at least one parameter.")
     end = max(float(h.t[-1]) for _, h in pieces)
     count = 0
 
@@ -190,8 +191,6 @@ def _covariance(J: Array, x: Array, names: Names, bounds: tuple[Array, Array]) -
     at_bound = (np.abs(x - bounds[0]) < DERIVATIVE_STEP) | (np.abs(x - bounds[1]) < DERIVATIVE_STEP)
     lost = blind + [n for n, w, b in zip(names, wide, at_bound, strict=True) if w or b]
     if lost:
-        raise ModelError(
-            f"the histories do not determine {', '.join(dict.fromkeys(lost))}.",
-            hint="Fit fewer parameters, or measure where they matter.",
-        )
+        text = f"the histories do not determine {', '.join(dict.fromkeys(lost))}"
+        raise ModelError(f"{text}; fit fewer parameters, or measure where they matter.")
     return cov

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import eigh
 
-from rom.arguments import Count, Length, Positive, finite, typed
+from rom.arguments import Count, Length, NotNegative, Positive, finite, typed, typed_record
 from rom.body.flexible import FlexibleBody
 from rom.components.rockfall import kernels
 from rom.components.rockfall.laws import GRAVITY, Cushion, Mass, Shear
@@ -33,6 +33,7 @@ NEARLY_THROUGH = 0.9  # of the limit of a cushion, where steps begin to miss it
 PARTS = (1, 4, 7, 10, 17)  # where time, ways, speeds, forces and energies end in a row
 
 
+@typed_record
 @dataclass(frozen=True, slots=True)
 class Slab:
     """Modes of the slab on its supports, mass-normalised, as the plug feels them.
@@ -53,8 +54,8 @@ class Slab:
 
     phi: Array
     omega: Array
-    damping: float = 0.05
-    capacity: float = np.inf
+    damping: Annotated[float, NotNegative(error=ModelError)] = 0.05
+    capacity: Annotated[float, Positive("N", error=ModelError, infinite=True)] = np.inf
 
     def __post_init__(self) -> None:
         both = self.phi, self.omega
@@ -63,9 +64,6 @@ class Slab:
             raise ModelError("a slab needs as many phi as omega, and supports that hold it.")
         if not np.any(self.phi):
             raise ModelError("no mode of the slab moves under the plug; choose another place.")
-        if not (self.capacity > 0 and 0 <= self.damping < np.inf):
-            given = f"capacity = {self.capacity} N, damping = {self.damping}"
-            raise ModelError(f"{given}: needed are capacity > 0, damping >= 0.")
 
     @classmethod
     @typed

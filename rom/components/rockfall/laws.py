@@ -9,7 +9,16 @@ import numpy.typing as npt
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from rom.arguments import Positive, typed, unit_vector
+from rom.arguments import (
+    AtLeast,
+    Between,
+    NotNegative,
+    Positive,
+    not_negative,
+    typed,
+    typed_record,
+    unit_vector,
+)
 from rom.components.rockfall import kernels
 from rom.errors import ConfigError
 from rom.model import Array
@@ -17,6 +26,8 @@ from rom.model import Array
 Mass = Annotated[float, Positive("kg")]
 Modulus = Annotated[float, Positive("Pa")]
 Density = Annotated[float, Positive("kg/m^3")]
+Recovery = Annotated[float, Between(0.0, 1.0, "(]")]  # share of an energy
+Capacity = Annotated[float, Positive("N", infinite=True)]
 GRAVITY = 9.81  # m/s^2
 ROCK = 2600.0  # its density [kg/m^3]
 # share of the energy that sand gives back: a boulder returns with a sixth of its speed, as the
@@ -45,10 +56,7 @@ class Resistance(ABC):
         Raises:
             ConfigError: for a negative energy, or one that takes the boulder through the cushion.
         """
-        if not 0 <= energy < np.inf:
-            raise ConfigError(f"energy = {energy} J: the cushion takes up what the boulder has.")
-
-        law, low, left = self.law, 0.0, energy
+        law, low, left = self.law, 0.0, not_negative("energy", energy)
 
         def missing(d: float) -> float:
             return float(quad(lambda x: kernels.cushion(x, x, law), low, d)[0]) - left
@@ -60,10 +68,10 @@ class Resistance(ABC):
                 return float(brentq(missing, low, high))
             low, left = high, -rest
         text = f"energy = {energy:.3g} J: the cushion takes up {energy - left:.3g} J before it is"
-        hint = "Take a thicker or a stiffer one."
-        raise ConfigError(f"{text} pressed through to {self.limit:g} m.", hint=hint)
+        raise ConfigError(f"{text} pressed through to {self.limit:g} m; take a stiffer one.")
 
 
+@typed_record
 @dataclass(frozen=True, slots=True)
 class Cushion(Resistance):
     """Resistance of the cushion to penetration d; it cannot pull.
@@ -83,17 +91,11 @@ class Cushion(Resistance):
         ConfigError: for a number out of its range.
     """
 
-    stiffness: float
-    exponent: float = 1.5
-    recovery: float = SAND_RECOVERY
-    limit: float = np.inf
-    hardening: float = 0.0
-
-    def __post_init__(self) -> None:
-        good = 0 < self.stiffness < np.inf and self.limit > 0 and 0 < self.recovery <= 1
-        if not (good and self.exponent >= 1 and self.hardening >= 0):
-            needed = "stiffness and limit > 0, 0 < recovery <= 1, exponent >= 1, hardening >= 0"
-            raise ConfigError(f"{self}: needed are {needed}.")
+    stiffness: Annotated[float, Positive("N/m^n")]
+    exponent: Annotated[float, AtLeast(1.0)] = 1.5
+    recovery: Recovery = SAND_RECOVERY
+    limit: Annotated[float, Positive("m", infinite=True)] = np.inf
+    hardening: Annotated[float, NotNegative()] = 0.0
 
     @classmethod
     @typed
@@ -125,6 +127,7 @@ def ball_radius(boulder: float, rock: float = ROCK) -> float:
     return float((3 * boulder / (4 * np.pi * rock)) ** (1 / 3))
 
 
+@typed_record
 @dataclass(frozen=True, slots=True)
 class Shear:
     """Resistance of the plug to being pushed through the slab.
@@ -140,19 +143,14 @@ class Shear:
         ConfigError: for a number out of its range.
     """
 
-    stiffness: float
-    capacity: float = np.inf
-    reinforced: float = 0.0
-    ultimate: float = np.inf
-    damping: float = 0.05
-
-    def __post_init__(self) -> None:
-        good = 0 < self.stiffness < np.inf and self.capacity > 0 and self.ultimate > 0
-        if not (good and self.reinforced >= 0 and self.damping >= 0):
-            needed = "stiffness, capacity, ultimate > 0, reinforced, damping >= 0"
-            raise ConfigError(f"{self}: needed are {needed}.")
+    stiffness: Annotated[float, Positive("N/m")]
+    capacity: Capacity = np.inf
+    reinforced: Annotated[float, NotNegative("N/m")] = 0.0
+    ultimate: Annotated[float, Positive("m", infinite=True)] = np.inf
+    damping: Annotated[float, NotNegative()] = 0.05
 
 
+@typed_record
 class CushionForce:
     """The cushion between two markers of a mechanism, for one run of ``mechanism.user_force``.
 
@@ -167,9 +165,13 @@ class CushionForce:
             beside the slab.
     """
 
-    def __init__(self, cushion: Resistance, down: npt.ArrayLike, gap: float, reach: float = np.inf):
-        if not (0.0 <= gap < np.inf and reach > 0.0):
-            raise ConfigError(f"gap = {gap} m must be 0 or more, reach = {reach} m positive.")
+    def __init__(
+        self,
+        cushion: Resistance,
+        down: npt.ArrayLike,
+        gap: Annotated[float, NotNegative("m")],
+        reach: Annotated[float, Positive("m", infinite=True)] = np.inf,
+    ):
         self.cushion, self.down = cushion, unit_vector("down", down)
         self.gap, self.reach = gap, reach
         self.t, self.trial, self.deepest = -np.inf, 0.0, 0.0

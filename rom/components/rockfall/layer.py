@@ -16,7 +16,17 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import Between, Length, Positive, Share, between, typed, vector
+from rom.arguments import (
+    Between,
+    Length,
+    Positive,
+    Share,
+    ascending,
+    between,
+    typed,
+    typed_record,
+    vector,
+)
 from rom.components.rockfall import kernels
 from rom.components.rockfall.laws import (
     GRAVITY,
@@ -25,6 +35,7 @@ from rom.components.rockfall.laws import (
     Density,
     Mass,
     Modulus,
+    Recovery,
     Resistance,
     Shear,
     ball_radius,
@@ -37,6 +48,7 @@ SAND_DENSITY, CONCRETE_DENSITY = 1800.0, 2500.0  # [kg/m^3]
 PUNCHING_SLOPE = 1.0  # of the cone that is punched out of the concrete, 45 degrees
 
 
+@typed_record
 @dataclass(frozen=True, slots=True)
 class Layer(Resistance):
     """A layer of sand of finite thickness under a boulder that is round below.
@@ -65,21 +77,13 @@ class Layer(Resistance):
     """
 
     exponent: ClassVar[float] = 1.5  # of unloading [1]
-    modulus: float
-    radius: float
-    thickness: float
-    angle: float = float(np.arctan(0.5))
-    recovery: float = SAND_RECOVERY
-    density: float = SAND_DENSITY
-    strength: float = np.inf
-
-    def __post_init__(self) -> None:
-        sizes = (self.modulus, self.radius, self.thickness, self.density)
-        good = all(0 < x < np.inf for x in sizes) and self.strength > 0
-        if not (good and 0 < self.recovery <= 1):
-            needed = "modulus, radius, thickness, density and strength > 0, 0 < recovery <= 1"
-            raise ConfigError(f"{self}: needed are {needed}.")
-        between("angle [rad]", self.angle, 0, np.pi / 2, "()")
+    modulus: Modulus
+    radius: Length
+    thickness: Length
+    angle: Annotated[float, Between(0.0, np.pi / 2, "()", "rad")] = float(np.arctan(0.5))
+    recovery: Recovery = SAND_RECOVERY
+    density: Density = SAND_DENSITY
+    strength: Annotated[float, Positive("Pa", infinite=True)] = np.inf
 
     @classmethod
     @typed
@@ -241,10 +245,8 @@ def arriving(
     Raises:
         ConfigError: for histories that do not fit, or a delay far shorter than the history.
     """
-    t, force = vector("t", t), vector("force", force)
-    if t.shape != force.shape or t.size < 2 or not (np.diff(t) > 0).all():
-        text = f"{t.size} instants with {force.size} forces"
-        raise ConfigError(f"{text}: needed are instants that grow, and a force at each.")
+    t = ascending("t", t)
+    force = vector("force", force, t.size)
     passages = int(np.ceil((t[-1] - t[0]) / delay / 2)) + 1
     if passages > MAX_PASSAGES:
         text = f"{passages} passages of a wave of {delay:.3g} s in {t[-1] - t[0]:.3g} s"

@@ -55,9 +55,8 @@ class BallBearing:
             text = f"conformity {self.conformity} must be above 0.5 and at most 1"
             raise ModelError(f"{text}: a groove is a little wider than its ball, by 0.52.")
         if not abs(self.contact_angle) < 1.4:
-            text = f"contact angle {self.contact_angle:g} rad is not below 80 degrees."
-            hint = "Angles are in radians; a thrust bearing is not one of these."
-            raise ModelError(text, hint=hint)
+            text = f"contact angle {self.contact_angle:g} rad is not below 80 degrees"
+            raise ModelError(f"{text}; angles are in radians, and thrust bearings none of these.")
 
     @property
     def count(self) -> int:
@@ -184,9 +183,7 @@ def _check_row(number: int, diameter: float, pitch: float, clearance: float) -> 
         text = f"{number} balls or rollers of {diameter:g} m on one of {pitch:g} m"
         raise ModelError(f"no bearing has {text}.")
     if diameter > pitch * np.sin(np.pi / number):
-        raise ModelError(
-            f"{number} balls or rollers of {diameter * 1e3:.4g} mm do not fit on a circle of "
-            f"{pitch * 1e3:.4g} mm.",
-            hint=f"There is room for {int(np.pi / np.arcsin(diameter / pitch))}.",
-        )
+        text = f"{number} balls or rollers of {diameter * 1e3:.4g} mm do not fit on a circle of"
+        room = f"there is room for {int(np.pi / np.arcsin(diameter / pitch))}"
+        raise ModelError(f"{text} {pitch * 1e3:.4g} mm; {room}.")
     between("clearance", clearance, -0.1 * diameter, 0.1 * diameter, "()", error=ModelError)

@@ -78,13 +78,9 @@ def check_round(name: str, mass: float, first: Array, inertia: Array, axis: Arra
     apart = float(np.linalg.norm(np.cross(axis, first)) / mass)
     size = np.sqrt(np.trace(inertia) / mass)
     if max(across[1] - across[0], tilted) > ROUND_RTOL * across[1] or apart > MESHED_RTOL * size:
-        raise ModelError(
-            f"its moments of inertia across the axis {axis.round(6).tolist()} are "
-            f"{across.round(9).tolist()} kg m^2 and its mass centre lies {apart:.3g} m beside it: "
-            "only a round body can turn through a frame that does not.",
-            where=name,
-            hint="Let its frame turn: give omega instead of spin.",
-        )
+        J = f"its inertia across {axis.round(6).tolist()} is {across.round(9).tolist()} kg m^2"
+        text = "only a round body can turn through a frame; give omega instead of spin"
+        raise ModelError(f"{text}: {J}, its mass centre lies {apart:.3g} m beside.", where=name)
 
 
 def _generator(body: "FlexibleBody", axis: Array, lam: Array, V: Array) -> Array:
@@ -120,9 +116,8 @@ def _turned_modes(body: "FlexibleBody", axis: Array, V: Array) -> Array:
     """(m, m) the elastic modes of V (6 + r, m) turned by the test angle, in multiples of them."""
     surface = body.surface
     if surface is None:
-        text = "a round body that turns through its frame needs a surface to show its shapes."
-        hint = "Reduce it from a mesh; reductions of bare matrices have none."
-        raise ModelError(text, where=body.name, hint=hint)
+        text = "a round body that turns through its frame needs a surface; reduce it from a mesh."
+        raise ModelError(text, where=body.name)
     X, centre = surface.points, body.first_moment / body.mass
     fields = _fields(X, surface.shape, V)
     R = matrix(exp(TEST_TURN * axis))

@@ -75,11 +75,8 @@ def _sense(name: str, a: Place, b: Place) -> float:
     cosine = float(a.axes[0] @ b.axes[0])
     if abs(cosine) < PARALLEL_COSINE:
         apart = np.degrees(np.arccos(cosine))
-        raise ConfigError(
-            f"axes of neighbouring pulleys of tendon {name!r} are {apart:.3g} degrees apart; they "
-            "must be nearly parallel.",
-            hint="Put an eyelet between them.",
-        )
+        text = f"axes of neighbouring pulleys of tendon {name!r} are {apart:.3g} degrees apart"
+        raise ConfigError(f"{text}; they must be nearly parallel, or have an eyelet between them.")
     return float(np.sign(cosine))
 
 
@@ -91,7 +88,5 @@ def _check_apart(name: str, k: int, ends: tuple[Place, Place], shift: float) -> 
     for one in ends:
         n = one.axes[0]
         if one.radius and np.linalg.norm(D - (D @ n) * n) <= abs(shift):
-            raise ConfigError(
-                f"between places {k + 1} and {k + 2} of tendon {name!r} there is no room: one lies "
-                "within the pulley of the other, or pulleys overlap. Take a smaller radius."
-            )
+            text = f"between places {k + 1} and {k + 2} of tendon {name!r} there is no room"
+            raise ConfigError(f"{text}: pulleys overlap. Take a smaller radius.")

@@ -14,7 +14,9 @@ from rom.arguments import (
     Length,
     NotNegative,
     Positive,
+    not_both,
     not_negative,
+    one_given,
     positive,
     typed,
     unit_vector,
@@ -143,15 +145,13 @@ def tendon(  # noqa: PLR0913  one keyword per property
     stations = tuple(_station(self, name, place, friction) for place in path)
     length = _design_length(self, name, stations)
     if any(one.friction for one in stations[1:-1]) and transition_speed is None:
-        text = f"tendon {name!r} has friction, but no transition_speed."
-        raise ConfigError(text, hint="Take a hundredth of the speed with which it slides.")
-    if (EA is None) == (tension is None):
-        raise ConfigError(f"tendon {name!r} needs either EA or tension.")
+        text = f"tendon {name!r} has friction, but no transition_speed"
+        raise ConfigError(f"{text}; take a hundredth of the speed with which it slides.")
+    one_given(f"tendon {name!r}", EA=EA, tension=tension)
     if EA is None and (damping or pretension or free_length is not None):
         text = f"tendon {name!r} is pulled by a given tension and does not stretch"
         raise ConfigError(f"{text}; leave damping, free_length and pretension out.")
-    if pretension and free_length is not None:
-        raise ConfigError(f"tendon {name!r} has pretension and free_length; give only one.")
+    not_both(f"tendon {name!r}", pretension=pretension or None, free_length=free_length)
     given = free_length if EA else tension
     if callable(given):
         number = 0.0
@@ -182,8 +182,7 @@ def _design_length(whole: Whole, name: str, stations: Sequence[Station]) -> floa
     if len(stations) < 2:
         raise ConfigError(f"tendon {name!r} needs at least two places, got {len(stations)}.")
     if stations[0].radius or stations[-1].radius:
-        text = f"tendon {name!r} ends at a pulley."
-        raise ConfigError(text, hint="It is fixed at a marker at both ends.")
+        raise ConfigError(f"tendon {name!r} ends at a pulley; fix it at a marker at both ends.")
     path = path_through(name, [_placed(whole, one) for one in stations])
     wraps = zip(stations, path.wrap, strict=True)
     arcs = (one.radius * (wrap + 2 * np.pi * one.turns) for one, wrap in wraps)

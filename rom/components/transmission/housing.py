@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from rom.arguments import orthonormal
 from rom.body.flexible import FlexibleBody
 from rom.body.reference import marker_motion
 from rom.errors import ModelError
@@ -60,13 +61,11 @@ class Housing:
             InterfaceError: if the body has no such interface.
             ModelError: if axes are not orthonormal, or the interfaces do not hold the body.
         """
-        A = np.asarray(axes, dtype=float)
-        if A.shape != (3, 3) or not np.allclose(A @ A.T, np.eye(3), atol=1e-9):
-            raise ModelError(f"axes {A.tolist()} of the unit must be orthonormal rows.")
+        A = orthonormal("axes of the unit", axes, error=ModelError)
         omega, V = body.modes(fixed=fixed)
         if omega[0] ** 2 < 1e-9 * omega[-1] ** 2:
-            text = f"the housing {body.name!r} moves as a whole although {fixed} are held."
-            raise ModelError(text, hint="Hold an interface that stops all six rigid motions.")
+            text = f"the housing {body.name!r} moves as a whole although {fixed} are held"
+            raise ModelError(f"{text}; hold an interface that stops all six rigid motions.")
         N = np.sqrt(body.mass) * V
         turn = np.kron(np.eye(2), A)
         left, right = (
@@ -86,7 +85,7 @@ class Housing:
         for name, held, there in zip(("pinion", "gear"), bearings, self.bushes, strict=True):
             if set(held) != set(there):
                 text = f"the {name} has bearings at nodes {sorted(held)}, the housing has bushes"
-                raise ModelError(f"{text} for {sorted(there)}.", hint="Name one per bearing.")
+                raise ModelError(f"{text} for {sorted(there)}; name one per bearing.")
             if any(np.shape(rows) != (6, self.n) for rows in there.values()):
                 raise ModelError(f"a bush of the {name} needs rows of shape (6, {self.n}).")
 

@@ -14,7 +14,7 @@ from rom.components.gear_mesh.tooth_loads import ToothLoads, tooth_loads
 from rom.components.journal_bearing.record import film_pressures
 from rom.errors import ConfigError
 from rom.model import Array
-from rom.names import offered
+from rom.names import check_known
 from rom.view.canvas.solids import Mesh, cylinder, gear, joined
 from rom.view.scenes.places import Places, at_start, moving
 
@@ -36,10 +36,8 @@ def toothed_shaft(mechanism: AnyMechanism, body: str) -> Mesh:
     """
     places = at_start(mechanism)
     films = [film for film in mechanism.journal_bearings.values() if film.i.body == body]
-    if not films:
-        turning = {film.i.body for film in mechanism.journal_bearings.values()}
-        there = offered(turning, body)
-        raise ConfigError(f"{body!r} turns in no journal bearing; there are {there}.")
+    turning = {film.i.body for film in mechanism.journal_bearings.values()}
+    check_known(body, turning, f"{body!r} turns in no journal bearing; there are")
     axis = places.direction(body, films[0].axes[0])[0]
     middle, part = places.point(films[0].i)[0], mechanism.part(body)
     surface = getattr(part.flexible, "surface", None)

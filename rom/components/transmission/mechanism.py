@@ -68,12 +68,10 @@ def _settled(unit: Transmission, theta: float, q: Array) -> Rest:
     try:
         return _rest_of(unit, theta, mech, equilibrium(mech, t=theta / unit.speed))
     except RomError as error:
-        raise SolverError(
-            f"the unit does not come to rest under {unit.torque} N m at {unit.speed:.1f} rad/s: "
-            f"{error.message}",
-            hint="Raise speed or viscosity, lower the torque, or move the oil inlets.",
-            solution=error.solution and _rest_of(unit, theta, mech, error.solution),
-        ) from error
+        text = f"the unit does not come to rest under {unit.torque} N m at {unit.speed:.1f} rad/s"
+        hint = "Raise speed or viscosity, lower the torque, or move the oil inlets."
+        near = error.solution and _rest_of(unit, theta, mech, error.solution)
+        raise SolverError(f"{text}: {error.message}", hint=hint, solution=near) from error
 
 
 def _rest_of(unit: Transmission, theta: float, mech: Mechanism, state: State) -> Rest:

@@ -92,10 +92,8 @@ def threshold(unit: Transmission, low: float, high: float, *, within: float = 0.
     found = [stable(speed) for speed in (low, high)]
     if found != [True, False]:
         words = ["whirls" if not s else "does not whirl" for s in found]
-        raise ModelError(
-            f"the unit {words[0]} at {low:.1f} rad/s and {words[1]} at {high:.1f} rad/s: the "
-            "threshold must lie between them."
-        )
+        text = f"the unit {words[0]} at {low:.1f} rad/s and {words[1]} at {high:.1f} rad/s"
+        raise ModelError(f"{text}: the threshold must lie between them.")
     while high - low > within * low:
         middle = (low + high) / 2
         low, high = (middle, high) if stable(middle) else (low, middle)

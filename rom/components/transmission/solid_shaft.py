@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import eigh
 
+from rom.arguments import check_places
 from rom.body.flexible import FlexibleBody
 from rom.components.round_bodies.spins import directed_mass
 from rom.components.transmission.housing import motion_of
@@ -49,15 +50,13 @@ class SolidShaft:
     discs: Sequence[Disc] = ()
 
     def __post_init__(self) -> None:
-        if any(not 0 <= disc.node < len(self.seats) for disc in self.discs):
-            raise ModelError(f"each disc must sit at a seat from 0 to {len(self.seats) - 1}.")
+        nodes = [disc.node for disc in self.discs]
+        check_places("discs at seats", nodes, len(self.seats), error=ModelError)
         for name in self.seats:
             x, y, _ = self.body.marker(name).point
             if np.hypot(x, y) > 1e-3 * self.body.size:
-                raise ModelError(
-                    f"the seat {name!r} of {self.body.name!r} is at x = {x:.4g} m, y = {y:.4g} m.",
-                    hint="The axis of the shaft has to be the Z axis of the body.",
-                )
+                text = f"the seat {name!r} of {self.body.name!r} is at x = {x:.4g} m, y = {y:.4g} m"
+                raise ModelError(f"{text}; the axis of the shaft has to be the Z axis of the body.")
 
     @property
     def nodes(self) -> int:
@@ -137,11 +136,9 @@ class SolidShaft:
             found.append(V[:, k : k + 2] @ turn[1])
         if not found:
             f = omega[:2] / (2 * np.pi)
-            raise ModelError(
-                f"the body {self.body.name!r} is not round about its Z axis: its first bending "
-                f"modes are no pair, at {f.round(1).tolist()} Hz.",
-                hint="Refine the mesh around the axis, or use beams.",
-            )
+            text = f"the body {self.body.name!r} is not round about its Z axis: its first bending"
+            hint = "Refine the mesh around the axis, or use beams."
+            raise ModelError(f"{text} modes are no pair, at {f.round(1).tolist()} Hz.", hint=hint)
         return np.stack(found, axis=1)
 
 

@@ -90,8 +90,7 @@ def steady(start: Rest | Steady, *, steps: int = 60) -> Steady:
         SolverError: if a step fails, or no such motion is found.
     """
     if any(len(errors) for errors in start.unit.mesh.correction.pitch):
-        text = "with pitch errors no motion repeats with every tooth."
-        raise ModelError(text, hint="Leave out the pitch errors, or simulate.")
+        raise ModelError("with pitch errors no motion repeats with every tooth; simulate.")
     unit = start.unit
     q, v = (start.q, 0.0 * start.q) if isinstance(start, Rest) else (start.q[0], start.v[0])
     mech, near = mechanism_of(unit, q, v), None if isinstance(start, Rest) else start.motion

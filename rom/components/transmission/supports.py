@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import eigh
 
-from rom.arguments import symmetric
+from rom.arguments import check_places, symmetric
 from rom.components.transmission.shaft import ComplexArray, Shaft, vibrations
 from rom.errors import ModelError
 from rom.model import Array
@@ -116,8 +116,7 @@ def _matrices(
     (M, K, G), z = shaft.matrices(), np.asarray(shaft.z, dtype=float)
     C, against, arms = np.zeros_like(K), np.zeros((4, 4)), (z - z.mean()) / np.ptp(z)
     for node, support in supports.items():
-        if not 0 <= node < z.size:
-            raise ModelError(f"the node {node} of a bearing must be 0 to {z.size - 1}.")
+        check_places("the node of a bearing", node, z.size, error=ModelError)
         at, R = slice(6 * node, 6 * node + 2), np.kron([1.0, arms[node]], np.eye(2))
         k = _square(support.stiffness)
         K[at, at] += k
@@ -125,8 +124,8 @@ def _matrices(
         against += R.T @ k @ R  # both translations and both tilts
     size = np.linalg.svd(against, compute_uv=False)
     if not size[-1] > SUPPORT_STIFFNESS_RTOL * size[0]:
-        text = f"bearings at the nodes {sorted(supports)} leave a rigid motion of the shaft free."
-        raise ModelError(text, hint="Give it two bearings that push back in both directions.")
+        text = f"bearings at the nodes {sorted(supports)} leave a rigid motion of the shaft free"
+        raise ModelError(f"{text}; give it two that push back in both directions.")
     rows = (6 * np.arange(z.size)[:, None] + LATERAL_DOFS).ravel()
     M, C, K, G = (A[np.ix_(rows, rows)] for A in (M, C, K, G))
     return M, C, K, G, rows

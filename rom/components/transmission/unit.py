@@ -100,9 +100,8 @@ class Transmission:
         for name in ("speed", "viscosity", "motor"):
             positive(name, getattr(self, name), error=ModelError)
         if not self.torque > 0:
-            text = f"contact is lost: a load of {self.torque} N m opens the working flanks."
-            hint = "Give a positive torque; turn the unit around to drive with the gear."
-            raise ModelError(text, hint=hint)
+            text = f"contact is lost: a load of {self.torque} N m opens the working flanks"
+            raise ModelError(f"{text}; turn the unit around to drive with the gear.")
         for name, rotor in (("pinion", self.pinion), ("gear", self.gear)):
             nodes = rotor.shaft.nodes
             if not rotor.bearings or not all(0 <= k < nodes for k in (*rotor.bearings, rotor.end)):

@@ -334,10 +334,8 @@ def family_model(
     """
     parts = Parts.of(family)
     if any(isinstance(p, BodyFamily) and p.stretch is not None for p in parts_of(family).values()):
-        raise ConfigError(
-            "a family with a parameter of thickness cannot be updated.",
-            hint="Reduce a family with moduli and densities alone.",
-        )
+        text = "a family with a parameter of thickness cannot be updated"
+        raise ConfigError(f"{text}; reduce a family with moduli and densities alone.")
     outside = {**attached, **candidates}
     own = {} if isinstance(family, FlexibleBody | Assembly) else family.parameters
     if len(outside) < len(attached) + len(candidates) or set(outside) & set(own):

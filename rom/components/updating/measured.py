@@ -232,10 +232,8 @@ class Responses:
                 hint="A coherence of exactly one comes of a single average: it says nothing.",
             )
         if c.shape and self.averages <= FREEDOM_LOST:
-            raise ConfigError(
-                f"coherence estimated from {self.averages} averages says nothing of the noise.",
-                hint="Average more, or give one number that is known.",
-            )
+            text = f"coherence estimated from {self.averages} averages says nothing of the noise"
+            raise ConfigError(f"{text}; average more, or give one number that is known.")
         if (noise := np.shape(self.force_noise)) not in ((), wanted[::2]):
             raise ConfigError(f"force_noise {noise} must be a number or {wanted[::2]}.")
         self._check_values()
@@ -248,15 +246,11 @@ class Responses:
             some = ", ".join(f"{x:.5g}" for x in self.frequencies[lines[:MAX_LINES_NAMED]])
             own = np.flatnonzero(bad.any(axis=(0, 2)))
             where = "" if own.size == len(bad[0]) else f" of sensors {named(own.tolist())}"
-            raise ConfigError(
-                f"H{where} is zero or not finite at {lines.size} lines, e.g. at {some} Hz.",
-                hint="Give these lines the coherence 0.",
-            )
+            text = f"H{where} is zero or not finite at {lines.size} lines, e.g. at {some} Hz"
+            raise ConfigError(f"{text}; give these lines the coherence 0.")
         if used.any() and not self.H[used].imag.any():
-            raise ConfigError(
-                "H is real at all lines: magnitudes or real parts alone are no responses.",
-                hint="Read phases or imaginary parts too.",
-            )
+            text = "H is real at all lines: magnitudes or real parts alone are no responses"
+            raise ConfigError(f"{text}; read phases or imaginary parts too.")
 
     @property
     def quantities(self) -> tuple[str, ...]:

@@ -279,10 +279,8 @@ def _whole_lines(data: Data) -> Index:
     """Numbers of the lines of which every value counts."""
     lines = np.flatnonzero((data.weight > 0).all(axis=(1, 2)))
     if not lines.size:
-        raise ConfigError(
-            "no line counts for all sensors and inputs.",
-            hint="Leave out the sensor of low coherence, or update by responses.",
-        )
+        text = "no line counts for all sensors and inputs"
+        raise ConfigError(f"{text}; leave out the sensor of low coherence, or update by responses.")
     return lines
 
 

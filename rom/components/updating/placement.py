@@ -168,10 +168,8 @@ def independent(
     whole("n", n, modes, len(Phi), reason="from the number of modes to that of the candidates")
     size = np.linalg.svd(Phi, compute_uv=False)
     if size[-1] <= INDEPENDENCE_RTOL * size[0]:
-        raise ModelError(
-            f"{len(Phi)} candidates do not tell {modes} modes apart.",
-            hint="Offer more points or directions, or ask for fewer modes.",
-        )
+        text = f"{len(Phi)} candidates do not tell {modes} modes apart"
+        raise ModelError(f"{text}; offer more points or directions, or ask for fewer modes.")
     kept = np.arange(len(Phi))
     while kept.size > n:
         Q = np.linalg.qr(Phi[kept])[0]

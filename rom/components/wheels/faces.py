@@ -59,11 +59,8 @@ def refuse_all_around(points: Array, axis: Array, at: Array) -> None:
     across = x - np.outer(x @ axis, axis)
     spread = np.sqrt((across**2).sum(axis=1).mean())
     if np.linalg.norm(across.mean(axis=0)) < MIN_CENTRE_RATIO * spread:
-        raise InterfaceError(
-            f"the axis {np.round(axis, 6).tolist()} through {np.asarray(at).tolist()} m runs "
-            "through the middle of the sector.",
-            hint="Check axis=… and at=….",
-        )
+        text = f"the axis {np.round(axis, 6).tolist()} through {np.asarray(at).tolist()} m runs"
+        raise InterfaceError(f"{text} through the middle of the sector; check axis=… and at=….")
 
 
 def _sectors(low: Interface, high: Interface, axis: Array, at: Array) -> tuple[int, bool]:
@@ -74,19 +71,18 @@ def _sectors(low: Interface, high: Interface, axis: Array, at: Array) -> tuple[i
         across = x - np.outer(x @ axis, axis)
         size = np.ptp(x, axis=0).max()
         if on_axis := (np.linalg.norm(across, axis=1) < COINCIDENT_RTOL * size).sum():
-            text = f"{on_axis} nodes of the cyclic face {face.name!r} lie on the axis of rotation."
-            raise InterfaceError(text, hint="Leave a small bore.")
+            text = f"{on_axis} nodes of the cyclic face {face.name!r} lie on the axis of rotation"
+            raise InterfaceError(f"{text}; leave a small bore.")
         weights = np.asarray(face.surface_mass.sum(axis=1)).ravel()
         arms.append(weights @ across / weights.sum())
     angle = np.arctan2(axis @ np.cross(*arms), arms[0] @ arms[1])
     share = 2 * np.pi / max(abs(angle), 1e-9)
     N = round(share)
     if N < 2 or abs(share - N) > SECTOR_COUNT_ATOL:
-        raise InterfaceError(
-            f"the cyclic faces {low.name!r} and {high.name!r} enclose {np.degrees(abs(angle)):.6g} "
-            f"degrees, which does not divide the circle: 360 degrees hold {share:.6g} sectors.",
-            hint="Check the sector angle of the geometry, and axis=… and at=….",
-        )
+        text = f"cyclic faces {low.name!r} and {high.name!r} enclose {np.degrees(abs(angle)):.6g}"
+        why = f"which does not divide the circle: 360 degrees hold {share:.6g} sectors"
+        hint = "Check the sector angle of the geometry, and axis=… and at=…."
+        raise InterfaceError(f"{text} degrees, {why}.", hint=hint)
     return N, bool(angle > 0)
 
 
@@ -97,12 +93,10 @@ def _refuse_different(
     scale = shapes[0][1:].max()
     apart = np.abs(shapes[0] - shapes[1]) / np.r_[shapes[0][0], np.full(6, scale)]
     if apart.max() > FACE_MATCH_RTOL:
-        raise InterfaceError(
-            f"the cyclic faces {master.name!r} and {slave.name!r} do not match: turned by "
-            f"{angle:g} degrees, their areas are {shapes[1][0]:.6g} and {shapes[0][0]:.6g} m^2 and "
-            f"their nodes up to {gap.max():.3g} m apart.",
-            hint="One face must be the image of the other; check which surfaces carry the names.",
-        )
+        text = f"the cyclic faces {master.name!r} and {slave.name!r} do not match: turned by"
+        areas = f"their areas are {shapes[1][0]:.6g} and {shapes[0][0]:.6g} m^2"
+        text = f"{text} {angle:g} degrees, {areas} and their nodes up to {gap.max():.3g} m apart."
+        raise InterfaceError(text, hint="Check which surfaces carry the names.")
 
 
 def _spread(S: csr_matrix, points: Array) -> Array:

@@ -139,10 +139,8 @@ def _refuse_divergence(sector: CyclicSector, diameter: int, K: csr_matrix, speed
     K = csr_matrix(T.conj().T @ K @ T)
     if negative_count(K if sector.standing(diameter) else real_form(K)):
         limit = divergence_speed(sector, diameter)
-        raise ModelError(
-            f"{speed:g} rad/s is too fast: spin softening has used up the stiffness against "
-            f"{diameter} nodal diameters at {limit:.6g} rad/s, an instability."
-        )
+        text = f"{speed:g} rad/s is too fast: spin softening has used up the stiffness against"
+        raise ModelError(f"{text} {diameter} nodal diameters at {limit:.6g} rad/s.")
 
 
 def spinning(sector: CyclicSector, speed: float) -> csr_matrix:

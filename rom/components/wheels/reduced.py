@@ -16,6 +16,7 @@ from rom.components.wheels.sector import NO_DOFS, Complex, CyclicSector, Matrix,
 from rom.eigen.verbs import DEPENDENT_RTOL, every_row, orthonormal_in, own_rows, static_shapes
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, Basis, Index, Interface, Report, Row
+from rom.names import check_all_known
 from rom.reduction.bases.method import CraigBampton
 from rom.reduction.interfaces.polynomial import FourierLegendre, Polynomial
 from rom.rows import FREQUENCY_RTOL, N_COMPARED, frequency_rows
@@ -89,10 +90,8 @@ def reduce_sector(
         orthogonal polynomial series, J. Eng. Gas Turbines Power 140 (2018); on cyclic faces ours.
     """
     if (n_modes is None) == (method is None) or (method and method.n_modes is None):
-        raise ConfigError(
-            f"a sector is reduced by a number of fixed-interface modes, not {n_modes}, {method!r}.",
-            hint="Write n_modes=60, or method=rom.CraigBampton(n_modes=60).",
-        )
+        text = f"a sector needs a number of fixed-interface modes, not {n_modes}, {method!r}."
+        raise ConfigError(text, hint="Write n_modes=60, or method=rom.CraigBampton(n_modes=60).")
     if sector.face is None:
         raise ConfigError("a sector without cyclic faces has no geometry: CyclicSector.from_model.")
     faces = {CYCLIC_FACES: functions or Polynomial(4)}
@@ -153,15 +152,9 @@ def reduced_by(
 ) -> ReducedSector:
     """A sector by what is given to `rom.reduce`: a method and the functions on its cyclic faces."""
     if of_bodies:
-        raise ConfigError(
-            "reference, damping, stress, stiffening and nonlinear belong to bodies in motion.",
-            hint="Give a sector the matrices of its rotation by rom.rotating_sector.",
-        )
-    if set(interfaces) - {CYCLIC_FACES}:
-        raise ConfigError(
-            f"a sector has one interface, {CYCLIC_FACES!r}, not {sorted(interfaces)}.",
-            hint=f"Write interfaces={{{CYCLIC_FACES!r}: rom.Polynomial(4)}}.",
-        )
+        text = "reference, damping, stress, stiffening and nonlinear belong to bodies in motion."
+        raise ConfigError(text, hint="Let a sector turn by rom.rotating_sector.")
+    check_all_known(interfaces, [CYCLIC_FACES], "a sector has no interface")
     return reduce_sector(sector, method=method, functions=interfaces.get(CYCLIC_FACES))
 
 
@@ -190,9 +183,8 @@ def face_functions(sector: CyclicSector, functions: Functions) -> Array:
     V, S = functions.functions(face), face.surface_mass
     at_rest = np.isin(face.dofs[::3], sector.held)
     if at_rest.all():
-        raise InterfaceError(
-            f"all nodes of the cyclic face {face.name!r} are held; hold another interface."
-        )
+        text = f"all nodes of the cyclic face {face.name!r} are held"
+        raise InterfaceError(f"{text}; hold another interface.")
     if at_rest.any():
         V = V * fading(face, at_rest)[:, None]
     norms = np.sqrt(np.einsum("km,km->m", V, S @ V))

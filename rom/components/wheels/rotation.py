@@ -18,7 +18,7 @@ from scipy.sparse import csr_matrix, identity, kron
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
 from rom.arguments import NotNegative, typed
-from rom.components.wheels.sector import CyclicSector, Matrix
+from rom.components.wheels.sector import CyclicSector, Matrix, stresses_of
 from rom.eigen.search import MAX_DENSE_DOFS
 from rom.eigen.verbs import pins
 from rom.eigen.workers import held_solution
@@ -45,10 +45,9 @@ def rotating_sector(sector: CyclicSector, model: FEModel) -> CyclicSector:
         Friswell, Penny, Garvey and Lees, Dynamics of Rotating Machines (2010); see
         docs/theory/rotating_solids.md.
     """
-    if model.stresses is None:
-        raise ConfigError("the model has no finite elements; make it with rom.fe.model.")
+    stresses = stresses_of(model)
     refuse_attachments(model)
-    K_geo = model.stresses.prestress(centrifugal_displacement(sector))
+    K_geo = stresses.prestress(centrifugal_displacement(sector))
     coriolis, softening = rotation_matrices(sector.M, sector.axis)
     return replace(sector, coriolis=coriolis, centrifugal=csr_matrix(K_geo - softening))
 
@@ -56,10 +55,8 @@ def rotating_sector(sector: CyclicSector, model: FEModel) -> CyclicSector:
 def refuse_attachments(model: FEModel) -> None:
     """Nobody knows how what is attached turns."""
     if model.attachments:
-        raise ConfigError(
-            f"the model carries {len(model.attachments)} attachments, whose rotation is not known.",
-            hint="Mesh them as a region of their own density.",
-        )
+        text = f"the model carries {len(model.attachments)} attachments, of which none turns"
+        raise ConfigError(f"{text}; mesh them as a region of their own density.")
 
 
 def rotation_matrices(M: Matrix, axis: Array) -> tuple[csr_matrix, csr_matrix]:

@@ -27,7 +27,7 @@ from rom.eigen.attachments import added_mass
 from rom.eigen.supports import Fixed, held_dofs
 from rom.eigen.verbs import rigid_motions
 from rom.eigen.workers import ONE_PROCESS, Workers
-from rom.errors import InterfaceError
+from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, FEModel, Index, Interface
 from rom.names import check_known
 
@@ -296,6 +296,18 @@ def region(model: FEModel, name: str) -> tuple[csr_matrix, csr_matrix]:
     check_known(name, model.regions, f"the sector has no region {name!r}; it has")
     share = model.regions[name]
     return all_rows(model, share.K), all_rows(model, share.M)
+
+
+def stresses_of(model: FEModel, blade: str | None = None) -> Any:
+    """Stress that the finite elements of a model, or of its blade, carry.
+
+    Raises:
+        ConfigError: if there are none.
+    """
+    found = (model if blade is None else model.regions[blade]).stresses
+    if found is None:
+        raise ConfigError("the model of the blade has no finite elements; see rom.fe.model.")
+    return found
 
 
 def workers_of(model: FEModel) -> Workers:

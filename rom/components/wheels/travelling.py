@@ -178,10 +178,9 @@ def _refuse_growth(lam: Complex, diameter: int, speed: float) -> None:
     growth = lam.real.max(initial=0.0)
     if growth > GROWTH_RATE_RTOL * abs(lam).max(initial=0.0):
         worst = lam[lam.real.argmax()]
-        raise ModelError(
-            f"at {speed:g} rad/s a motion with {diameter} nodal diameters grows by {growth:.3g} "
-            f"1/s at {abs(worst.imag) / (2 * np.pi):.4g} Hz, an instability; see divergence_speed."
-        )
+        text = f"at {speed:g} rad/s one with {diameter} nodal diameters grows by {growth:.3g} 1/s"
+        where = f"at {abs(worst.imag) / (2 * np.pi):.4g} Hz"
+        raise ModelError(f"{text} {where}, an instability; see divergence_speed.")
 
 
 def _verify(M: csr_matrix, G: csr_matrix, K: csr_matrix, lam: Complex, U: Complex, m: int) -> None:
@@ -203,10 +202,9 @@ def _verify(M: csr_matrix, G: csr_matrix, K: csr_matrix, lam: Complex, U: Comple
         A = csr_matrix(K - square * M + 1j * sign * w * G)
         true = negative_count(csc_matrix(real_form(A))) // 2
         if true != start + falls.sum():
-            raise ModesMissedError(
-                f"the inertia of the system, {true} from {start} on, does not agree with "
-                f"{falls.size} waves below {w / (2 * np.pi):.6g} Hz; ask for more."
-            )
+            waves = f"{falls.size} waves below {w / (2 * np.pi):.6g} Hz"
+            text = f"the inertia of the system, {true} from {start} on, does not agree with {waves}"
+            raise ModesMissedError(f"{text}; ask for more.")
 
 
 SPEEDS_AT_ONCE = 8  # whose waves are kept until they are followed

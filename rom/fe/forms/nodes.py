@@ -52,10 +52,8 @@ def interface(name: str, tags: MeshTags, V: fem.FunctionSpace, points: Array) ->
     S = _surface_mass(V, facets, nodes)
     weights = np.asarray(S.sum(axis=0)).ravel()
     if not weights.sum() > 0.0:
-        raise InterfaceError(
-            f"the interface {name!r} lies inside the solid and has no outer surface.",
-            hint="Interfaces are parts of the outer boundary.",
-        )
+        text = f"the interface {name!r} lies inside the solid and has no outer surface"
+        raise InterfaceError(f"{text}; interfaces are parts of the outer boundary.")
     return Interface(name, nodes, points[nodes], S, weights @ points[nodes] / weights.sum())
 
 

@@ -70,10 +70,8 @@ def _by_planes(mesh: SolidMesh, n: int, a: Array) -> tuple[Index, list[str]]:
     low, high = along.min(), along.max()
     piece = np.floor(n * (middle - low) / (high - low)).astype(np.int64)
     if empty := sorted(set(range(n)) - set(piece.tolist())):
-        raise MeshError(
-            f"piece {empty[0] + 1} of {n} along {a.tolist()} has no cells: they are longer.",
-            hint="Ask for fewer pieces, or mesh more finely along the axis.",
-        )
+        text = f"piece {empty[0] + 1} of {n} along {a.tolist()} has no cells: they are longer"
+        raise MeshError(f"{text}; ask for fewer pieces, or mesh more finely along the axis.")
     return piece, [str(k + 1) for k in range(n)]
 
 
@@ -134,8 +132,6 @@ def _named_facets(mesh: SolidMesh, own: Mask, name: str) -> dict[str, Index]:
         if inside.all():
             found[key] = rows
         elif inside.any():
-            raise TagError(
-                f"surface {key!r} lies partly on piece {name!r}: a cut crosses it.",
-                hint="Name the parts of the surface, or cut elsewhere.",
-            )
+            text = f"surface {key!r} lies partly on piece {name!r}: a cut crosses it"
+            raise TagError(f"{text}; name the parts of the surface, or cut elsewhere.")
     return found

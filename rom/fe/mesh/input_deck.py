@@ -60,10 +60,8 @@ def input_deck(
 
 def _of_degree(mesh: SolidMesh, degree: int) -> SolidMesh:
     if mesh.cell_type not in ELEMENTS:
-        raise MeshError(
-            f"cells of the type {mesh.cell_type} have other shape functions there.",
-            hint="Mesh with tetrahedra.",
-        )
+        text = f"cells of the type {mesh.cell_type} have other shape functions there"
+        raise MeshError(f"{text}; mesh with tetrahedra.")
     whole("degree", degree, 1, 2, reason="decks have such elements")
     if degree == 1 and mesh.cell_type == "tet10":
         raise MeshError("the mesh has curved edges, which need degree=2.")

@@ -179,10 +179,8 @@ def read_triangles(
     with in_file(path):
         request = _request(path, parameters, scale, trust=trust) | {"flat": True}
         if request["reader"] not in ("geo", "builder", "msh"):
-            raise ConfigError(
-                f"the suffix {path.suffix!r} holds no plane section.",
-                hint="Give .geo, .py or .msh.",
-            )
+            text = f"the suffix {path.suffix!r} holds no plane section"
+            raise ConfigError(f"{text}; give .geo, .py or .msh.")
     arrays, notes = read_apart(request, where=str(path), size=path.stat().st_size)
     provenance = {"path": str(path), "sha256": _digest(path), "scale": scale}
     X, T = arrays["points"][:, :2] * scale, arrays["cells"]

@@ -60,10 +60,8 @@ def write_stress(
         ResourceError: if the disk is full.
     """
     if body.stress is None or body.surface is None:
-        raise ConfigError(
-            f"the stress of body {body.name!r} cannot be recovered.",
-            hint="Reduce it with stress=True.",
-        )
+        text = f"the stress of body {body.name!r} cannot be recovered"
+        raise ConfigError(f"{text}; reduce it with stress=True.")
     return write_whole(path, _stressed(body.surface, q, body.stress.field(q, accelerations)))
 
 

@@ -92,10 +92,8 @@ def read_node_sets(path: str | Path, names: tuple[str, ...]) -> dict[str, Index]
     """
     path = Path(path)
     if path.suffix.lower() != ".inp":
-        raise ConfigError(
-            f"sets of nodes are read from .inp, not from {path}.",
-            hint="Give a dictionary of labels.",
-        )
+        text = f"sets of nodes are read from .inp, not from {path}"
+        raise ConfigError(f"{text}; give a dictionary of labels.")
     sets = _deck(path).node_sets
     known = {name: name.upper() for name in names}
     missing = [name for name, key in known.items() if key not in sets.members]

@@ -48,10 +48,8 @@ def interface_form(body: FlexibleBody) -> InterfaceForm:
     odd = [m.name for m in body.markers.values() if m.hold.shape[0] != 6]
     if not names or len(names) > MOST_INTERFACES or odd:
         what = f"interface {named(odd)} has other coordinates" if odd else f"it has {len(names)}"
-        raise ConfigError(
-            f"body {body.name!r} needs interfaces of six coordinates each: {what}.",
-            hint="Reduce it with rbe2 or rbe3 interfaces.",
-        )
+        text = f"body {body.name!r} needs interfaces of six coordinates each: {what}"
+        raise ConfigError(f"{text}; reduce it with rbe2 or rbe3 interfaces.")
     body.check_support(names)
     M, K = body.full_matrices()
     D = np.zeros_like(K)

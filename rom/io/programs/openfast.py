@@ -125,10 +125,8 @@ def _rows(body: FlexibleBody, form: InterfaceForm, held: Sequence[str]) -> npt.N
         check_known(name, form.names, f"{name!r} cannot be held; there are")
     free = [name for name in form.names if name not in held]
     if len(free) != 1:
-        raise ConfigError(
-            f"body {body.name!r} has {len(free)} free interfaces, {free}; OpenFAST takes one.",
-            hint="Hold the others: held=(...), on the command line --held.",
-        )
+        text = f"body {body.name!r} has {len(free)} free interfaces, {free}; OpenFAST takes one"
+        raise ConfigError(f"{text}; hold the others: held=(...), on the command line --held.")
     first = 6 * form.names.index(free[0])
     return np.r_[first : first + 6, 6 * len(form.names) : len(form.K)]
 

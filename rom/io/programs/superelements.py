@@ -79,10 +79,8 @@ def write_radioss(
     """
     form = interface_form(body)
     if form.omega.size:
-        raise ConfigError(
-            f"body {body.name!r} has {form.omega.size} modes; OpenRadioss reads interfaces alone.",
-            hint="Reduce it with rom.Guyan().",
-        )
+        text = f"body {body.name!r} has {form.omega.size} modes; OpenRadioss reads interfaces alone"
+        raise ConfigError(f"{text}; reduce it with rom.Guyan().")
     points = np.array([form.points[k] for k in sorted(form.points)])
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
     if len(points) < MIN_POINTS or spread[1] < COLLINEAR_RTOL * spread[0]:

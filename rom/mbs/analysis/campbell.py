@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import linear_sum_assignment
 
-from rom.arguments import Count, typed, unit_vector
+from rom.arguments import Ascending, Count, typed, unit_vector
 from rom.errors import ConfigError, warn
 from rom.mbs.analysis.equilibrium import equilibrium
 from rom.mbs.analysis.linearize import Linearization, linearize
@@ -74,7 +74,7 @@ class Campbell:
 @typed
 def campbell(
     mechanism: Turned,
-    speeds: npt.ArrayLike,
+    speeds: Annotated[npt.ArrayLike, Ascending("rad/s")],
     *,
     n: Annotated[int, Count(1)] | None = None,
     axis: npt.ArrayLike = (0.0, 0.0, 1.0),
@@ -107,8 +107,6 @@ def campbell(
         RomWarning: where no body turns at the speed, as when a drive prescribes another one.
     """
     speeds = np.asarray(speeds, dtype=float)
-    if speeds.ndim != 1 or speeds.size < 2 or not np.all(np.diff(speeds) > 0):
-        raise ConfigError(f"speeds = {speeds.tolist()} must be at least two growing numbers.")
     axis = unit_vector("axis", axis)
     counted = partial(linearize, frame=frame, blades=blades)
     found = [_at(mechanism, speed, axis, about, n, counted) for speed in speeds]
@@ -164,10 +162,10 @@ def _at(
 def _follow(one: Linearization, two: Linearization, order: Index) -> tuple[Index, Array]:
     """Modes of ``two`` that continue those of ``one`` in this order, and their likeness."""
     if one.eigenvalues.size != two.eigenvalues.size:
-        raise ConfigError(
-            f"the mechanism has {one.eigenvalues.size} modes at one speed and "
-            f"{two.eigenvalues.size} at the next: it must stay the same."
+        numbers = (
+            f"{one.eigenvalues.size} modes at one speed and {two.eigenvalues.size} at the next"
         )
+        raise ConfigError(f"the mechanism has {numbers}: it must stay the same.")
     a, b = one.shapes[:, order] / one.scale[:, None], two.shapes / one.scale[:, None]
     sizes = np.outer(np.linalg.norm(a, axis=0), np.linalg.norm(b, axis=0))
     mac = np.abs(a.conj().T @ b) ** 2 / np.maximum(sizes, 1e-300) ** 2

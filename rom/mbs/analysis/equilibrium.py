@@ -256,10 +256,8 @@ class _Search:
         (step, dlam), before, share = correction, self.room(now, state), 1.0
         for name, room in before.items():
             if not room > MIN_ROOM:
-                raise SolverError(
-                    f"nothing keeps the gap of {name!r} open: {room:.2g} of it is left.",
-                    hint="Lower the load, or start nearer to the equilibrium (state=...).",
-                )
+                text = f"nothing keeps the gap of {name!r} open: {room:.2g} of it is left."
+                raise SolverError(text, hint="Lower the load, or start nearer (state=...).")
         for _ in range(MAX_HALVINGS):
             ahead = self.spins.steady(self.now, now.moved(state, share * step, share * dlam))
             left = [room / before[name] for name, room in self.room(now, ahead).items()]
@@ -298,11 +296,9 @@ class _Search:
         loose = [weakest.motions[:, k] for k in np.flatnonzero(weakest.loose)]
         free = [motion for motion in loose if not self.along_spin(motion, state)]
         if free:
-            raise ModelError(
-                f"{_described(self.now.packed, free[0])} and no force opposes ({len(free)} free "
-                "motions): there is no unique equilibrium.",
-                hint="Hold it by a joint or a spring, or give its place by a drive.",
-            )
+            text = f"{_described(self.now.packed, free[0])} and no force opposes ({len(free)} free"
+            hint = "Hold it by a joint or a spring, or give its place by a drive."
+            raise ModelError(f"{text} motions): there is no unique equilibrium.", hint=hint)
         # stiffness alone says what is stable where nothing spins and no film pushes around
         alone = self.now.packed.has_potential and not self.spins.any
         if alone and weakest.squares.size and weakest.squares[0] < 0.0:

@@ -13,7 +13,7 @@ from scipy.linalg import eig, eigh
 from scipy.sparse import bmat, csc_matrix, csr_matrix, diags, identity
 from scipy.sparse.linalg import LinearOperator, eigs, eigsh
 
-from rom.arguments import finite, whole
+from rom.arguments import finite, not_both, whole
 from rom.errors import ConfigError, ModelError, ModesMissedError, SolverError
 from rom.mbs.analysis.local_equations import Instant
 from rom.mbs.equations.sparse_solve import Constrained, bordered, signature, unit_rows
@@ -96,8 +96,7 @@ class Wanted:
             return None
         if band is None:
             return cls(n or 0)
-        if n is not None:
-            raise ConfigError("at most one of n and band must be given.")
+        not_both("linearize", n=n, band=band)
         low, high = finite("band", band, (2,))
         if not 0 <= low < high:
             raise ConfigError(f"band = ({low:g}, {high:g}) Hz must be two growing frequencies.")
@@ -119,10 +118,8 @@ class Wanted:
         middle = 0.5 * sum(self.band)
         found = sorted(sorted(np.unique(near), key=lambda w: abs(w - middle))[:2])
         modes = " and ".join(f"{w / (2 * np.pi):.6g}" for w in found)
-        raise ModelError(
-            f"no mode lies between {low:g} and {high:g} Hz; near are {modes} Hz.",
-            hint="Widen band.",
-        )
+        text = f"no mode lies between {low:g} and {high:g} Hz; near are {modes} Hz."
+        raise ModelError(text, hint="Widen band.")
 
 
 @dataclass(frozen=True)
@@ -331,11 +328,9 @@ class Pencil:
     def confirm(self, found: int, shift: float, count: int) -> None:
         """Compare what was found with what there is."""
         if found != count:
-            raise ModesMissedError(
-                f"{found} modes were found up to {np.sqrt(abs(shift)) / (2 * np.pi):.6g} Hz, but "
-                f"there are {count}.",
-                hint="Ask for a few more modes, or for another band.",
-            )
+            text = f"{found} modes were found up to {np.sqrt(abs(shift)) / (2 * np.pi):.6g} Hz, but"
+            hint = "Ask for a few more modes, or for another band."
+            raise ModesMissedError(f"{text} there are {count}.", hint=hint)
 
     def damped(self, shift: complex, k: int) -> tuple[Array, Array]:
         """The k eigenvalues nearest to a shift [1/s], and shapes (n, k), of s^2 M + s C + K.
@@ -366,8 +361,6 @@ def _gap(squares: Array, n: int) -> tuple[int, float]:
     gaps = (upper - lower) / np.maximum(np.abs(upper), 1e-12 * size)
     j = int(np.argmax(gaps))
     if gaps[j] < MIN_GAP:
-        raise SolverError(
-            f"modes {n} to {squares.size} have one frequency: they cannot be counted apart.",
-            hint="Ask for a few modes more or less.",
-        )
+        text = f"modes {n} to {squares.size} have one frequency: they cannot be counted apart."
+        raise SolverError(text, hint="Ask for a few modes more or less.")
     return n + j, float(0.5 * (upper[j] + lower[j]))

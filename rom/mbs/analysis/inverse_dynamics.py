@@ -1,12 +1,13 @@
 """Inverse dynamics: loads of a motion that drives prescribe entirely, without integration."""
 
 from dataclasses import replace
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import typed
-from rom.errors import ConfigError, ModelError, reached
+from rom.arguments import Ascending, typed
+from rom.errors import ModelError, reached
 from rom.mbs.elements.family import Laws, apply_laws
 from rom.mbs.equations.equations import evaluate, retract
 from rom.mbs.equations.packing import Packed, pack
@@ -27,7 +28,9 @@ DIFFERENCE_SPACING = 1e-4  # of drives without derivatives, relative to the dura
 
 
 @typed
-def inverse_dynamics(mechanism: Mechanism, t: npt.ArrayLike, *, assemble: bool = False) -> Solution:
+def inverse_dynamics(
+    mechanism: Mechanism, t: Annotated[npt.ArrayLike, Ascending("s")], *, assemble: bool = False
+) -> Solution:
     """Positions, velocities, accelerations and all loads of a mechanism that is driven entirely.
 
     At each time the joints and drives give the position, their derivatives velocities and
@@ -47,8 +50,6 @@ def inverse_dynamics(mechanism: Mechanism, t: npt.ArrayLike, *, assemble: bool =
         SolverError: if a drive or load is not finite.
     """
     times = np.array(t, dtype=float)
-    if times.ndim != 1 or times.size < 2 or not (np.diff(times) > 0).all():
-        raise ConfigError(f"t must hold at least two ascending times, got {np.shape(t)}.")
     packed = pack(mechanism)
     span, spacing = (times[0], times[-1]), DIFFERENCE_SPACING * (times[-1] - times[0])
     state = initial_state(packed, times[0], spacing, assemble=assemble, placing=True)
@@ -89,11 +90,8 @@ def _refuse_free(packed: Packed, state: State) -> None:
     elastic = int(packed.system.bodies.r.sum())
     if free:
         what = f"{elastic} of them elastic; " if elastic else ""
-        raise ModelError(
-            f"{free} motions are not prescribed by joints and drives ({what}inverse dynamics "
-            "needs none).",
-            hint="Add drives, or simulate the motion: its solution answers the same questions.",
-        )
+        text = f"{free} motions are not prescribed by joints and drives ({what}it needs"
+        raise ModelError(f"{text} none); add drives, or simulate the motion.")
     packed.refuse_rolling("rolling prescribes velocities, not positions; use rom.simulate instead.")
 
 

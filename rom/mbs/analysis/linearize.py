@@ -147,10 +147,8 @@ class Linearization:
 def jacobian(packed: Packed, H: Array, marker: Marker) -> Array:
     """(6, n) motion of a marker per coordinate, from those of all markers H (k, 6, 6 + R)."""
     if packed.markers.get(marker, len(H)) >= len(H):
-        raise ConfigError(
-            f"{marker!r} is not a marker of the mechanism.",
-            hint="Name it when the body is added, and take it from the part: part.marker(...).",
-        )
+        hint = "Name it when the body is added, and take it from the part: part.marker(...)."
+        raise ConfigError(f"{marker!r} is not a marker of the mechanism.", hint=hint)
     k = packed.row(marker)
     J, b = np.zeros((6, packed.v.size)), packed.system.markers.body[k]
     if b >= 0:

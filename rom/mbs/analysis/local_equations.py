@@ -83,9 +83,9 @@ class Instant:
         self.evaluate(q, v)
         residual(self.system, self.W, q, v, a, lam)
         if self.packed.broken_laws:
+            hint = "Begin closer; what is wrong with a law of yours rom.check_law finds."
             raise SolverError(
-                f"no forces at t = {self.t:.9g} s{self.packed.broken_laws}.",
-                hint="Begin closer; what is wrong with a law of yours rom.check_law finds.",
+                f"no forces at t = {self.t:.9g} s{self.packed.broken_laws}.", hint=hint
             )
         return self.W.residual.copy()
 
@@ -149,10 +149,8 @@ class Instant:
         if state.base is None:
             return
         if np.size(state.base) != self.W.base.size:
-            raise ConfigError(
-                f"the state has {np.size(state.base)} joint coordinates that forces act on; this "
-                f"mechanism has {self.W.base.size}."
-            )
+            text = f"the state has {np.size(state.base)} joint coordinates that forces act on"
+            raise ConfigError(f"{text}; this mechanism has {self.W.base.size}.")
         self.W.base[:] = state.base
 
     def moved(self, state: State, step: Array, dlam: Array) -> State:
@@ -223,12 +221,10 @@ def _check(packed: Packed, miss: Array, limit: float, what: str) -> None:
     if not miss.size or np.abs(miss).max() <= limit:
         return
     k = int(np.argmax(np.abs(miss)))
-    raise ModelError(
-        f"the state does not fit the mechanism at this time: {packed.row_owner[k]!r} {what} "
-        f"{abs(miss[k]):.3g} (relative).",
-        where=packed.row_owner[k],
-        hint="Take a state of the same mechanism and give its time t.",
-    )
+    where = packed.row_owner[k]
+    text = f"the state does not fit the mechanism at this time: {where!r} {what} {abs(miss[k]):.3g}"
+    hint = "Take a state of the same mechanism and give its time t."
+    raise ModelError(f"{text} (relative).", where=where, hint=hint)
 
 
 def free_motions(G: Array, scale: Array, rank: int) -> Array:
@@ -246,10 +242,8 @@ def of_unit_mass(Z: Array, mass: Array) -> Array:
     try:
         L = np.linalg.cholesky(Z.T @ mass @ Z)
     except np.linalg.LinAlgError as error:
-        raise SolverError(
-            "the mass matrix is not positive definite: a body is deformed beyond what its linear "
-            "shapes can describe."
-        ) from error
+        text = "the mass matrix is not positive definite: a body deforms beyond linear shapes."
+        raise SolverError(text) from error
     return solve_triangular(L, Z.T, lower=True).T if Z.size else Z
 
 

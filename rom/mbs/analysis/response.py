@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.sparse import identity
 
-from rom.arguments import typed
+from rom.arguments import typed, vector
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.mbs.analysis.few_modes import Pencil
 from rom.mbs.analysis.linearize import (
@@ -227,8 +227,8 @@ def _blocked(drive: str) -> ModelError:
 
 
 def _checked(frequencies: npt.ArrayLike) -> Array:
-    f = np.atleast_1d(np.asarray(frequencies, dtype=float))
-    if f.ndim != 1 or not f.size or not np.isfinite(f).all() or (f < 0).any():
+    f = vector("frequencies", np.atleast_1d(frequencies))
+    if (f < 0).any():
         raise ConfigError(f"frequencies = {frequencies!r} must be a list of numbers from zero on.")
     return f
 

@@ -163,9 +163,8 @@ def _checked(
         try:
             signature(called).bind(**parameters)
         except TypeError as error:
-            raise ConfigError(
-                f"{name} must take the parameters {sorted(parameters)} by name: {error}."
-            ) from error
+            text = f"{name} must take the parameters {sorted(parameters)} by name: {error}."
+            raise ConfigError(text) from error
     return dict(parameters)
 
 
@@ -232,10 +231,8 @@ def _vectors(E: Array, linear: Linearization, k: int) -> tuple[complex, Array, A
     s, every = linear.eigenvalues[k], linear.eigenvalues
     near = np.abs(np.delete(every, k) - s).min(initial=np.inf)
     if near < SEPARATE_RTOL * np.abs(every).max():
-        raise ModelError(
-            f"two eigenvalues are equal ({abs(s):.6g} rad/s): neither has a derivative of its own.",
-            hint="Let the parameters break the symmetry a little.",
-        )
+        text = f"two eigenvalues are equal ({abs(s):.6g} rad/s): neither has a derivative"
+        raise ModelError(f"{text}; let the parameters break the symmetry a little.")
     n = linear.basis.shape[0]
     full = (np.array([s**2, s, 1.0]) @ E.reshape(3, -1)).reshape(E.shape[1:])
     U, _, V = np.linalg.svd(s**2 * linear.M + s * linear.C + linear.K)

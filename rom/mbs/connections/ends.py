@@ -52,12 +52,9 @@ def enter(whole: Whole, joint: Joint) -> None:
     for marker in joint.markers if joint.kind not in MOMENT_FREE else ():
         body = whole.part(marker.body).flexible
         if body is not None and not body.has_static_shapes:
-            raise ModelError(
-                f"{joint.kind} joint {joint.name!r} transmits moments, and body "
-                f"{marker.body!r} has free-free modes only: it would be too stiff by tens of "
-                "per cents and without stress at the joint.",
-                hint="Reduce the body with CraigBampton or Rubin, which know the interfaces.",
-            )
+            text = f"{joint.kind} joint {joint.name!r} transmits moments, and body {marker.body!r}"
+            hint = "Reduce the body with CraigBampton or Rubin, which know the interfaces."
+            raise ModelError(f"{text} has free-free modes only: it is too stiff.", hint=hint)
     whole.joints[joint.name] = joint
 
 

@@ -50,10 +50,8 @@ def distance(
     ends = ends_of(self, name, m1, m2)
     apart = float(np.linalg.norm(ends.gap))
     if apart == 0.0:
-        raise ConfigError(
-            f"the points of joint {name!r} coincide: a rod of length zero has no direction.",
-            hint="Use a spherical joint.",
-        )
+        text = f"the points of joint {name!r} coincide: a rod of length zero has no direction"
+        raise ConfigError(f"{text}; use a spherical joint.")
     row = Row(DISTANCE, NO_VECTOR, NO_VECTOR, NO_VECTOR, apart if length is None else length)
     enter(self, Joint(name, "distance", ends.markers, (row,)))
 

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from scipy.interpolate import PchipInterpolator
 
 from rom import rotation
-from rom.arguments import Number, Orientation, finite, one_of, unit_quaternion
+from rom.arguments import Number, Orientation, ascending, finite, one_of, unit_quaternion
 from rom.errors import ConfigError
 from rom.mbs.elements.family import Family, Hooks, Places, integers, rows_of
 from rom.mbs.kernels.algebra import (
@@ -105,11 +105,8 @@ def _matrix66(name: str, value: npt.ArrayLike) -> Array:
     A = finite(name, np.diag(value) if np.shape(value) == (6,) else value, (6, 6))
     size = np.abs(A).max()
     if np.abs(A - A.T).max() > 1e-9 * size:
-        raise ConfigError(
-            f"{name} is not symmetric by {np.abs(A - A.T).max():.3g}: no energy.",
-            hint="Forces that go around, as of a bearing given by eight coefficients, are a law: "
-            "mech.law, of which docs/laws.md has this one.",
-        )
+        text = f"{name} is not symmetric by {np.abs(A - A.T).max():.3g}: no energy."
+        raise ConfigError(text, hint="Bearings of eight coefficients are a law, see docs/laws.md.")
     if np.linalg.eigvalsh(A)[0] < -1e-9 * size:
         raise ConfigError(f"{name} must not be negative in a direction: it would drive the motion.")
     return 0.5 * (A + A.T)
@@ -120,12 +117,8 @@ def _curve(
 ) -> tuple[int, Array]:
     """Direction and pieces (n, 7) of a tabulated force, see `Bushings`."""
     one_of(f"curve of bushing {name!r}", direction, DIRECTIONS)
-    n = np.size(table[0])
-    x, force = (finite(f"curve {direction} of {name}", values, (n,)) for values in table)
-    if n < 2 or np.diff(x).min() <= 0.0:
-        raise ConfigError(
-            f"curve {direction} of bushing {name!r} needs two or more ascending displacements."
-        )
+    x = ascending(f"displacements of curve {direction} of bushing {name!r}", table[0])
+    force = finite(f"curve {direction} of {name}", table[1], (x.size,))
     cubic = PchipInterpolator(x, force)
     energy = cubic.antiderivative()
     slopes = cubic.derivative()(x[[0, -1]])

@@ -108,10 +108,8 @@ def stop(
     places = [(-1, lower), (1, upper)]
     limits = [(side, float(x)) for side, x in places if x is not None]
     if not limits or limits[0][1] > limits[-1][1]:
-        raise ConfigError(
-            f"stop {name!r} has no limit or no room: give lower = {lower} or upper = {upper}, and "
-            "lower at most upper."
-        )
+        text = f"stop {name!r} has no limit or no room: give lower = {lower} or upper = {upper}"
+        raise ConfigError(f"{text}, and lower at most upper.")
     self.add(name, Stop(joint, row, tuple(limits), law), STOPS_FAMILY)
 
 

@@ -170,10 +170,8 @@ def spread_load(
     part = self.part(str(getattr(part, "name", part)))
     shapes = getattr(load, "shapes", None)
     if shapes is None or shapes.shape != (part.r, 3, 3) or part.flexible is None:
-        raise ConfigError(
-            f"load {name!r} is not one of body {part.name!r} with {part.r} coordinates.",
-            hint="Make it with rom.surface_load or rom.mass_load from that body.",
-        )
+        text = f"load {name!r} is not one of body {part.name!r} with {part.r} coordinates"
+        raise ConfigError(f"{text}; make it with rom.surface_load or rom.mass_load from that body.")
     function = amplitude if callable(amplitude) else None
     constant = 0.0 if function else number("amplitude", amplitude)
     arrays = (load.force, load.first, shapes + _by_the_frame(part, load))

@@ -132,10 +132,8 @@ class Assembly:
         """Handle of a named place, or of the origin of a frame, counted from 0 or the end."""
         frame = self.body.places.get(place) if isinstance(place, str) else place
         if isinstance(frame, bool) or not isinstance(frame, int | np.integer):
-            raise ConfigError(
-                f"body {self.name!r} has no marker {place!r}; it has "
-                f"{offered(self.body.places, place)} and frames 0 to {len(self.parts) - 1}."
-            )
+            there = f"{offered(self.body.places, place)} and frames 0 to {len(self.parts) - 1}"
+            raise ConfigError(f"body {self.name!r} has no marker {place!r}; it has {there}.")
         n = len(self.parts)
         whole(f"frame of body {self.name!r}", frame, -n, n - 1)
         return self.parts[frame].marker((0.0, 0.0, 0.0))
@@ -204,10 +202,8 @@ def _frame_part(name: str, frames: Frames, k: int, pose: tuple[Array, ...]) -> P
 def _check(name: str, body: NonlinearBody) -> None:
     missing = [x for x in ("frames", "elements", "places", "coincident") if not hasattr(body, x)]
     if missing:
-        raise ConfigError(
-            f"body {name!r} is {body!r}, which has no {', '.join(missing)}.",
-            hint="Make one with rom.components.cosserat.body; reduced ones go to add_flexible.",
-        )
+        hint = "Make one with rom.components.cosserat.body; reduced ones go to add_flexible."
+        raise ConfigError(f"body {name!r} is {body!r}, without {', '.join(missing)}.", hint=hint)
     frames, n = body.frames, len(body.frames.x)
     for key, shape in (("x", (n, 3)), ("p", (n, 4)), ("mass", (n,)), ("inertia", (n, 3))):
         finite(f"{key} of {name}", getattr(frames, key), shape)

@@ -283,18 +283,13 @@ def deflection_of(part: Part) -> tuple[LargeDeflection, Family]:
     """The energy of a body of large deflection beyond that of small deflection, and its family."""
     body = part.flexible
     if body.K_geo:
+        text = f"body {body.name!r} has the energy of large deflection, in which all loads stiffen"
         raise ModelError(
-            f"body {body.name!r} has the energy of large deflection, in which all loads stiffen; "
-            f"the geometric stiffness {listed(body.K_geo)} would be counted twice.",
-            hint="Leave K_geo empty.",
+            f"{text}; the geometric stiffness {listed(body.K_geo)} would be counted twice."
         )
     if part.spin.any():
-        raise ModelError(
-            "a body of large deflection does not spin in a frame that rests: its gyroscopic forces "
-            "would be those of small deflection.",
-            where=part.name,
-            hint="Let it turn with its frame, by omega.",
-        )
+        text = "a body of large deflection does not spin in a frame that rests; turn it by omega."
+        raise ModelError(text, where=part.name)
     by_points = hasattr(body.quartic, "gradients")
     family = SAMPLES_FAMILY if by_points else QUARTICS_FAMILY
     return LargeDeflection(part.name, body.quartic), family

@@ -96,12 +96,9 @@ def _told(packed: Packed, W: Work, q: Array, v: Array, assemble: bool, placing: 
         return largest
     summary = f"{'; '.join(what for what, _ in moved)}."
     if largest > REFUSAL_RTOL:
-        raise ModelError(
-            f"the start contradicts joints and drives: {summary}",
-            where=moved[0][1],
-            hint="Let places and drives fit, and velocities: omega about a pin moves the origin, "
-            "too. Or let the start be moved (assemble=True; in a file, assemble = true).",
-        )
+        text = f"the start contradicts joints and drives: {summary}"
+        hint = "Let places, velocities and drives fit, or the start be moved: assemble=True."
+        raise ModelError(text, where=moved[0][1], hint=hint)
     warn(
         f"the start was moved to fit joints and drives: {summary} Draw the bodies so that "
         "joints are closed and drives begin where they are, or ask for it (assemble=True)."
@@ -190,11 +187,9 @@ def assembled(packed: Packed, W: Work, q: Array) -> Array:
             break
     largest, where, size = _largest(packed, gap)
     if not np.isfinite(gap).all() or largest > GAP_TOLERANCE:
-        raise ModelError(
-            f"the mechanism cannot be assembled: {where!r} stays open by {size}.",
-            where=where,
-            hint="Joints contradict each other: check positions, axes and drives.",
-        )
+        text = f"the mechanism cannot be assembled: {where!r} stays open by {size}."
+        hint = "Joints contradict each other: check positions, axes and drives."
+        raise ModelError(text, where=where, hint=hint)
     return closed
 
 
@@ -328,12 +323,10 @@ def check_velocity(packed: Packed, W: Work, v: Array, given: Array | None = None
         size = np.maximum(size, 1e-3 * now.max())
     k = int(np.argmax(miss / np.maximum(size, 1e-300)))
     if miss[k] > 1e-8 * size[k]:
-        raise ModelError(
-            f"the velocities of joints and drives contradict each other: "
-            f"{packed.row_owner[k]!r} misses {miss[k]:.3g}.",
-            where=packed.row_owner[k],
-            hint="Let drives go as fast as what was given, or leave them out.",
-        )
+        where = packed.row_owner[k]
+        text = "the velocities of joints and drives contradict each other"
+        hint = "Let drives go as fast as what was given, or leave them out."
+        raise ModelError(f"{text}: {where!r} misses {miss[k]:.3g}.", where=where, hint=hint)
 
 
 def _prescribed(packed: Packed, W: Work) -> Array:
@@ -402,12 +395,9 @@ def _rank(packed: Packed, W: Work, q: Array) -> int:
 def _refuse_shared_friction(packed: Packed, names: Container[str]) -> None:
     for first in packed.loaded_rows:
         if packed.row_owner[first] in names:
-            raise ModelError(
-                "friction depends on the load of a joint that shares it with others as only "
-                "their deformation could decide.",
-                where=packed.row_owner[first],
-                hint="Let the joints repeat nothing, or give friction a constant level (coulomb).",
-            )
+            text = "friction depends on the load of a joint that shares it with others"
+            hint = "Let the joints repeat nothing, or give friction a constant level (coulomb)."
+            raise ModelError(f"{text} unknown.", where=packed.row_owner[first], hint=hint)
 
 
 def _check_start(packed: Packed, W: Work, q: Array, rank: int) -> None:
@@ -423,8 +413,6 @@ def _check_start(packed: Packed, W: Work, q: Array, rank: int) -> None:
         return
     raised = _constraints(packed, W, beside).rank
     if raised > rank:
-        raise ModelError(
-            f"the mechanism starts in a singular position: {rank} independent constraints there, "
-            f"{raised} beside it; its motion could branch.",
-            hint="Start from a position in which the parts are not all in line.",
-        )
+        text = f"the mechanism starts in a singular position: {rank} independent constraints there"
+        hint = "Start from a position in which the parts are not all in line."
+        raise ModelError(f"{text}, {raised} beside it; its motion could branch.", hint=hint)

@@ -126,10 +126,9 @@ def _step(record: Record, equations: Equations, solver: DOP853, due: int) -> int
     with np.errstate(all="ignore"):  # of a trial that went too far
         message = solver.step()
     if solver.status == "failed":
-        raise equations.broken or SolverError(
-            f"dop853 failed at t = {solver.t:.9g} s: {message}",
-            hint="The motion is too stiff for it: use generalized-alpha.",
-        )
+        text = f"dop853 failed at t = {solver.t:.9g} s: {message}"
+        hint = "The motion is too stiff for it: use generalized-alpha."
+        raise equations.broken or SolverError(text, hint=hint)
     stop = _first_event(record, equations, solver)
     due = _output(record, equations, solver, due)
     if stop is not None:
@@ -209,11 +208,8 @@ def first_steps(record: Record, W: Work, step: Step) -> tuple[Array, tuple[Array
     """
     start, count = record.final, step.past.shape[1]
     if count > record.settings.steps:
-        raise ConfigError(
-            f"bdf of order {count + 1} needs {count} steps to begin with, the run has "
-            f"{record.settings.steps}.",
-            hint="Take shorter steps or a lower order.",
-        )
+        text = f"bdf of order {count + 1} needs {count} steps to begin with, the run has"
+        raise ConfigError(f"{text} {record.settings.steps}; take shorter steps or a lower order.")
     t = record.settings.time(np.arange(count + 1))
     equations = Equations(record, W, start)
     W.base[:] = start.base
@@ -222,10 +218,8 @@ def first_steps(record: Record, W: Work, step: Step) -> tuple[Array, tuple[Array
         options = {"method": "Radau", "rtol": RADAU_RTOL, "atol": RADAU_ATOL, "t_eval": t[1:]}
         found = solve_ivp(equations, (t[0], t[-1]), _coordinates(past[0][0]), **options)
         if not found.success:
-            raise SolverError(
-                f"the first steps failed after t = {t[0]:.9g} s: {found.message}",
-                hint="Take bdf of order two, or generalized-alpha.",
-            )
+            text = f"the first steps failed after t = {t[0]:.9g} s: {found.message}"
+            raise SolverError(text, hint="Take bdf of order two, or generalized-alpha.")
         past += [
             _instant(record, equations, float(x), y) for x, y in zip(t[1:], found.y.T, strict=True)
         ]

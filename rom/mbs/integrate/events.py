@@ -58,10 +58,8 @@ class Instant(Whereabouts):
             if known is row:
                 self._evaluate()
                 return float(self.W.x[k]), float(self.W.xd[k])
-        raise ConfigError(
-            f"the coordinate of joint {name!r} is not followed.",
-            hint=f"Add the event with follow=[{name!r}].",
-        )
+        text = f"the coordinate of joint {name!r} is not followed"
+        raise ConfigError(f"{text}; add the event with follow=[{name!r}].")
 
     def _at_marker(self, row: int) -> Seen:
         self._evaluate()

@@ -87,10 +87,7 @@ class Keeping:
         cure = "Go on with it by --resume (resume=True), or remove the folder."
         if self.resume:
             fault = f"there is nothing to resume: {self.folder} holds no motion."
-            cure = (
-                "A run that came to its end leaves none, nor does one that ended within its first "
-                "steps. Leave out --resume."
-            )
+            cure = "A run that came to its end, or ended soon, leaves none. Leave out --resume."
         raise ConfigError(fault, hint=cure)
 
     def begin(self, origin: float | None, taken: int, digests: Mapping[str, str]) -> None:
@@ -123,11 +120,9 @@ class Keeping:
         ours = self._manifest["digests"]
         names = [name for name in {**ours, **digests} if ours.get(name) != digests.get(name)]
         if names:
-            raise ConfigError(
-                f"the interrupted run in {self.folder} had another {names[0]}: it cannot go on.",
-                hint="Resume it with what it was begun with; t_end alone may differ. Or remove "
-                "the folder to begin anew.",
-            )
+            text = f"the interrupted run in {self.folder} had another {names[0]}: it cannot go on."
+            hint = "Only t_end may differ from what it was begun with; or remove the folder."
+            raise ConfigError(text, hint=hint)
         state = unpacked_state(manifest, arrays, self.state)
         if state.memory is None:
             raise FileFormatError("the state has no memory of its run.", where=str(self.state))
@@ -157,9 +152,8 @@ class Keeping:
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise ConfigError(
-                f"{self.folder} cannot be made: {error.strerror}.", hint="Choose another folder."
-            ) from error
+            text = f"{self.folder} cannot be made: {error.strerror}; choose another folder."
+            raise ConfigError(text) from error
         parts = self._parts
         if count > self._blocks:
             parts += 1

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from rom.errors import ConfigError, ResourceError
+from rom.errors import ConfigError
 from rom.mbs.equations.packing import Packed
 from rom.mbs.integrate.events import Noted, Watch
 from rom.mbs.integrate.keeping import Keeping, until
@@ -17,7 +17,7 @@ from rom.mbs.parts.signals import Span, padded, sampled
 from rom.mbs.results.solution import Solution
 from rom.mbs.results.state import State
 from rom.model import Array
-from rom.process.memory import free_bytes
+from rom.process.memory import check_memory, free_bytes
 from rom.process.progress import Progress
 
 # a million steps a second, as the fastest mechanisms take, for eleven days
@@ -105,13 +105,9 @@ class Settings:
         wide = 4 + packed.q.size + 2 * packed.v.size + packed.system.rows.kind.size + followed
         # the blocks, joined, and the prescribed functions beside them
         need, there = 8.0 * rows * (2 * wide + 3 * signals), free_bytes()
-        if need > there:
-            raise ResourceError(
-                f"keeping {rows:.4g} instants takes {need / 2**30:.4g} GiB; {there / 2**30:.4g} "
-                "GiB are free.",
-                hint=f"Keep fewer of them, e.g. save_every = {int(need / there) + 1} times "
-                f"{int(self.save_every)}, or take longer steps.",
-            )
+        fewer = f"save_every = {int(need / there) + 1} times {int(self.save_every)}"
+        hint = f"Keep fewer of them, e.g. {fewer}, or take longer steps."
+        check_memory(f"keeping {rows:.4g} instants", need, there, hint)
 
     @property
     def kind(self) -> str:

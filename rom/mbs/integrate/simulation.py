@@ -131,10 +131,8 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
     numbers = (t_start, t_end, dt, save_every, rho_inf, tolerance, rtol, atol)
     settings = Settings(*numbers, progress, method, order=order, stabilised=stabilised)
     if state is None and dt is not None and dt > (t_end - t_start) * (1 + 1e-9):
-        raise ConfigError(
-            f"dt = {dt:g} s is longer than the motion of {t_end - t_start:g} s.",
-            hint="Take a shorter step, or leave dt out: steps are then chosen by rtol.",
-        )
+        text = f"dt = {dt:g} s is longer than the motion of {t_end - t_start:g} s"
+        raise ConfigError(f"{text}; take a shorter one, or none: steps are then chosen by rtol.")
     settings, packed = settings.after(state), pack(mechanism)
     settings.check_room(packed)
     record = Record(
@@ -215,11 +213,9 @@ def _go_on(record: Record, keeping: Keeping) -> None:
     kept = keeping.read()
     h, begun = kept.memory.h, kept.memory.taken - kept.taken
     if settings.dt is not None and kept.state.t < settings.t_end and h != settings.h:
-        raise ConfigError(
-            f"t_end = {settings.t_end:g} s would change the steps of the interrupted run from "
-            f"{h:.9g} s to {settings.h:.9g} s: it cannot go on.",
-            hint=f"Take its own t_end, or a multiple of {h:.9g} s.",
-        )
+        text = f"t_end = {settings.t_end:g} s would change the steps of the interrupted run from"
+        hint = f"Take its own t_end, or a multiple of {h:.9g} s."
+        raise ConfigError(f"{text} {h:.9g} s to {settings.h:.9g} s: it cannot go on.", hint=hint)
     record.settings = replace(settings, origin=kept.origin, taken=kept.taken, begun=begun)
     record.given, record.blocks, record.noted = kept.state, kept.blocks, kept.noted
 
@@ -260,8 +256,6 @@ def _check_fit(state: State, packed: Packed, mechanism: Mechanism) -> None:
     angles = packed.followed if state.base is None else np.size(state.base)
     if angles != packed.followed:
         remembering = [name for name, law in mechanism.laws.items() if law.memory.size]
-        raise ConfigError(
-            f"the state has {angles} followed joint coordinates and remembered numbers; this "
-            f"mechanism has {packed.followed}.",
-            hint=f"Its laws that remember are {remembering}." if remembering else "",
-        )
+        text = f"the state has {angles} followed joint coordinates and remembered numbers; this"
+        hint = f"Its laws that remember are {remembering}." if remembering else ""
+        raise ConfigError(f"{text} mechanism has {packed.followed}.", hint=hint)

@@ -99,7 +99,6 @@ def _words(value: Any, kind: types.Type, what: str) -> list[int]:
     if kind is types.int64:
         return [int(value)]
     if value.dtype != kind.dtype.name or value.ndim != kind.ndim or not value.flags.c_contiguous:
-        raise TypeError(
-            f"{what} is an array of {value.dtype} with strides {value.strides}, not {kind}."
-        )
+        given = f"{value.dtype} with strides {value.strides}"
+        raise TypeError(f"{what} is an array of {given}, not {kind}.")
     return [value.ctypes.data, *value.shape]

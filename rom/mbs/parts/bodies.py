@@ -125,19 +125,17 @@ class Part:
         """
         speed = float(axis @ self.spin)
         if np.linalg.norm(self.spin - speed * axis) > SPIN_RTOL * np.linalg.norm(self.spin):
+            text = f"body {self.name!r} spins about {self.spin.tolist()} rad/s, and the axis of"
             raise ConfigError(
-                f"body {self.name!r} spins about {self.spin.tolist()} rad/s, and the axis of "
-                f"{name!r} is {axis.round(9).tolist()} in it: both must be one."
+                f"{text} {name!r} is {axis.round(9).tolist()} in it: both must be one."
             )
         return speed
 
     def refuse_spin(self, what: str, why: str) -> None:
         """Refuse a body that spins, for what knows nothing of it, and say why."""
         if self.spin.any():
-            raise ConfigError(
-                f"{what} is of body {self.name!r}, which spins in its frame: {why}.",
-                hint="Let its frame turn: give omega instead of spin.",
-            )
+            text = f"{what} is of body {self.name!r}, which spins in its frame: {why}"
+            raise ConfigError(f"{text}; give omega instead of spin.")
 
     def check_on_axis(self, name: str, marker: Marker) -> None:
         """Let nothing, by name, hold a body that spins at a point beside its axis.
@@ -152,14 +150,11 @@ class Part:
         apart = float(np.linalg.norm(np.cross(self.spin, arm))) / speed
         size = np.sqrt(np.trace(self.second) / self.mass)
         if apart > (SPIN_RTOL if self.flexible is None else MESHED_RTOL) * size:
-            raise ModelError(
-                f"marker {marker.place!r} of body {self.name!r} lies {apart:.4g} m beside the axis "
-                f"about which the body spins, and {name!r} holds it there: with the material it "
-                f"would go round, an unbalance of {self.mass * apart:.4g} kg m.",
-                where=self.name,
-                hint="Let its frame turn: give omega instead of spin. Or put the marker on the "
-                f"axis and let a force of {self.mass * apart * speed**2:.4g} N at this speed turn.",
-            )
+            text = f"marker {marker.place!r} of body {self.name!r} lies {apart:.4g} m"
+            why = f"an unbalance of {self.mass * apart:.4g} kg m that {name!r} holds"
+            cure = f"or let a force of {self.mass * apart * speed**2:.4g} N at this speed turn"
+            hint = f"Let its frame turn: give omega instead of spin, {cure}."
+            raise ModelError(f"{text} beside the axis, {why}.", where=self.name, hint=hint)
 
     @property
     def own_frame(self) -> Marker | None:
@@ -207,9 +202,8 @@ def rigid_part(name: str, mass: float, inertia: Array, pose: Any, points: dict[s
     elif moments[2] > (1 + 1e-6) * (moments[0] + moments[1]):
         fault = "the largest must be at most the sum of the others; no body has this inertia"
     if fault:
-        raise ModelError(
-            f"inertia has principal moments {moments.tolist()} kg m^2: {fault}.", where=name
-        )
+        text = f"inertia has principal moments {moments.tolist()} kg m^2: {fault}."
+        raise ModelError(text, where=name)
     reach = max((float(np.linalg.norm(x)) for x in points.values()), default=0.0)
     radius = float(np.sqrt(moments[2] / mass))
     if reach > 0.0:  # a marker in the mass centre says nothing
@@ -232,21 +226,15 @@ def flexible_part(name: str, body: Any, moving: Any, pose: Any, elastic: Any) ->
     part = Part(*still, velocity, omega, {}, body, moving, *elastic)
     M = mass_at_rest(part)
     if not np.isfinite(M).all() or np.diag(M).min() <= 0.0:
-        raise ModelError(
-            "the mass matrix must be finite, with a positive diagonal.",
-            where=part.name,
-            hint="Reduce the body again; rom.check names what is wrong with one of a file.",
-        )
+        text = "the mass matrix must be finite, with a positive diagonal; rom.check says more."
+        raise ModelError(text, where=part.name)
     scale = 1 / np.sqrt(np.diag(M))
     spectrum = np.linalg.eigvalsh(M * scale * scale[:, None])
     if spectrum[0] < SINGULAR_MASS * spectrum[-1]:
-        raise ModelError(
-            f"the mass matrix of the frame and the {part.r} elastic coordinates is singular "
-            f"(eigenvalue ratio {spectrum[0] / spectrum[-1]:.2g}): a rigid motion was left in the "
-            "elastic shapes, which the floating frame already describes.",
-            where=part.name,
-            hint="Give the body a reference condition: body.with_reference('mean-axis').",
-        )
+        text = f"the mass matrix of the frame and the {part.r} elastic coordinates is singular"
+        ratio = f"(eigenvalue ratio {spectrum[0] / spectrum[-1]:.2g})"
+        hint = "Give the body a reference condition: body.with_reference('mean-axis')."
+        raise ModelError(f"{text} {ratio}: it moves rigidly.", where=part.name, hint=hint)
     return part
 
 

@@ -81,10 +81,8 @@ def real(what: str, t: float, value: object, shape: tuple[int, ...], needed: str
     """The same, finite or not."""
     A = _floats(value)
     if A is None or A.size != math.prod(shape) or (len(shape) > 1 and A.shape[0] != shape[0]):
-        raise ConfigError(
-            f"{what} returned {shortened(value)} at t = {t:.9g} s; needed is {needed}.",
-            hint=KEPT_HINT,
-        )
+        text = f"{what} returned {shortened(value)} at t = {t:.9g} s; needed is {needed}."
+        raise ConfigError(text, hint=KEPT_HINT)
     return A.reshape(shape)
 
 

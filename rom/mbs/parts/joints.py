@@ -10,7 +10,7 @@ from rom.errors import ConfigError
 from rom.mbs.kernels.system import ALONG, ANGLE, COUPLING, NORMAL, POINT
 from rom.mbs.parts.bodies import Marker, Part
 from rom.model import Array
-from rom.names import offered
+from rom.names import check_known, offered
 
 Coordinate = Literal["angle", "displacement", "way"]  # the last is the earlier name of the second
 NO_VECTOR = np.zeros(3)
@@ -96,8 +96,7 @@ def coincidence() -> tuple[Row, ...]:
 
 def coordinate_of(joints: Mapping[str, Joint], joint: str, which: str | None, what: str) -> Row:
     """The row of the coordinate "angle" or "displacement" of a joint; None for the first."""
-    if joint not in joints:
-        raise ConfigError(f"{what}: no joint {joint!r}; there are {offered(joints, joint)}.")
+    check_known(joint, joints, f"{what}: no joint {joint!r}; there are")
     names = {None: "coordinate", "angle": "turn", "displacement": "displacement"}
     names["way"] = "displacement"
     if which not in names:
@@ -106,10 +105,8 @@ def coordinate_of(joints: Mapping[str, Joint], joint: str, which: str | None, wh
     if row is None:
         able = [name for name, one in joints.items() if getattr(one, names[which])]
         lack = f"coordinate {which!r}" if which else "angle about an axis and no way along one"
-        raise ConfigError(
-            f"{what}: joint {joint!r} is {joints[joint].kind}: it has no {lack}.",
-            hint=f"Joints that have one: {offered(able, joint)}.",
-        )
+        text = f"{what}: joint {joint!r} is {joints[joint].kind}: it has no {lack}."
+        raise ConfigError(text, hint=f"Joints that have one: {offered(able, joint)}.")
     return row
 
 

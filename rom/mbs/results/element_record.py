@@ -104,10 +104,8 @@ def element_record(solution: AnySolution, name: str) -> ElementRecord:
     family, element = mechanism.elements[name]
     markers = markers_of(mechanism, family, element)
     if not markers:
-        raise ConfigError(
-            f"{name!r} of the {family.name} acts on whole bodies, not on markers.",
-            hint="interface_loads has what acts on the interfaces of a body.",
-        )
+        text = f"{name!r} of the {family.name} acts on whole bodies, not on markers"
+        raise ConfigError(f"{text}; see interface_loads for what acts on interfaces.")
     rows = np.array([solution.packed.row(marker) for marker in markers])
     if family is not LAWS_FAMILY:
         return _alone(solution, name, markers, rows)

@@ -160,10 +160,8 @@ class Solution(Whereabouts, Columns, metaclass=Open, kind="columns", bound=typed
         t = vector("t", t)
         outside = ~((t >= self.t[0]) & (t <= self.t[-1]))
         if outside.any():
-            raise ConfigError(
-                f"t = {t[outside][0]:g} s must be within the motion from {self.t[0]:g} s to "
-                f"{self.t[-1]:g} s."
-            )
+            text = f"t = {t[outside][0]:g} s must be within the motion from {self.t[0]:g} s to"
+            raise ConfigError(f"{text} {self.t[-1]:g} s.")
         if self.t.size == 1:
             return self
         left = np.clip(np.searchsorted(self.t, t, side="right") - 1, 0, self.t.size - 2)
@@ -201,10 +199,8 @@ class Solution(Whereabouts, Columns, metaclass=Open, kind="columns", bound=typed
         part = self.mechanism.part(body)
         recovery = getattr(part.moving, "stress", None) if part.r else None
         if recovery is None:
-            raise ConfigError(
-                f"the stress of body {body!r} cannot be recovered.",
-                hint="Reduce it with stress=True.",
-            )
+            text = f"the stress of body {body!r} cannot be recovered"
+            raise ConfigError(f"{text}; reduce it with stress=True.")
         q, moving = self.elastic(body)[instant], None
         if recovery.inertial is not None:
             at = self.packed.system.bodies.v_at[self._number(body)]

@@ -79,20 +79,15 @@ def check_state(state: State, packed: Packed, *, joints: bool = True) -> None:
     needed = (packed.q.size, packed.v.size, packed.system.rows.kind.size)
     sizes = tuple(np.size(getattr(state, x, 0.0)) for x in ("q", "v", "lam"))
     if not isinstance(state, State) or sizes[: 2 + joints] != needed[: 2 + joints]:
-        raise ConfigError(
-            f"the state has {sizes[0]} coordinates, {sizes[1]} velocities and {sizes[2]} "
-            "constraints; this mechanism has {}, {} and {}: their bodies "
-            "differ, or joints.".format(*needed),
-            hint="Take a state of the same mechanism: sol.final, or rom.equilibrium.",
-        )
+        has = "the state has {} coordinates, {} velocities and {} constraints".format(*sizes)
+        text = "{}; this mechanism has {}, {} and {}: their bodies differ.".format(has, *needed)
+        raise ConfigError(text, hint="Take one of the same mechanism: sol.final, rom.equilibrium.")
     stiffened = dict(zip(packed.names, packed.system.bodies.stiffened, strict=True))
     moved = [marker.body for marker in packed.frames if not stiffened[marker.body]]
     if state.in_own_frames and moved:
-        raise ConfigError(
-            f"the state counts {named(moved)} in the frame of its reference condition; motions "
-            "now are integrated on mean axes, and the two differ by the deformation.",
-            hint="Compute the motion up to there again; its file is of an older version.",
-        )
+        text = f"the state counts {named(moved)} in the frame of its reference, as an older"
+        hint = "Compute the motion up to there again."
+        raise ConfigError(f"{text} version did; motions now are on mean axes.", hint=hint)
 
 
 @typed

@@ -90,10 +90,9 @@ class Whereabouts:
         given = place if isinstance(place, Marker) else self.mechanism.part(body).marker(place)
         marker = _of_body(given, body, [body])
         if marker not in self.packed.markers:
-            raise ConfigError(
-                f"the point {marker.place} of body {body!r} was not a marker of the run.",
-                hint="Name it when the body is added; an event may follow it: follow=[marker].",
-            )
+            text = f"the point {marker.place} of body {body!r} was not a marker of the run."
+            hint = "Name it when the body is added; an event may follow it: follow=[marker]."
+            raise ConfigError(text, hint=hint)
         return self._at_marker(self.packed.row(marker))
 
     def _has_frames(self, body: str) -> bool:
@@ -136,7 +135,5 @@ def _of_body(marker: Marker, body: str, names: list[str]) -> Marker:
     """The marker, if it is one of a body, whose frames have these names."""
     if marker.body in names:
         return marker
-    raise ConfigError(
-        f"the marker {marker.place!r} is of body {marker.body!r}, not of {body!r}.",
-        hint=f"Write ({marker.body!r}, {marker.place!r}), or the name of a marker of {body!r}.",
-    )
+    text = f"the marker {marker.place!r} is of body {marker.body!r}, not of {body!r}."
+    raise ConfigError(text, hint=f"Write ({marker.body!r}, {marker.place!r}), or another marker.")

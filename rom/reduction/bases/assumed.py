@@ -75,8 +75,5 @@ def supported_by(reference: Any, origins: dict[str, Array]) -> Fixed:
         if np.delete(chord, k).max() <= ALIGNED_RTOL * chord[k]:
             along = "xyz"[k]
             return {first: f"xyz r{along}", second: "xyz".replace(along, "")}
-    raise ConfigError(
-        f"reference = {reference!r} does not say what the modes obey: that is an interface, two on "
-        "a line along an axis, or mean axes.",
-        hint='Say it by fixed=, for example {"root": "xyz rx", "tip": "yz"}.',
-    )
+    text = f"reference = {reference!r} does not say what the modes obey, as one interface does."
+    raise ConfigError(text, hint='Say it by fixed=, as in {"root": "xyz rx", "tip": "yz"}.')

@@ -111,10 +111,8 @@ def second_order_balanced_truncation(
     S, R = _gramian_factors(K, M, D, B, C)
     U, sigma, Vt = svd(S.T @ R)
     if sigma[r - 1] <= np.finfo(float).eps * sigma[0]:
-        raise ConfigError(
-            f"r = {r}, but only {np.count_nonzero(sigma > np.finfo(float).eps * sigma[0])} "
-            "coordinates are both controllable and observable; take r at most so large."
-        )
+        most = np.count_nonzero(sigma > np.finfo(float).eps * sigma[0])
+        raise ConfigError(f"r = {r}, but only {most} coordinates are controllable and observable.")
     right = R @ Vt[:r].T / np.sqrt(sigma[:r])
     left = S @ U[:, :r] / np.sqrt(sigma[:r])  # left^T right = 1
     M_inverse = np.linalg.inv(M)
@@ -126,19 +124,14 @@ def _gramian_factors(K: Array, M: Array, D: Array, B: Array, C: Array) -> tuple[
     """Factors of Gramians: velocity observability S S^T, position controllability R R^T."""
     n = K.shape[0]
     if n > MAX_COORDINATES:
-        raise ResourceError(
-            f"{n} coordinates make a dense Lyapunov equation of {2 * n}; it is refused above "
-            f"{MAX_COORDINATES}.",
-            hint="Reduce with CraigBampton first, or choose a smaller pool.",
-        )
+        text = f"{n} coordinates make a Lyapunov equation that is refused above {MAX_COORDINATES}."
+        raise ResourceError(text, hint="Reduce with CraigBampton first, or choose a smaller pool.")
     scale = np.sqrt(np.linalg.norm(np.linalg.solve(M, K), 2))  # of time, for the conditioning
     back = [-np.linalg.solve(M, K) / scale**2, -np.linalg.solve(M, D) / scale]
     A = np.block([[np.zeros((n, n)), np.eye(n)], back])
     if np.linalg.eigvals(A).real.max() >= 0.0:
-        raise ModelError(
-            "the system is not stable: its Gramians do not exist.",
-            hint="Hold its rigid motions, and give each mode damping above zero.",
-        )
+        text = "the system is not stable: hold its rigid motions, and give each mode damping."
+        raise ModelError(text)
     b = np.vstack([np.zeros_like(B), np.linalg.solve(M, B) / scale**2])
     c = np.hstack([C, np.zeros_like(C)])
     P = solve_continuous_lyapunov(A, -b @ b.T)[:n, :n]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import Modes, typed
+from rom.arguments import Modes, check_places, finite, typed
 from rom.eigen.scipy import SciPyOperators
 from rom.eigen.verbs import Held, Operators, constraint_modes, quadratic
 from rom.errors import ConfigError
@@ -99,11 +99,10 @@ def check_interfaces(boundary: Index, n: int) -> None:
     """Refuse no interface, or dofs (n_b,) of one beyond the n of the model."""
     if boundary.size == 0:
         raise ConfigError(
-            "the method needs interfaces, and none is given.",
-            hint='Name one, for example interfaces={"pin_a": "rbe2"}.',
+            'the method needs interfaces, and none is given: interfaces={"a": "rbe2"}.'
         )
-    if boundary.ndim != 1 or boundary.min() < 0 or boundary.max() >= n:
-        raise ConfigError(f"boundary must be a row of numbers from 0 to {n - 1}.")
+    finite("boundary", boundary, (None,))
+    check_places("boundary", boundary, n)
 
 
 def residual_shapes(ops: Operators, held: Held, Psi_b: Array, omega: Array, Phi: Array) -> Array:

@@ -163,11 +163,8 @@ def _attached(ops: Operators, boundary: Index, G: Array) -> Array:
     scale = 1 / np.sqrt(np.maximum(np.diag(G_bb), np.finfo(float).tiny))
     lam = np.linalg.eigvalsh(scale[:, None] * G_bb * scale)
     if lam[0] < FLEXIBILITY_RTOL * lam[-1]:
-        raise InterfaceError(
-            f"the residual flexibility of the {boundary.size} boundary dofs is singular "
-            f"({lam[0] / lam[-1]:.1e}): the modes kept describe all of it, or dofs depend on "
-            "each other.",
-            hint="Ask for fewer modes, or give the interface fewer coordinates.",
-        )
+        text = f"the residual flexibility of the {boundary.size} boundary dofs is singular"
+        hint = "Ask for fewer modes, or give the interface fewer coordinates."
+        raise InterfaceError(f"{text} ({lam[0] / lam[-1]:.1e}).", hint=hint)
     factor = cho_factor(scale[:, None] * G_bb * scale)
     return G @ (scale[:, None] * cho_solve(factor, np.diag(scale)))

@@ -5,10 +5,11 @@ from typing import Annotated
 
 import numpy as np
 
-from rom.arguments import Count, typed
+from rom.arguments import Count, NotNegative, typed
 from rom.eigen.verbs import Held, Operators, unit_motions, without_dependent
 from rom.errors import ConfigError, SolverError
 from rom.model import Array, Index
+from rom.names import check_once
 from rom.reduction.bases.fixed_interface import Columns, Constrained, numbered
 
 RESONANCE_RTOL = 1e-8  # distance of a frequency from a mode
@@ -36,17 +37,13 @@ class MomentMatching(Constrained):
         for second-order systems Bai and Su, SIAM J. Sci. Comput. 26 (2005) 1692.
     """
 
-    frequencies: tuple[float, ...] = (0.0,)
+    frequencies: Annotated[tuple[float, ...], NotNegative("Hz", (None,))] = (0.0,)
     order: Annotated[int, Count(1)] = 1
 
     def __post_init__(self) -> None:
-        f = np.asarray(self.frequencies, dtype=float)
-        if not f.size:
+        check_once(self.frequencies, "frequencies:")
+        if not self.frequencies:
             raise ConfigError("MomentMatching needs a frequency.")
-        if not (np.isfinite(f) & (f >= 0)).all() or np.unique(f).size < f.size:
-            raise ConfigError(
-                f"frequencies = {self.frequencies!r}: needed are different numbers from 0 Hz."
-            )
 
     def _completed(self, ops: Operators, held: Held, Psi_b: Array, boundary: Index) -> Columns:
         E, blocks = unit_motions(ops, boundary), []
@@ -75,8 +72,5 @@ def _refuse_resonance(ops: Operators, held: Held, s: float, f: float) -> None:
         X = X / np.sqrt(ops.gram(X, ops.apply_M(X)).item())
     gap = ops.gram(X, ops.apply_K(X)).item() - s
     if abs(gap) < RESONANCE_RTOL * s:
-        raise SolverError(
-            f"{f:g} Hz is a natural frequency of the body with its interfaces held: its answer "
-            "there is infinite.",
-            hint="Choose a frequency beside it.",
-        )
+        text = f"{f:g} Hz is a natural frequency of the body with its interfaces held."
+        raise SolverError(text, hint="Its answer there is infinite; choose one beside it.")

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal, Protocol
 
 import numpy as np
 
-from rom.arguments import Between, Modes, Positive, typed, whole
+from rom.arguments import Between, Modes, Positive, finite, not_both, one_of, typed, whole
 from rom.eigen.band import modes_up_to
 from rom.eigen.verbs import Held, Operators, whole_clusters, without_dependent
 from rom.errors import ConfigError, warn
@@ -85,10 +85,8 @@ class CraigBampton(Constrained):
     supports: tuple[Index, ...] = field(default=(), repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        if self.n_modes is not None and self.f_max is not None:
-            raise ConfigError("CraigBampton takes n_modes or f_max, not both.")
-        if self.n_modes is not None and self.tol is not None:
-            raise ConfigError("CraigBampton takes n_modes or tol, not both.")
+        not_both("CraigBampton", n_modes=self.n_modes, f_max=self.f_max)
+        not_both("CraigBampton", n_modes=self.n_modes, tol=self.tol)
         if self.search == SUBSTRUCTURE_SEARCH and (self.f_max is None or self.tol is not None):
             raise ConfigError('search="substructures" needs f_max, and takes no tol.')
 
@@ -194,17 +192,12 @@ class WithLoads:
 
     def _forces(self, ops: Operators) -> Array:
         if isinstance(self.loads, str):
-            if self.loads != "gravity":
-                raise ConfigError(f'loads = {self.loads!r}; the only word known is "gravity".')
+            one_of("loads", self.loads, ["gravity"])
             if ops.rigid is None:
                 raise ConfigError("gravity needs the coordinates of the nodes.")
             return ops.apply_M(ops.rigid[:, :3])
-        F = np.asarray(self.loads, dtype=float)
         n = ops.expand(np.zeros((ops.n_local, 1))).shape[0]
-        if F.ndim != 2 or F.shape[0] != n or not np.isfinite(F).all():
-            raise ConfigError(
-                f"loads have the shape {F.shape}; needed are finite forces of the shape ({n}, k)."
-            )
+        F = finite("loads", self.loads, (n, None))
         return ops.restrict(F)
 
 

@@ -58,9 +58,9 @@ class Characteristic:
         """
         names = [name for name, tie in connection.ties.items() if tie.label == "full"]
         if not names:
+            hint = 'Name one, for example interfaces={"pin_a": "full"}.'
             raise ConfigError(
-                "Characteristic reduces full interfaces, and none is given.",
-                hint='Name one, for example interfaces={"pin_a": "full"}.',
+                "Characteristic reduces full interfaces, and none is given.", hint=hint
             )
         sizes = [connection.parts[name].size for name in names]
         least = names[int(np.argmin(sizes))]

@@ -15,7 +15,7 @@ from rom.eigen.connection import Connection, Tie
 from rom.eigen.verbs import Operators, given_rigid_motions, held_rows, owned, rigid_motions
 from rom.errors import InterfaceError
 from rom.model import FEModel, Index, Interface
-from rom.names import named, offered
+from rom.names import check_all_known, named
 from rom.reduction.interfaces.kinds import tie
 
 
@@ -29,11 +29,8 @@ def connect(ops: Operators, model: FEModel, interfaces: dict[str, Any]) -> Conne
     chosen = found(model, interfaces)
     for other, one in combinations(chosen, 2):
         if shared := np.intersect1d(one.nodes, other.nodes).size:
-            raise InterfaceError(
-                f"interfaces {other.name!r} and {one.name!r} share {shared} nodes; "
-                "two rigid or averaged surfaces cannot both rule one node.",
-                hint="Leave a gap between the surfaces, or make them one physical surface.",
-            )
+            text = f"interfaces {other.name!r} and {one.name!r} share {shared} nodes; leave a gap"
+            raise InterfaceError(f"{text} between the surfaces, or make them one physical surface.")
     ties = {i.name: tie(i, interfaces[i.name]) for i in chosen}
     if not any(t.removed.size for t in ties.values()):
         return _connection(ops, ties, [interface.dofs for interface in chosen])
@@ -44,17 +41,11 @@ def connect(ops: Operators, model: FEModel, interfaces: dict[str, Any]) -> Conne
 def found(model: FEModel, names: Iterable[str]) -> list[Interface]:
     """The interfaces of these names."""
     names = list(names)
-    if unknown := [name for name in names if name not in model.interfaces]:
-        raise InterfaceError(
-            f"there is no interface {named(unknown)}; the model has {offered(model.interfaces)}.",
-            hint="Interfaces are the named physical surfaces of the geometry.",
-        )
+    check_all_known(names, model.interfaces, "the model has no interface", InterfaceError)
     if wrong := [name for name in names if model.interfaces[name].name != name]:
-        raise InterfaceError(
-            f"interface {named(wrong)} of the model calls itself "
-            f"{named(model.interfaces[name].name for name in wrong)}.",
-            hint="Rename it as well: dataclasses.replace(interface, name=...).",
-        )
+        other = named(model.interfaces[name].name for name in wrong)
+        text = f"interface {named(wrong)} of the model calls itself {other}"
+        raise InterfaceError(f"{text}; rename it as well: dataclasses.replace(it, name=...).")
     return [model.interfaces[name] for name in names]
 
 

@@ -74,11 +74,9 @@ def _averaged(interface: Interface) -> Tie:
     is well conditioned.
     """
     if interface.dofs.size > RBE3_DOFS:
-        raise ResourceError(
-            f"interface {interface.name!r} has {interface.dofs.size} dofs; averaging couples all "
-            f"of them, which is refused above {RBE3_DOFS}.",
-            hint='Use "rbe2", or a coarser mesh on this surface.',
-        )
+        text = f"averaging couples all {interface.dofs.size} dofs of interface {interface.name!r}"
+        hint = 'Use "rbe2", or a coarser mesh on this surface.'
+        raise ResourceError(f"{text}, which is refused above {RBE3_DOFS}.", hint=hint)
     C = mean_motion(interface)
     size = np.ptp(interface.points, axis=0).max()
     scaled = C * np.r_[np.ones(3), np.full(3, size)][:, None]
@@ -92,10 +90,8 @@ def _averaged(interface: Interface) -> Tie:
 def by_name(interfaces: Any) -> dict[str, Any]:
     """The kinds of interfaces as a dictionary."""
     if not isinstance(interfaces, Mapping):
-        raise ConfigError(
-            f"interfaces = {interfaces!r} tells no interface its kind.",
-            hint='Give a dictionary, for example {"bore": "rbe2"}.',
-        )
+        hint = 'Give a dictionary, for example {"bore": "rbe2"}.'
+        raise ConfigError(f"interfaces = {interfaces!r} tells no interface its kind.", hint=hint)
     return dict(interfaces)
 
 

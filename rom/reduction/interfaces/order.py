@@ -38,10 +38,8 @@ def with_orders(
     """
     open_ = open_orders(interfaces)
     if not isinstance(method, CraigBampton) or method.f_max is None or method.tol is None:
-        raise ConfigError(
-            f"the order of the polynomials on {open_} is open, and {method} states no accuracy.",
-            hint="Give an order, or reduce with CraigBampton(f_max=…, tol=…).",
-        )
+        text = f"the order of the polynomials on {open_} is open, and {method} states no accuracy."
+        raise ConfigError(text, hint="Give one, or reduce with CraigBampton(f_max=…, tol=…).")
     error = _error_in_band(ops, connect(ops, model, interfaces | dict.fromkeys(open_, "full")).ops)
     half, found = replace(method, tol=0.5 * method.tol), np.inf
     for order in range(1, MAX_ORDER + 1):
@@ -53,11 +51,9 @@ def with_orders(
         say("polynomials of order %d: estimated error %.1e", order, found)
         if found <= method.tol:
             return kinds, half
-    raise SolverError(
-        f"polynomials of order {MAX_ORDER} on {open_} leave an estimated error of {found:.1e} up "
-        f"to {method.f_max:g} Hz; asked for was {method.tol:g}.",
-        hint='Use "full" on these interfaces, or a larger tolerance.',
-    )
+    text = f"polynomials of order {MAX_ORDER} on {open_} leave an estimated error of {found:.1e}"
+    hint = f'Use "full" on these interfaces, or a larger tolerance than {method.tol:g}.'
+    raise SolverError(f"{text} up to {method.f_max:g} Hz.", hint=hint)
 
 
 def _error_in_band(ops: Operators, full: Operators) -> Callable[[Array, float], float]:

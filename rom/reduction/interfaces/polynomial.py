@@ -18,7 +18,7 @@ import numpy as np
 from numpy.polynomial.legendre import legvander
 
 from rom.arguments import Count, typed
-from rom.eigen.verbs import DEPENDENT_RTOL, orthonormal_in
+from rom.eigen.verbs import DEPENDENT_RTOL, on_a_line, orthonormal_in
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, Interface
 
@@ -57,9 +57,9 @@ class Polynomial:
             ConfigError: if the order is still open, or far beyond what the nodes can tell apart.
         """
         if self.order is None:
+            hint = "Give one: only rom.reduce with CraigBampton(f_max=…, tol=…) chooses it."
             raise ConfigError(
-                f"the order of the polynomials on {interface.name!r} is open.",
-                hint="Give one: only rom.reduce with CraigBampton(f_max=…, tol=…) can choose it.",
+                f"the order of the polynomials on {interface.name!r} is open.", hint=hint
             )
         p = self.order
         _refuse_many((p + 1) * (p + 2) * (p + 3) // 6, interface, f"order {p}")
@@ -116,11 +116,7 @@ def interface_functions(kind: Polynomial | FourierLegendre, interface: Interface
     Q = orthonormal_in(S, V[:, norms > DEPENDENT_RTOL * size])
     linear = np.linalg.matrix_rank(_local(interface), tol=1e-6)
     if linear < 2 or Q.shape[1] < 3:
-        raise InterfaceError(
-            f"the {interface.nodes.size} nodes of interface {interface.name!r} lie on a line: "
-            "its rotation about that line is undetermined.",
-            hint="Choose a surface with an area, or hold another interface.",
-        )
+        raise on_a_line(interface)
     return Q
 
 
@@ -153,11 +149,8 @@ def _principal_axis(interface: Interface, x: Array) -> Array:
     moments, axes = np.linalg.eigh((interface.surface_mass @ x).T @ x)
     gaps = np.diff(moments)
     if gaps.max() < 1e-3 * moments[-1]:
-        raise InterfaceError(
-            f"interface {interface.name!r} has no axis: its area is spread alike in all "
-            "directions.",
-            hint="Use `Polynomial` on it.",
-        )
+        text = f"interface {interface.name!r} has no axis: it is spread alike in all directions"
+        raise InterfaceError(f"{text}; use `Polynomial` on it.")
     return axes[:, 2] if gaps[1] > gaps[0] else axes[:, 0]
 
 
@@ -181,8 +174,5 @@ def _local(interface: Interface) -> Array:
 def _refuse_many(n: int, interface: Interface, asked: str) -> None:
     """More functions than nodes are dropped in the end, but all are evaluated before."""
     if n * interface.nodes.size > MOST_VALUES:
-        raise ConfigError(
-            f"{asked} on interface {interface.name!r} mean {n:.3g} functions for its "
-            f"{interface.nodes.size} nodes.",
-            hint="Orders above ten add nothing to most surfaces.",
-        )
+        text = f"{asked} on interface {interface.name!r} mean {n:.3g} functions for its nodes"
+        raise ConfigError(f"{text}; orders above ten add nothing to most surfaces.")

@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from rom.arguments import Between, Count, finite, typed
+from rom.arguments import Between, Count, finite, one_given, typed
 from rom.eigen.verbs import rigid_motions
 from rom.errors import ConfigError
 from rom.model import Array, Interface
@@ -42,16 +42,11 @@ class Snapshots:
         X = finite("values", self.values, None)
         object.__setattr__(self, "values", X)
         if X.ndim != 2 or X.shape[0] % 3 or not X.size:
-            raise ConfigError(
-                f"snapshots of shape {X.shape} are not displacements of nodes, (3 k, s).",
-                hint="One column per snapshot, x y z node by node.",
-            )
+            text = f"snapshots of shape {X.shape} are not displacements of nodes, (3 k, s)"
+            raise ConfigError(f"{text}; give one column per snapshot, x y z node by node.")
         if not X.any():
             raise ConfigError(f"all {X.shape[1]} snapshots are zero: one must show a motion.")
-        if (self.energy is None) == (self.n is None):
-            raise ConfigError(
-                "Snapshots needs either energy or n.", hint="energy=0.9999 keeps almost all."
-            )
+        one_given("Snapshots", energy=self.energy, n=self.n)
 
     def __repr__(self) -> str:
         """Size instead of numbers, for provenance and labels."""
@@ -62,11 +57,8 @@ class Snapshots:
 def snapshot_functions(kind: Snapshots, interface: Interface) -> Array:
     """(3k, m) functions with Q^T (S x I_3) Q = I, rigid motions first, then by falling energy."""
     if kind.values.shape[0] != interface.dofs.size:
-        raise ConfigError(
-            f"snapshots of {kind.values.shape[0]} dofs do not fit interface {interface.name!r} "
-            f"with {interface.dofs.size}.",
-            hint="Give the displacements of all nodes of the surface, in the order of its nodes.",
-        )
+        text = f"snapshots of {kind.values.shape[0]} dofs do not fit interface {interface.name!r}"
+        raise ConfigError(f"{text} with {interface.dofs.size}; give all of them, in its order.")
     S = interface.surface_mass
     L = np.linalg.cholesky(S.toarray() if hasattr(S, "toarray") else np.asarray(S))
     x = interface.points - interface.points.mean(axis=0)
@@ -87,10 +79,10 @@ def _number(kind: Snapshots, sigma: Array, name: str) -> int:
         share = np.cumsum(sigma**2) / max((sigma**2).sum(), 1e-300)
         return min(int(np.searchsorted(share, kind.energy * (1 - 1e-14))) + 1, sigma.size)
     if kind.n > 6 + sigma.size:
+        text = f"n = {kind.n}, but the {kind.values.shape[1]} snapshots of interface {name!r} hold"
+        hint = "Ask for fewer, or take more snapshots."
         raise ConfigError(
-            f"n = {kind.n}, but the {kind.values.shape[1]} snapshots of interface {name!r} hold "
-            f"{6 + sigma.size} independent functions, the six rigid motions among them.",
-            hint="Ask for fewer, or take more snapshots.",
+            f"{text} {6 + sigma.size} independent functions with six rigid ones.", hint=hint
         )
     return kind.n - 6
 

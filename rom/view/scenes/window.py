@@ -84,10 +84,8 @@ def plotter(thing: AnyBody | FEModel | AnyMechanism, *, n: int = 1) -> Any:
         ResourceError: if pyvista is missing.
     """
     if "dolfinx" in sys.modules:
-        raise ConfigError(
-            "dolfinx is loaded in this process, in which VTK may abort.",
-            hint="Save the body with rom.save and load it in another process.",
-        )
+        text = "dolfinx is loaded in this process, in which VTK may abort"
+        raise ConfigError(f"{text}; save the body with rom.save and load it in another process.")
     require("pyvista")
     import pyvista
 

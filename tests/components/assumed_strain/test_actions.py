@@ -448,15 +448,15 @@ ABOVE = box((-1, 1), (2, 2))
         ({"tools": [Tool("punch", box((0.2, 0.9), (0.8, 2)))]}, MeshError,
          "tool 'punch' starts 0.1 m inside the sheet at node 7"),
         ({"tools": [Tool("wedge", [(0.6, 0.8), (0.9, 2), (0.6, 2)])]}, MeshError,
-         "corner 0 of the tool 'wedge' starts inside the sheet"),
+         "corner 0 of tool 'wedge' starts inside the sheet"),
         ({"tools": [Tool("pad", ABOVE[::-1])]}, ConfigError, "'pad': .* not convex, or clockwise"),
-        ({"tools": [Tool("pad", ABOVE, -0.1)]}, ConfigError, "'pad': the friction -0.1"),
+        ({"tools": [Tool("pad", ABOVE, -0.1)]}, ConfigError, "'pad': friction = -0.1"),
         ({"tools": [Tool("pad", ABOVE[:2])]}, ConfigError, "'pad': corners of the outline = 2"),
         ({"tools": [Tool("pad", [*ABOVE, ABOVE[-1]])]}, ConfigError, "use it once"),
         ({"tools": [Tool("pad", ABOVE, 0.0, ((0, 1), (0, 1)))]}, ConfigError, r"'pad'.*\(2,\)"),
         ({"loads": [Load(np.zeros((3, 2)))]}, ConfigError, "forces of load 0 has shape"),
         ({"loads": [Load(0 * SMALL.points, ((0, 0), (0, 1)))]}, ConfigError, "load 0: times"),
-        ({"drives": [Drive([18], ((0,), (0,)))]}, ConfigError, "drive 0: dofs 18 to 18"),
+        ({"drives": [Drive([18], ((0,), (0,)))]}, ConfigError, "drive 0: dofs .* 18 must be"),
         ({"drives": [Drive([3], ((0,), (0,))), Drive([3], ((0,), (1,)))]}, ConfigError, "twice"),
         ({"drives": [Drive([3], ((0,), (np.nan,)))]}, ConfigError, "drive 0: value 0 is .nan"),
         ({"loads": [Load(0 * SMALL.points, None)]}, ConfigError, "load 0: its history must be"),
@@ -464,7 +464,7 @@ ABOVE = box((-1, 1), (2, 2))
         ({"tools": [Tool("pad", ABOVE, 0.0, np.sin)]}, ConfigError, r"'pad': .*\(257,\), needed"),
         ({"tractions": [Traction([(0, 4)], 1.0)]}, ConfigError, "the side 0-4 is not an outer"),
         ({"tractions": [Traction([(1, 0)], 1.0)]}, ConfigError, "solid on the left"),
-        ({"tractions": [Traction([(0, 1)], np.inf)]}, ConfigError, "traction 0 needs finite"),
+        ({"tractions": [Traction([(0, 1)], np.inf)]}, ConfigError, "traction 0: pressure = inf"),
     ],
 )  # fmt: skip
 def test_actions_that_do_not_fit_are_named(actions, error, words):
@@ -472,7 +472,11 @@ def test_actions_that_do_not_fit_are_named(actions, error, words):
 
 
 def test_wrong_runs_are_named():
-    refuses(ConfigError, "times of", lambda: quasi_static(SMALL, SOFT, Actions(), [0.0]))
+    refuses(
+        ConfigError,
+        "times = .* 2 or more",
+        lambda: quasi_static(SMALL, SOFT, Actions(), [0.0]),
+    )
     pad = Actions(tools=[Tool("pad", ABOVE)])
     refuses(ConfigError, "impacts", implicit_motion, SMALL, SOFT, pad, [0, 1], rho_inf=0.8)
     tear = Actions(range(6), drives=[Drive(range(6, 18), ((0, 1), (0, 30.0)))])

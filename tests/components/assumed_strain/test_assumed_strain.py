@@ -395,17 +395,17 @@ X, T = distorted((2, 2))
 SMALL, SOFT = sheet(X, T), Metal(1.0, 0.3)
 
 test_messages_name_what_is_wrong = refused(
-    (lambda: Metal(1.0, 0.5), MaterialError, "no solid is .*nu=0.5.* nu < 0.5"),
-    (lambda: Metal(-1.0, 0.3), MaterialError, "E, rho, yield_stress > 0"),
-    (lambda: Metal(1.0, 0.3, 1.0, 1.0, -2.0), MaterialError, "hardening=-2.0"),
-    (lambda: sheet(SMALL.points, SMALL.triangles + 5), MeshError, "nodes 5 to 13; there are 0"),
+    (lambda: Metal(1.0, 0.5), MaterialError, "nu = 0.5 must be above -1 and below 0.5"),
+    (lambda: Metal(-1.0, 0.3), MaterialError, "E = -1 must be positive"),
+    (lambda: Metal(1.0, 0.3, 1.0, 1.0, -2.0), MaterialError, "hardening = -2 must not be negative"),
+    (lambda: sheet(SMALL.points, SMALL.triangles + 5), MeshError, "13 must be from 0 to 8"),
     (lambda: sheet(SMALL.points.T, SMALL.triangles), MeshError, r"points \(2, 9\)"),
     (lambda: sheet(SMALL.points - 2, SMALL.triangles, state="axisymmetric"), MeshError,
      "-2 m of node 0, is a radius"),
     (lambda: forces(SMALL, SOFT, SMALL.points[:3]), ConfigError, r"has shape \(3, 2\)"),
     (lambda: tangent(SMALL, SOFT, np.nan * SMALL.points), ConfigError, "is not finite"),
     (lambda: fly(SMALL, SOFT, np.zeros((3, 2)), [0], 1.0), ConfigError, "velocities has"),
-    (lambda: fly(SMALL, SOFT, 0 * SMALL.points, [18], 1.0), ConfigError, "held dofs 18 to 18"),
+    (lambda: fly(SMALL, SOFT, 0 * SMALL.points, [18], 1.0), ConfigError, "held dofs .* 18 must be"),
     (lambda: equilibrium(SMALL, SOFT, np.zeros(3), [0]), ConfigError, "forces of load 0"),
     (lambda: sheet(X, T[:, ::-1]), MeshError, "triangle 0 has the area"),
     (lambda: sheet(np.vstack([X, X[:1] - 1]), [*T, T[0], T[0]]), MeshError, "belongs to 4"),

@@ -147,4 +147,4 @@ def test_one_row_of_triangles_bends_a_little_softly(diagonal, soft):
 
 def test_interfaces_that_name_no_node_of_the_sheet():
     body, edge = sheet(*distorted()), {"edge": np.array([0, 1, 99])}
-    refuses(InterfaceError, "'edge' names the nodes 0 to 99", in_space, body, STEEL, edge)
+    refuses(InterfaceError, "interface 'edge': 99 must be from", in_space, body, STEEL, edge)

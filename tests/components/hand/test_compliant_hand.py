@@ -197,7 +197,7 @@ def test_the_hand_has_fifteen_joints():
 
 def test_what_no_finger_can_do_is_named():
     finger = Finger(n=4)
-    refuses(ConfigError, "both tension and pull", close, finger, tension=1.0, pull=1.0)
+    refuses(ConfigError, "tension or pull, not both", close, finger, tension=1.0, pull=1.0)
     refuses(ModelError, "3 springs and 2 phalanges", Finger, phalanges=(1.0, 1.0))
     refuses(ModelError, "the last >= 0", Finger, phalanges=(0.0, 1.0, 1.0))
     refuses(ModelError, "a tendon of 1 holes", lambda: Tendon((Hole(0, 0, (0, 0, 0)),)))

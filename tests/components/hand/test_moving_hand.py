@@ -244,8 +244,8 @@ def test_what_no_hand_can_do_is_named():
     finger, force = {"index": Finger(n=2)}, {"tension": 1.0}
     for words, drives in (
         ("drive of 'toe'", {"toe": Drive(**force)}),
-        ("either a tension or a pull", {"index": Drive()}),
-        ("either a tension or a pull", {"index": Drive(**force, pull=1 * MM)}),
+        ("exactly one of tension and pull", {"index": Drive()}),
+        ("exactly one of tension and pull", {"index": Drive(**force, pull=1 * MM)}),
         (r"winch of 'index' is to take in 0\.03 m", {"index": Drive(pull=30 * MM)}),
         ("'index cable' are at one point", {"index": Drive(**force, conduit=2 * ((0, 0, -0.1),))}),
         ("not in a conduit", {"index joint 1": Drive(**force, conduit=((0, 0, -0.1),))}),

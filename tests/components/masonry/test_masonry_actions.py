@@ -422,7 +422,7 @@ ONE = Masonry((stone(box(), **SOFT),), (), 1e9, 0.5)
         ([SupportMotion((0,), (0.1, 0.0), history=1.0)], "begins away from where"),
         ([SupportMotion((0,), (0.1, 0.0), history=masonry.rectangle(1.0, 1.0))], "begins away"),
         ([SupportMotion((0,), (50.0, 0.0), history=lambda t: t)], "support 0 moves by .* in the"),
-        ([SupportMotion((0,), (0.1, 0.0))] * 2, r"supports \[0\] are moved by two actions"),
+        ([SupportMotion((0,), (0.1, 0.0))] * 2, "a support moved by an action, 0 is given twice"),
     ],
 )
 def test_actions_that_cannot_be_are_named(actions, words):

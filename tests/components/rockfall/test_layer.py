@@ -247,10 +247,10 @@ def test_what_stays_is_the_shape_of_the_static_deflection():
 
 
 test_messages_name_what_is_wrong = refused(
-    (lambda: Layer(-1.0, 0.6, 0.9), ConfigError, "needed are modulus"),
-    (lambda: Layer(3e6, 0.6, float("nan")), ConfigError, "needed are modulus"),
-    (lambda: Layer(3e6, 0.6, 0.9, angle=30.0), ConfigError, r"angle \[rad\] = 30"),
-    (lambda: Layer(3e6, 0.6, 0.9, recovery=0.0), ConfigError, "0 < recovery <= 1"),
+    (lambda: Layer(-1.0, 0.6, 0.9), ConfigError, "modulus = -1 must be positive"),
+    (lambda: Layer(3e6, 0.6, float("nan")), ConfigError, "thickness = nan must be a finite"),
+    (lambda: Layer(3e6, 0.6, 0.9, angle=30.0), ConfigError, "angle = 30 must be above 0 and below"),
+    (lambda: Layer(3e6, 0.6, 0.9, recovery=0.0), ConfigError, "recovery = 0 must be above 0"),
     (lambda: GOOD.contact(0.9), ConfigError, r"d \[m\] = 0.9 must be"),
     (lambda: GOOD.spread(-0.1), ConfigError, r"d \[m\] = -0.1"),
     (lambda: strike(baseline(cushion=GOOD, height=300.0)), ConfigError, "pressed through"),
@@ -370,8 +370,8 @@ def test_the_delay_of_a_layer_is_that_of_its_bar_wave():
 
 
 test_what_cannot_arrive_is_named = refused(
-    (lambda: arriving([0, 1], [1.0], 0.1), "2 instants with 1 forces"),
-    (lambda: arriving([0, 0], [1.0, 1.0], 0.1), "instants that grow"),
+    (lambda: arriving([0, 1], [1.0], 0.1), "a row of 2 numbers"),
+    (lambda: arriving([0, 0], [1.0, 1.0], 0.1), "2 or more numbers that ascend"),
     (lambda: arriving([0, 1], [1.0, 1.0], 1e-9), "passages of a wave of 1e-09 s in 1 s"),
     (lambda: rockfall.wave_delay(Layer(25e6, 0.7, 0.9), 1.0), r"d \[m\] = 1 must be"),
     error=ConfigError,

@@ -140,7 +140,7 @@ def test_sand_bears_as_vesic_says(degrees, factor):
 
 
 test_bad_numbers_are_named = refused(
-    (lambda: rockfall.Layer(1e6, 1.0, 1.0, strength=0.0), "density and strength > 0"),
+    (lambda: rockfall.Layer(1e6, 1.0, 1.0, strength=0.0), "strength = 0 must be positive"),
     (lambda: calibrate(full_size(granular(40)), FLAT, STRENGTH), "pressed through"),
     (lambda: calibrate(full_size(Cushion(1e6)), {}, STRENGTH), "nothing is measured"),
     (lambda: calibrate(full_size(Cushion(1e6)), FLAT, STRENGTH), "needs a cushion of type Layer"),

@@ -459,19 +459,23 @@ def test_parameters_are_varied_one_at_a_time():
 
 
 test_messages_name_what_is_wrong = refused(
-    (lambda: Cushion(np.inf), ConfigError, "needed are stiffness"),
-    (lambda: Cushion(np.nan), ConfigError, "needed are stiffness"),
-    (lambda: Shear(np.inf), ConfigError, "needed are|stiffness, capacity"),
-    (lambda: Cushion(-1.0), ConfigError, "needed are stiffness and limit > 0"),
-    (lambda: Cushion(1.0, recovery=0.0), ConfigError, "0 < recovery <= 1"),
-    (lambda: Cushion(1.0, exponent=0.5), ConfigError, "exponent >= 1"),
-    (lambda: Slab(np.ones(2), np.ones(2), capacity=-1.0), ModelError, "capacity = -1.0 N"),
+    (lambda: Cushion(np.inf), ConfigError, "stiffness = inf must be a finite"),
+    (lambda: Cushion(np.nan), ConfigError, "stiffness = nan must be a finite"),
+    (lambda: Shear(np.inf), ConfigError, "stiffness = inf must be a finite"),
+    (lambda: Cushion(-1.0), ConfigError, "stiffness = -1 must be positive"),
+    (lambda: Cushion(1.0, recovery=0.0), ConfigError, "recovery = 0 must be above 0 and at most 1"),
+    (lambda: Cushion(1.0, exponent=0.5), ConfigError, "exponent = 0.5 must be at least 1"),
+    (
+        lambda: Slab(np.ones(2), np.ones(2), capacity=-1.0),
+        ModelError,
+        "capacity = -1 must be positive",
+    ),
     (lambda: Slab(np.zeros(2), np.ones(2)), ModelError, "moves under the plug"),
     (lambda: Slab(np.array([np.nan]), np.ones(1)), ModelError, "not finite"),
     (lambda: Slab(np.ones(2), np.array([0.0, 1.0])), ModelError, "supports that hold it"),
     (lambda: strike(baseline(), dt=0.01, t_end=20.0), SolverError, "grows without bound"),
-    (lambda: Shear(-1.0), ConfigError, "stiffness, capacity, ultimate > 0"),
-    (lambda: Cushion(1.0).penetration(-3.0), ConfigError, "energy = -3.0 J"),
+    (lambda: Shear(1.0, ultimate=0.0), ConfigError, "ultimate = 0 must be positive or"),
+    (lambda: Cushion(1.0).penetration(-3.0), ConfigError, "energy = -3 must not be negative"),
 )
 
 

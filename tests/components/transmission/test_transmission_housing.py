@@ -115,4 +115,4 @@ def test_a_reduced_body_is_held_and_bends_as_a_cantilever():
     assert soft[1, 3] == pytest.approx(-slender[1] * 1.5 / size[0], rel=0.03)
     first = np.sqrt(house.K[0, 0] / house.M[0, 0]) / (2 * np.pi)
     assert first == pytest.approx(body.frequencies(1, fixed=("root",))[0], rel=1e-6)
-    refuses(ModelError, "must be orthonormal", made, axes=2 * axes)
+    refuses(ModelError, "orthonormal rows", made, axes=2 * axes)

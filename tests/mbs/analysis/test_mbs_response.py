@@ -188,4 +188,4 @@ def test_a_mechanism_as_a_whole_takes_its_equilibrium_at_each_speed():
 
 def test_wrong_speeds_and_mechanisms_are_named():
     for speeds in ([1.0], [2.0, 1.0]):
-        refuses(ConfigError, "at least two growing", rom.campbell, rotor, speeds)
+        refuses(ConfigError, "must be 2 or more numbers that ascend", rom.campbell, rotor, speeds)

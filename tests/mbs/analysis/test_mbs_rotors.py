@@ -191,7 +191,7 @@ test_spins_and_blades_that_are_none_are_refused = refused(
     (counted(blades(2)), "3 or more"),
     (counted("blade"), "3 or more"),
     (counted(["blade 0", "blade 1", "blade 9"]), "no body 'blade 9'"),
-    (counted(["blade 0", "blade 1", "blade 1"]), "listed once"),
+    (counted(["blade 0", "blade 1", "blade 1"]), "'blade 1' is given twice"),
     (counted(["blade 0", "blade 1", "hub"]), "alike"),
     (counted([["blade 0", "hub"], ["blade 1"], ["blade 2"]]), "alike"),
     (counted([f"blade {k}" for k in (0, 2, 1, 3)]), "does not stand"),  # across, not around

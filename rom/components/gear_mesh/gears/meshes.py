@@ -164,8 +164,8 @@ def gear_mesh(  # noqa: PLR0913  one keyword per property
     axes = np.array([z @ turned[0], c @ turned[0], z @ turned[1], along @ turned[1]])
     follows = _follows_energy(name, pair, entry, conservative)
     if friction and transition_speed is None:
-        text = f"mesh {name!r} has friction, but no transition_speed."
-        raise ConfigError(text, hint="Take a hundredth of the speed with which its flanks slide.")
+        text = f"mesh {name!r} has friction, but no transition_speed"
+        raise ConfigError(f"{text}; take a hundredth of the speed with which its flanks slide.")
     between(f"coupling [m] of mesh {name!r} and its width", coupling, 0, pair.width)
     soft = hertz.compliance if hertz else 0.0
     numbers = (damping, friction, transition_speed or 1.0, follows, coupling, soft)
@@ -199,14 +199,11 @@ def phase_from(name: str, mesh: GearMesh, others: Iterable[tuple[str, GearMesh]]
         (one, first), (two, second) = phases.values()
         misfit = abs((one - two + 0.5 * pitch) % pitch - 0.5 * pitch) * pair.rb[0]
         if misfit > MAX_MISFIT * pair.base_pitch + abs(pair.backlash):
-            raise ModelError(
-                f"the teeth of mesh {name!r} miss each other's gaps by "
-                f"{misfit / pair.base_pitch:.3f} of a pitch: by meshes {first!r} and {second!r} "
-                "the wheels stand otherwise, so that no such train can be put together.",
-                where=name,
-                hint="Planets in equal steps need a sum of the teeth of sun and ring that their "
-                "number divides. To leave that alone give phase=...",
-            )
+            text = f"the teeth of mesh {name!r} miss each other's gaps by"
+            other = f"by meshes {first!r} and {second!r} the wheels stand otherwise"
+            hint = "Planets in equal steps divide the sum of teeth of sun and ring; or give phase=."
+            far = f"{misfit / pair.base_pitch:.3f} of a pitch"
+            raise ModelError(f"{text} {far}: {other}.", where=name, hint=hint)
     return phases[min(phases)][0]
 
 
@@ -267,11 +264,8 @@ def _follows_energy(
     """1 for forces that follow the energy along the path, 0 for those along involutes."""
     jumps = entry == 0.0 and pair.helix == 0.0
     if conservative and jumps:
-        raise ConfigError(
-            f"the energy of mesh {name!r} would jump: its lines come with their whole width at "
-            "once, for entry = 0.",
-            hint="Let teeth take up their load over an entry of 0.02, or give conservative=False.",
-        )
+        text = f"the energy of mesh {name!r} would jump: lines come at once with entry = 0."
+        raise ConfigError(text, hint="Take an entry of 0.02, or give conservative=False.")
     return float(not jumps if conservative is None else conservative)
 
 
@@ -279,12 +273,9 @@ def _check_place(name: str, pair: GearPair | RackPair, D: Array, z: Array) -> No
     """Refuse wheels that do not stand as the pair says."""
     distance = float(np.linalg.norm(D - (D @ z) * z))
     if not abs(distance - abs(pair.distance)) <= DISTANCE_RTOL * pair.module:
-        raise ConfigError(
-            f"the wheels of mesh {name!r} stand {distance * 1e3:.6g} mm apart, those of its pair "
-            f"{abs(pair.distance) * 1e3:.6g} mm.",
-            hint="Move a body, or give the pair this centre_distance; the marker of a rack is "
-            "beside the axis of its pinion.",
-        )
+        text = f"the wheels of mesh {name!r} stand {distance * 1e3:.6g} mm apart, those of its pair"
+        hint = "Move a body (the marker of a rack), or give the pair this centre_distance."
+        raise ConfigError(f"{text} {abs(pair.distance) * 1e3:.6g} mm.", hint=hint)
     if not abs(float(D @ z)) <= FACE_RTOL * pair.width:
         text = f"the faces of mesh {name!r} are {abs(D @ z) * 1e3:.4g} mm beside each other"
         raise ConfigError(f"{text}; wheel_a and wheel_b must be the middles of the common face.")
@@ -299,9 +290,8 @@ def _check_correction(name: str, pair: GearPair | RackPair, correction: Correcti
         raise ConfigError(f"the rack of {name!r} does not turn; give it no run-out.")
     for amount, _ in finite("run_out", correction.run_out, (2, 2)):
         if not abs(amount) <= MAX_RUN_OUT * pair.module:
-            text = f"run-out {amount:g} m of {name!r} is more than {MAX_RUN_OUT} modules."
-            hint = "Flanks with so much are no involutes about their axis: move the marker."
-            raise ConfigError(text, hint=hint)
+            text = f"run-out {amount:g} m of {name!r} is more than {MAX_RUN_OUT} modules"
+            raise ConfigError(f"{text}: no involutes about their axis; move the marker.")
     _maps(pair, correction, name)
 
 

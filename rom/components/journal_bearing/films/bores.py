@@ -47,8 +47,8 @@ def bore_of(
         hint = "Reduce that interface with rom.FourierLegendre(4, 2), or leave out elastic_bush."
         raise ConfigError(f"{where} has no functions by which it could deform.", hint=hint)
     if bearing.aligned:
-        text = f"{where} deforms, and the film of an aligned bearing is half of one that does not."
-        raise ConfigError(text, hint="Give the bearing aligned=False.")
+        text = f"{where} deforms, and the film of an aligned bearing does not"
+        raise ConfigError(f"{text}; give it aligned=False.")
     surface, patch = found
     frame = np.array([across, np.cross(axis, across), axis])
     _check_bore(where, (patch.points - surface.point) @ frame.T, bearing)
@@ -68,20 +68,14 @@ def _check_bore(where: str, local: Array, bearing: JournalBearing) -> None:
     """Refuse a surface with nodes (n, 3) in the axes of the bearing that is not its bore."""
     radii, R = np.hypot(local[:, 0], local[:, 1]), bearing.radius
     if np.abs(radii - R).max() > BORE_RTOL * R:
-        raise ConfigError(
-            f"{where} is no bore of it: its nodes lie {1e3 * radii.min():.5g} to "
-            f"{1e3 * radii.max():.5g} mm from the axis, and the journal has a radius of "
-            f"{1e3 * R:.5g} mm.",
-            hint="Compare diameter and axis of the bearing with the bore that was meshed.",
-        )
+        far = f"{1e3 * radii.min():.5g} to {1e3 * radii.max():.5g} mm from the axis"
+        text = f"{where} is no bore of it: its nodes lie {far}, and the journal has a radius of"
+        raise ConfigError(f"{text} {1e3 * R:.5g} mm; compare diameter, axis and mesh.")
     L = bearing.length
     beyond = 0.5 * L - min(local[:, 2].max(), -local[:, 2].min())
     if beyond > LENGTH_RTOL * L:
-        raise ConfigError(
-            f"{where} ends {1e3 * beyond:.4g} mm before the bearing does, which is "
-            f"{1e3 * L:.5g} mm long.",
-            hint="Its functions say nothing of what lies beyond: mesh a longer bore.",
-        )
+        text = f"{where} ends {1e3 * beyond:.4g} mm before the bearing does, which is"
+        raise ConfigError(f"{text} {1e3 * L:.5g} mm long; mesh a longer bore.")
 
 
 @inner

@@ -114,8 +114,8 @@ def journal_bearing(  # noqa: PLR0913  one keyword per property
     turning = self.part(journal.body).spin_about(name, axes[0])
     film = OilFilm(journal, bush, bearing, axes, oil, numbers, turning)
     if elastic_bush and tabulated:
-        text = f"the bush of bearing {name!r} bends: its film has no table of places."
-        raise ConfigError(text, hint="Leave out elastic_bush or tabulated.")
+        text = f"the bush of bearing {name!r} bends: its film has no table of places"
+        raise ConfigError(f"{text}; leave out elastic_bush or tabulated.")
     if tabulated:
         film = replace(film, table=table_of(name, bearing))
     if elastic_bush:
@@ -143,12 +143,9 @@ def _check_gap(name: str, bearing: JournalBearing, place: Array, roughness: floa
         text = f"roughness of bearing {name!r} is {roughness * 1e6:.3g} micrometres"
         raise ConfigError(f"{text}, and its film {most * 1e6:.3g} at most.")
     if not bearing.thinnest(place) > roughness:
-        raise ConfigError(
-            f"the journal of bearing {name!r} touches its bush at the start: it stands "
-            f"{np.hypot(*place) * 1e6:.4g} micrometres beside the middle, and the clearance is "
-            f"{c * 1e6:.4g}.",
-            hint="Put the markers on one axis where the bodies are added.",
-        )
+        far = f"{np.hypot(*place) * 1e6:.4g} micrometres beside the middle of {c * 1e6:.4g}"
+        text = f"the journal of bearing {name!r} touches its bush at the start: it stands"
+        raise ConfigError(f"{text} {far}; put the markers on one axis.")
 
 
 def _oil(name: str, oil: Oil | float, inlet: float | None) -> tuple[float, ...]:

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from rom.arguments import Positive, typed
 from rom.errors import ModelError
 from rom.model import Array
+from rom.names import check_known
 
 CELSIUS_ZERO = 273.15  # [K]
 AT_100 = {32: 5.4, 46: 6.8, 68: 8.7}  # usual mineral oils of these grades [mm^2/s]
@@ -39,10 +40,8 @@ class Oil:
 
     def __post_init__(self) -> None:
         if not self.nu_40 > self.nu_100 > 0.3:
-            raise ModelError(
-                f"no oil has {self.nu_40} mm2/s at 40 C and {self.nu_100} mm2/s at 100 C: hot oil "
-                "is thinner; needed are nu_40 > nu_100 > 0.3."
-            )
+            text = f"no oil has {self.nu_40} mm2/s at 40 C and {self.nu_100} mm2/s at 100 C"
+            raise ModelError(f"{text}: hot oil is thinner; needed are nu_40 > nu_100 > 0.3.")
 
     def law(self) -> tuple[float, float]:
         """A and B of log10 log10 (nu + 0.7) = A - B log10 T, nu in mm^2/s and T in kelvin [1]."""
@@ -64,7 +63,5 @@ def iso_vg(grade: int) -> Oil:
     Raises:
         ModelError: for other grades.
     """
-    if grade not in AT_100:
-        text = f"ISO VG {grade} is not listed; there are {sorted(AT_100)}."
-        raise ModelError(text, hint="Use Oil.")
+    check_known(grade, AT_100, f"ISO VG {grade} is not listed; use Oil, there are", ModelError)
     return Oil(float(grade), AT_100[grade])

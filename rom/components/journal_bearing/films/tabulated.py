@@ -55,8 +55,8 @@ def table_of(name: str, bearing: JournalBearing) -> Array:
         "has grooves with pressure": bool(bearing.grid.inlet.any()),
     }
     for reason in (reason for reason, holds in reasons.items() if holds):
-        text = f"bearing {name!r} {reason}: its film has no table of places and directions."
-        raise ConfigError(text, hint="Leave out tabulated.")
+        text = f"bearing {name!r} {reason}: its film has no table of places and directions"
+        raise ConfigError(f"{text}; leave out tabulated.")
     D, grooves = bearing.diameter / bearing.length, tuple(bearing.grooves)
     return _table(replace(bearing, diameter=D, length=1.0, clearance=1e-3 * D, grooves=grooves))
 

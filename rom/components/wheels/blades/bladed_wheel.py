@@ -146,10 +146,9 @@ class BladedWheel:
     def _check(self, blades: Sequence[ReducedBlade]) -> None:
         (N, r, _), found = self.roots.shape, [blade.n_root for blade in blades]
         if found != [r] * N:
-            raise ConfigError(
-                f"{len(found)} blades with {sorted(set(found))} root coordinates, not {N} of {r}.",
-                hint="Take sector.blade, its varied(…), or rom.reduced_blade(sector, …).",
-            )
+            text = f"{len(found)} blades with {sorted(set(found))} coordinates, not {N} of {r}."
+            hint = "Take sector.blade, its varied(…), or rom.reduced_blade(sector, …)."
+            raise ConfigError(text, hint=hint)
 
     def _joined(self, name: str, blades: Sequence[ReducedBlade]) -> Array:
         """The matrix of that name of the disk, and those of the blades on their roots."""
@@ -196,10 +195,8 @@ class BladedWheel:
             ModelError: if a motion is left without stiffness, by the blades or by the speed.
         """
         if speed and not self.sector.supported:
-            raise ConfigError(
-                "a free wheel of different blades has no modes at speed.",
-                hint="Hold the disk, fixed=(…), or put it on springs, rom.supported_sector.",
-            )
+            text = "a free wheel of different blades has no modes at speed"
+            raise ConfigError(f"{text}; hold the disk, or put it on rom.supported_sector.")
         K, M = self.matrices(blades, speed=speed)
         lam, Phi = _apart(K, M, self.rigid)
         if lam[0] < -RIGID_RTOL * lam[-1] or (speed and lam[0] <= 0.0):

@@ -34,7 +34,7 @@ from rom.components.wheels.reduced import (
     project,
 )
 from rom.components.wheels.rotation import arms, centrifugal_displacement, rotation_matrices
-from rom.components.wheels.sector import NO_DOFS, CyclicSector, all_rows, region
+from rom.components.wheels.sector import NO_DOFS, CyclicSector, all_rows, region, stresses_of
 from rom.eigen.verbs import dofs_of, every_row, own_rows, static_shapes
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, FEModel, Index, Interface
@@ -218,23 +218,14 @@ def turning(
     return replace(blade, coriolis=Psi.T @ (G @ Psi), centrifugal=0.5 * (C + C.T))
 
 
-def stresses_of(model: FEModel, blade: str | None) -> Stresses:
-    """Stress that the elements of a blade carry."""
-    found = (model if blade is None else model.regions[blade]).stresses
-    if found is None:
-        raise ConfigError("the blade has no finite elements; make it with rom.fe.model.")
-    return found
-
-
 def cut(K: csr_matrix, K_blade: csr_matrix, name: str) -> tuple[Index, Index]:
     """Inner dofs of a blade, and nodes of its root: those it shares with the rest."""
     total, mine = K.diagonal(), K_blade.diagonal()
     shared = (mine > 0.0) & (total - mine > SHARED_STIFFNESS_RTOL * total)
     nodes = np.flatnonzero(shared.reshape(-1, 3).any(axis=1))
     if nodes.size == 0:
-        raise InterfaceError(
-            f"region {name!r} shares no node with the rest of the sector; mesh both as one solid."
-        )
+        text = f"region {name!r} shares no node with the rest of the sector"
+        raise InterfaceError(f"{text}; mesh both as one solid.")
     return np.setdiff1d(np.flatnonzero(mine > 0.0), dofs_of(nodes)), nodes
 
 
@@ -252,9 +243,9 @@ def _same_surface(sector: SubstructuredSector, points: Array) -> csr_matrix:
     boxes = [np.array([p.min(axis=0), p.max(axis=0)]) for p in (own, points)]
     apart = np.abs(boxes[0] - boxes[1]).max()
     if apart > ROOT_MATCH_RTOL * size:
+        text = f"the root of this blade ends up to {apart:.3g} m from that of the sector"
         raise InterfaceError(
-            f"the root of this blade ends up to {apart:.3g} m from that of the sector, "
-            f"{size:.3g} m wide; only above it may blades differ in shape."
+            f"{text}, {size:.3g} m wide; only above it may blades differ in shape."
         )
     return interpolation(own, points)
 
@@ -303,9 +294,8 @@ def substructured_sector(
     inner, nodes = cut(sector.K, K_blade, blade)
     shared, faces = dofs_of(nodes), np.union1d(sector.slave, sector.master)
     if np.intersect1d(np.union1d(inner, shared), faces).size:
-        raise InterfaceError(
-            f"the blade {blade!r} reaches a cyclic face; cut the wheel between the blades."
-        )
+        text = f"the blade {blade!r} reaches a cyclic face"
+        raise InterfaceError(f"{text}; cut the wheel between the blades.")
     face = root_of(model, nodes)
     Q_root = interface_functions(root or Polynomial(3), face)
     kinds, r = {CYCLIC_FACES: functions or Polynomial(4)}, 3 * Q_root.shape[1]
@@ -338,7 +328,5 @@ def _refuse_stiffened(sector: CyclicSector, model: FEModel, of_blade: Array) -> 
     """What heat adds to a sector cannot be told apart into disk and blade."""
     own = all_rows(model, model.K).diagonal()[of_blade]
     if np.any(abs(sector.K.diagonal()[of_blade] - own) > SHARED_STIFFNESS_RTOL * own):
-        raise ConfigError(
-            "the blade has more than the stiffness of its finite elements: see rom.heated_sector.",
-            hint="Substructure the sector without heat, or reduce it whole by rom.reduce_sector.",
-        )
+        text = "the blade has more than stiffness of its finite elements: see rom.heated_sector."
+        raise ConfigError(text, hint="Substructure it without heat, or use rom.reduce_sector.")

@@ -59,9 +59,8 @@ class SpeedTable(ABC):
             ConfigError: if the speed is above the highest.
         """
         if not abs(speed) <= self.top * (1 + 1e-12):
-            raise ConfigError(
-                f"{speed!r} rad/s is beyond the {self.top:g} rad/s of rom.spin_up; give it more."
-            )
+            text = f"{speed!r} rad/s is beyond the {self.top:g} rad/s of rom.spin_up"
+            raise ConfigError(f"{text}; give it more.")
         return lagrange(straightened(self.speeds, self.omega), straightened(speed, self.omega))
 
     @abstractmethod
@@ -153,10 +152,8 @@ class SpinUp(SpeedTable):
             start = self.steady.independent(self.displacements[:, k])
             a, reached = self.steady.follow(start, self.speeds[k] ** 2, square, self.steady.load)
             if reached < square:
-                raise ModelError(
-                    f"no stable state at {speed:.5g} rad/s, the last at {reached**0.5:.5g} rad/s.",
-                    solution=self.steady.T @ a,
-                )
+                text = f"no stable state at {speed:.5g} rad/s, the last at {reached**0.5:.5g}."
+                raise ModelError(text, solution=self.steady.T @ a)
         return self.steady.T @ a
 
     def at(self, speed: float) -> CyclicSector:
@@ -285,10 +282,8 @@ def spin_up(
     if heat is not None:
         a, share = steady.follow(a, 0.0, 1.0, steady.solid.warm)
         if share < 1.0:
-            raise ModelError(
-                f"no stable state beyond {heat.described(share)}: it buckles, see "
-                "rom.thermal_buckling."
-            )
+            text = f"no stable state beyond {heat.described(share)}"
+            raise ModelError(f"{text}: it buckles, see rom.thermal_buckling.")
     coriolis = rotation_matrices(sector.M, sector.axis)[0]
     base = replace(sector, coriolis=coriolis, centrifugal=csr_matrix(-steady.softening))
     omega = cyclic_modes(sector, 0, min(3, sector.free.size)).omega
@@ -305,10 +300,8 @@ def spin_up(
         for k in range(1, n_states):
             a, square = steady.follow(found[-1], squares[k - 1], squares[k], steady.load)
             if square < squares[k]:
-                raise ModelError(
-                    f"no stable steady state was found above {np.sqrt(square):.5g} rad/s.",
-                    hint="Ask for a lower speed, or hold the solid more firmly.",
-                )
+                text = f"no stable steady state was found above {np.sqrt(square):.5g} rad/s"
+                raise ModelError(f"{text}; ask for a lower speed, or hold the solid more firmly.")
             found.append(a)
     return table()
 

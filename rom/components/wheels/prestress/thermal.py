@@ -21,7 +21,7 @@ from rom.arguments import finite, number, typed
 from rom.components.wheels.modes import real_form
 from rom.components.wheels.prestress.steady_rotation import Solid
 from rom.components.wheels.rotation import axial_pins, largest_ratio
-from rom.components.wheels.sector import CyclicSector, Matrix, all_rows, workers_of
+from rom.components.wheels.sector import CyclicSector, Matrix, all_rows, stresses_of, workers_of
 from rom.eigen.supports import Fixed, held_dofs
 from rom.eigen.verbs import dofs_of, pins, rigid_motions
 from rom.eigen.workers import Workers, held_solution
@@ -171,9 +171,7 @@ def thermal_buckling(model: FEModel, heat: Heat, *, fixed: Fixed = ()) -> float:
 
 def finite_solid(model: FEModel, heat: Heat | None = None) -> Solid:
     """The solid in large motion, heated, see `rom.fe.forms.large_strain.FiniteStrain`."""
-    if model.stresses is None:
-        raise ConfigError("the model has no finite elements; make it with rom.fe.model.")
-    solid = model.stresses.finite_strain()
+    solid = stresses_of(model).finite_strain()
     if heat is not None:
         solid.heat(*heat.on(model))
     return solid
@@ -262,5 +260,5 @@ def _refuse_buckled(parts: Iterable[tuple[csr_matrix, ...]], heat: Heat, workers
             shares.append(critical_factor(*part))
     share = min(shares, default=None)
     if share is not None:
-        text = f"the heated solid buckles at {heat.described(share)}."
-        raise ModelError(text, hint="Hold it more loosely, or follow its shape with rom.spin_up.")
+        text = f"the heated solid buckles at {heat.described(share)}"
+        raise ModelError(f"{text}; hold it more loosely, or follow its shape with rom.spin_up.")

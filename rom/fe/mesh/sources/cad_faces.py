@@ -228,10 +228,8 @@ class Picker:
                 + (f" Faces of these numbers are {numbers!r}." if whole else ""),
             )
         if len(order) > 1 and distance[order[1]] - best < TIE_RTOL * size:
-            raise TagError(
-                f"faces {order[0]} and {order[1]} are equally near to the point {wish.text}.",
-                hint="Choose a point away from the edge, or a number.",
-            )
+            text = f"faces {order[0]} and {order[1]} are equally near to the point {wish.text}"
+            raise TagError(f"{text}; choose a point away from the edge, or a number.")
         return order[:1]
 
     def _distance(self, tag: int, point: tuple[float, ...]) -> float:

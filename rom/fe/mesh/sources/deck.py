@@ -26,10 +26,8 @@ def only_type(found: Iterable[str]) -> str:
     if not types:
         raise MeshError("there are no volume cells in the deck.", hint="A solid is needed.")
     if len(types) > 1:
-        raise MeshError(
-            f"the cells are of several types, {types}; one mesh needs one type.",
-            hint="Mesh all volumes with tetrahedra, or all with hexahedra.",
-        )
+        text = f"the cells are of several types, {types}; one mesh needs one type"
+        raise MeshError(f"{text}; mesh all volumes with tetrahedra, or all with hexahedra.")
     return types[0]
 
 

@@ -107,10 +107,8 @@ def _check_names(names: dict[tuple[int, int], str]) -> None:
     for (dim, tag), name in names.items():
         what = f"physical {DIMENSIONS[dim]} {tag}"
         if name in seen:
-            raise TagError(
-                f"the name {name!r} stands for {seen[name]} and {what}.",
-                hint="Give each group its own name.",
-            )
+            text = f"the name {name!r} stands for {seen[name]} and {what}"
+            raise TagError(f"{text}; give each group its own name.")
         seen[name] = what
 
 

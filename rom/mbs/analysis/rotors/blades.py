@@ -23,7 +23,7 @@ from rom.errors import ConfigError
 from rom.mbs.equations.packing import Packed
 from rom.mbs.results.state import State
 from rom.model import Array, Index
-from rom.names import check_known
+from rom.names import check_known, check_once
 
 MIN_BLADES = 3  # with two, coefficients stay periodic
 SPACING_TOL = 1e-3  # of the azimuth of a blade [rad]
@@ -56,12 +56,10 @@ class Blades:
         for k, A in enumerate(axes):
             there = rotation.matrix(rotation.exp(2 * np.pi * k / len(rows) * axis)) @ axes[0]
             if np.abs(A - there).max() > SPACING_TOL:
-                raise ConfigError(
-                    f"blades: {packed.names[rows[k, 0]]!r} does not stand {360 * k / len(rows):g} "
-                    f"degrees from {packed.names[rows[0, 0]]!r} about one axis.",
-                    hint="Name them one after the other around the axis, their axes turned alike; "
-                    "under gravity they hang down differently.",
-                )
+                angle, first = 360 * k / len(rows), packed.names[rows[0, 0]]
+                text = f"blades: {packed.names[rows[k, 0]]!r} does not stand {angle:g} degrees from"
+                hint = "Name them in turn around the axis, turned alike; gravity bends them apart."
+                raise ConfigError(f"{text} {first!r} about one axis.", hint=hint)
         return cls(rows, coordinates, q_at, v_at, axes[0], axis)
 
     def speed(self, state: State) -> float:
@@ -119,10 +117,7 @@ class Blades:
 def _bodies(blades: object, packed: Packed) -> Index:
     """(N, bodies of a blade) numbers of bodies, refused if they are no identical blades."""
     if isinstance(blades, str) or not isinstance(blades, Sequence) or len(blades) < MIN_BLADES:
-        raise ConfigError(
-            f"blades must be {MIN_BLADES} or more, each named by its bodies.",
-            hint="Two blades have periodic coefficients in all axes.",
-        )
+        raise ConfigError(f"blades must be {MIN_BLADES} or more, each named by its bodies.")
     number_of: dict[object, int] = {name: b for b, name in enumerate(packed.names)}
     named = [[getattr(x, "name", x) for x in _parts(blade)] for blade in blades]
     for name in (name for row in named for name in row):
@@ -138,8 +133,7 @@ def _bodies(blades: object, packed: Packed) -> Index:
     if not alike:
         raise ConfigError("blades must be alike: the same bodies in the same order for each.")
     every = np.array(rows)
-    if np.unique(every).size != every.size:
-        raise ConfigError("blades: each body must be listed once, in only one blade.")
+    check_once((packed.names[k] for k in every.flat), "blades: body")
     return every
 
 

@@ -137,10 +137,9 @@ def _turning(mechanism: Mechanism, now: Instant, spin: Mapping[str, float]) -> t
         for other in groups[:-1]:
             if both := groups[-1] & other:
                 held = [packed.names[b] if b >= 0 else GROUND for b in sorted(both)]
-                raise ConfigError(
-                    f"spin: what joint {joint.name!r} turns is held elsewhere, too: {held}.",
-                    hint="Name all joints about which it turns, from what rests to what turns.",
-                )
+                text = f"spin: what joint {joint.name!r} turns is held elsewhere, too: {held}."
+                hint = "Name all joints about which it turns, from what rests to what turns."
+                raise ConfigError(text, hint=hint)
     _take_along(groups, [set(map(int, x)) for x in packed.coupled()], fixed, packed.names)
     return tuple(
         Turning(
@@ -176,10 +175,9 @@ def _take_along(
         piece = _joined({min(left)}, inside)
         holding = [g for g in groups if any(link & piece and link & g for link in soft)]
         if len(holding) > 1:
+            text = f"spin: only forces hold body {names[min(piece)]!r}, to what turns and rests."
             raise ConfigError(
-                f"spin: only forces hold body {names[min(piece)]!r}, on what turns and on what "
-                "does not: it is not clear whether it turns.",
-                hint="Hold it by a joint, with a spring along what the joint leaves.",
+                text, hint="Hold it by a joint, with a spring along what that leaves."
             )
         (holding or groups)[0].update(piece)
         left -= piece

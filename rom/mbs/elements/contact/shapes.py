@@ -104,10 +104,8 @@ def sphere_on_cylinder(  # noqa: PLR0913  two surfaces and a law
         ConfigError: for a sphere that does not fit into the bore.
     """
     if inside and radius2 >= radius1:
-        raise ConfigError(
-            f"contact {name!r}: the sphere of {radius2:g} m must be smaller than the bore of "
-            f"{radius1:g} m; leave inside out for a sphere outside."
-        )
+        text = f"contact {name!r}: the sphere of {radius2:g} m must be smaller than the bore of"
+        raise ConfigError(f"{text} {radius1:g} m; leave inside out for a sphere outside.")
     kind, radii = points.BORE if inside else points.CYLINDER, (radius2, radius1)
     _enter(self, name, kind, (m1, m2), law, (axis, None), radii)
 
@@ -145,20 +143,16 @@ def capsule_on_capsule(  # noqa: PLR0913  two bodies and a law
     sizes = ((axis1, length1), (axis2, length2))
     for k, (axis, length) in enumerate(sizes, start=1):
         if length > 0.0 and axis is None:
-            raise ConfigError(
-                f"contact {name!r}: length{k} = {length:g} m without axis{k} is no bar.",
-                hint="Give a positive length and an axis, or neither for a sphere.",
-            )
+            text = f"contact {name!r}: length{k} = {length:g} m without axis{k} is no bar"
+            raise ConfigError(f"{text}; give a length and an axis, or neither for a sphere.")
     axes = [np.array([0.0, 0.0, 1.0]) if axis is None else axis for axis, _ in sizes]
     half = 0.5 * length2, 0.5 * length1
     self.check_markers(name, m1, m2)
     gap = self.design_point(m2) - self.design_point(m1)
     e, s = (unit_vector(f"axis of {name}", axis) for axis in axes)
     if not points.distance(gap, e, s, half[1], half[0]) > 0.0:
-        raise ConfigError(
-            f"contact {name!r}: the axes cross at the start; nothing tells the side on which the "
-            "bodies touch. Move one of them away."
-        )
+        text = f"contact {name!r}: the axes cross at the start; nothing tells the side on which the"
+        raise ConfigError(f"{text} bodies touch. Move one of them away.")
     _enter(self, name, points.CAPSULE, (m1, m2), law, axes, (radius2, radius1), half)
 
 
@@ -250,10 +244,8 @@ def _cover(
     self.check_new(name)
     part = self.part(str(getattr(part, "name", part)))
     if part.flexible is None:
-        raise ConfigError(
-            f"contact {name!r}: body {part.name!r} is rigid, it has no surface.",
-            hint="Add it by add_flexible, or give markers and a sphere_contact.",
-        )
+        text = f"contact {name!r}: body {part.name!r} is rigid, it has no surface"
+        raise ConfigError(f"{text}; add it by add_flexible, or take a sphere_contact.")
     law = checked_law(name, law, part, self.part(m1.body))
     e, areas = _carried(self, name, m1, axis), part.flexible.surface_areas(where)
     self.check_apart(name, m1, Marker(part.name, surface_place(0)))

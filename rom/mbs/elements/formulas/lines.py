@@ -149,10 +149,8 @@ def line_law(
     """
     start = float(np.linalg.norm(mechanism.design_point(m2) - mechanism.design_point(m1)))
     if start == 0.0:
-        raise ConfigError(
-            f"both markers of {name!r} are in one place at the start: the force has no direction.",
-            hint="Take points that are apart, or a bushing.",
-        )
+        text = f"both markers of {name!r} are in one place at the start: the force has no direction"
+        raise ConfigError(f"{text}; take points that are apart, or a bushing.")
     stores = "t" not in force.names
     second = np.zeros(0) if potential is None else potential.program
     at = HEAD_SIZE + force.program.size if potential is not None else 0

@@ -57,7 +57,7 @@ WRONG = {  # sizes of the pair, keys of the mesh, where the other wheel stands [
                        r"rack of helix 17\.19 degrees does not mesh.*opposite: -17\.19 degrees"),
     "steep rack": ({"teeth": [26, 0], "pressure_angle": 0.67}, {}, 0.052, "the rack are pointed"),
     "rack beside its pinion": ({"teeth": [26, 0]}, {}, (0.052, 0.03, 0),
-                               "marker of a rack is beside the axis of its pinion"),
+                               "marker of a rack"),
     "rack along the axis": ({"teeth": [26, 0]}, {"axis": [1, 0, 0]}, 0.052, "'m' stand 0 mm apart"),
 }  # fmt: skip
 
