@@ -335,5 +335,4 @@ def test_the_count_is_called_n_and_the_record_is_one(way):
     assert all(columns.shape[-1] == 2 for columns in each)
     more = function(*before, 3, **words).omega
     np.testing.assert_allclose(more[:2], omega, rtol=1e-6, atol=1e-6 * more[-1])
-    with pytest.raises(ConfigError, match="n = -1 must be a whole number"):
-        function(*before, -1, **words)
+    refuses(ConfigError, "n = -1 must be a whole number", function, *before, -1, **words)

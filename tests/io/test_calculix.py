@@ -27,7 +27,7 @@ from cases.files.damage import changed
 from cases.files.decks import BY_HAND
 from cases.long import few
 from cases.paths import ROOT, TESTS
-from cases.refusals import refused
+from cases.refusals import refused, refuses
 from cases.solid import block, reduced
 from rom.cli.main import main
 from rom.errors import ConfigError, FileFormatError, MeshError, TagError
@@ -121,8 +121,7 @@ def test_a_body_goes_to_abaqus_and_comes_back(tmp_path):
         found = read_matrix((path, name))
         assert_allclose(found.A.toarray(), np.tril(A), rtol=1e-13)
         assert_array_equal(found.dofs, np.where(form.dofs == 0, 1, form.dofs))
-    with pytest.raises(ConfigError, match="Name one"):
-        read_matrix(path)
+    refuses(ConfigError, "Name one", read_matrix, path)
     labels, points = read_nodes(path)
     assert_array_equal(labels, [1, 2, 1001, 1002, 1003])
     assert_allclose(points[:2], [form.points[1], form.points[2]], atol=1e-15)
@@ -184,8 +183,7 @@ def copied(tmp_path, ending, change):
     ],
 )
 def test_damaged_matrices_are_named(ending, change, message, tmp_path):
-    with pytest.raises(FileFormatError, match=message):
-        read_stored_matrix(copied(tmp_path, ending, change))
+    refuses(FileFormatError, message, read_stored_matrix, copied(tmp_path, ending, change))
 
 
 def test_missing_parts_and_supports_are_named(tmp_path):
@@ -377,8 +375,7 @@ def test_a_deck_is_read_back(kind, tmp_path):
     facets = mesh.facets | {"lower half": mesh.facets["root"][:1]}
     mesh = replace(mesh, points=points, regions=np.arange(len(mesh.cells)) // 6 + 1,
                    region_names={1: "left", 2: "right"}, facets=facets)  # fmt: skip
-    with pytest.raises(TagError, match="'lower half' is no name"):
-        input_deck(mesh)
+    refuses(TagError, "'lower half' is no name", input_deck, mesh)
     mesh.facets["lower_half"] = mesh.facets.pop("lower half")
     path = tmp_path / "box.inp"
     path.write_text(input_deck(mesh, degree=1 if kind == "tet4" else 2))

@@ -13,6 +13,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import rom
 from cases.command import ran
 from cases.mbs.mechanisms import random_body
+from cases.refusals import refuses
 from cases.solid import block, reduced
 from rom.errors import ConfigError, ResourceError
 from rom.io.fields.gltf import upright
@@ -160,8 +161,7 @@ def test_what_cannot_be_written_is_named(motion, tmp_path):
         (rom.write_animation, "m.glb", {"frames": 1}, "got 1 in"),
         (rom.write_animation, "m.glb", {"up": (0, 0, 0)}, "has length zero"),
     ):  # fmt: skip
-        with pytest.raises(ConfigError, match=message):
-            write(motion, tmp_path / name, **how)
+        refuses(ConfigError, message, write, motion, tmp_path / name, **how)
     assert not list(tmp_path.iterdir())
 
 
@@ -334,8 +334,7 @@ def test_an_h5py_that_does_not_load_is_told_with_the_cure(beside, match, monkeyp
     if beside:
         monkeypatch.setitem(sys.modules, "dolfinx", sys)
     monkeypatch.setattr(sys, "meta_path", [Broken(), *sys.meta_path])
-    with pytest.raises(ResourceError, match=rf"{match}.*\.csv needs nothing"):
-        h5py(".csv")
+    refuses(ResourceError, rf"{match}.*\.csv needs nothing", h5py, ".csv")
 
 
 @pytest.mark.fenicsx

@@ -8,6 +8,7 @@ from scipy.linalg import eigh
 import rom
 from cases.files.damage import changed
 from cases.paths import TESTS
+from cases.refusals import refuses
 from cases.solid import block, reduced
 from rom.cli.main import main
 from rom.errors import ConfigError, QualityGateError, UnsafeFileError
@@ -196,8 +197,7 @@ def test_one_interface_is_free(body, tmp_path, capsys):
         ("has 0 free interfaces", {"held": ("root", "tip")}),
         ("dmig holds no interfaces, openfast does", {"held": ["root"], "to": "dmig"}),
     ):
-        with pytest.raises(ConfigError, match=message):
-            rom.export(body, path, **{"to": "openfast"} | how)
+        refuses(ConfigError, message, rom.export, body, path, **{"to": "openfast"} | how)
     with pytest.raises(ConfigError, match="version 3 of OpenFAST is unknown"):
         write_openfast(body, path, held=["root"], version=3)
     file = rom.save(body, tmp_path / "b.rom.npz")

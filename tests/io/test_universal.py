@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import rom
 from cases.files.decks import IM, RE, X, dataset, header
 from cases.paths import TESTS
+from cases.refusals import refuses
 from cases.solid import block, reduced
 from rom.errors import ConfigError, FileFormatError
 from rom.io.fields.universal import assemble, read_universal
@@ -61,8 +62,7 @@ def test_bytes_that_are_missing_are_not_made_up(tmp_path):
     data, path = (HERE / "pyuff_binary.uff").read_bytes(), tmp_path / "x.uff"
     for bad in (data[:-30], data[:-7], data[:940] + data[944:]):
         path.write_bytes(bad)
-        with pytest.raises(FileFormatError, match=r"x\.uff: dataset \d is cut"):
-            read_universal(path)
+        refuses(FileFormatError, r"x\.uff: dataset \d is cut", read_universal, path)
 
 
 def test_other_datasets_and_line_ends_do_not_disturb(tmp_path):
@@ -89,8 +89,7 @@ def test_functions_are_assembled_by_sensor_and_exciter(tmp_path):
     f, H = assemble(functions, [(9, 2), (5, 2)], [(11, 3)])
     assert_array_equal(f, X)
     assert_allclose(H[:, :, 0], np.column_stack([9 * RE + 1j * IM, 5 * RE + 1j * IM]))
-    with pytest.raises(ConfigError, match=r"\(6, 2\)"):
-        assemble(functions, [(6, 2)], [(11, 3)])
+    refuses(ConfigError, r"\(6, 2\)", assemble, functions, [(6, 2)], [(11, 3)])
 
 
 def test_broken_files_are_named(tmp_path):
@@ -98,11 +97,9 @@ def test_broken_files_are_named(tmp_path):
     whole = dataset(6, 1, [RE, IM])
     for bad in (whole[: len(whole) // 2], whole.replace("E+00", "Q+00"), whole[:-40] + whole[-7:]):
         path.write_text(bad)
-        with pytest.raises(FileFormatError, match=r"x\.unv: dataset 1"):
-            read_universal(path)
+        refuses(FileFormatError, r"x\.unv: dataset 1", read_universal, path)
     path.write_text("no universal file")
-    with pytest.raises(FileFormatError, match="holds no function"):
-        read_universal(path)
+    refuses(FileFormatError, "holds no function", read_universal, path)
 
 
 @pytest.fixture(scope="module")

@@ -180,8 +180,7 @@ def test_a_free_body_has_its_frequencies_and_a_certificate(thin, body):
 
 
 def test_holding_an_interface_is_refused(body):
-    with pytest.raises(ModelError, match="free-free modes only; with 'root' held"):
-        body.frequencies(fixed=("root",))
+    refuses(ModelError, "free-free modes only; with 'root' held", body.frequencies, fixed=("root",))
 
 
 def test_the_body_file_remembers(body, tmp_path):
