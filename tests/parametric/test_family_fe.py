@@ -1,10 +1,12 @@
 """Bodies with parameters from finite elements: named regions, stress, any number of processes."""
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.sparse import csr_matrix
 
 import rom
 from cases.long import SHARED_BY
@@ -90,21 +92,14 @@ def test_petsc_and_scipy_say_the_same(model, family):
     """The same regions as plain matrices."""
     regions = {}
     for name in ("core", "faces"):
-        K, M = (_csr(A, model.n_dofs) for A in (model.regions[name].K, model.regions[name].M))
-        regions[name] = rom.Region(K, M)
+        parts = (getattr(model.regions[name], which).getValuesCSR() for which in "KM")
+        regions[name] = rom.Region(*(csr_matrix(A[::-1], (model.n_dofs,) * 2) for A in parts))
     plain = replace(model, operators=None, regions=regions, stresses=None)
     assert isinstance(mesh_operators(plain), SciPyOperators)
     assert np.abs(regions["core"].K @ rigid_motions(model.points)).max() < 1e-3
     other = family_of(plain, certify=False)
     found, expected = (f.at(**POINT).frequencies(16)[6:] for f in (other, family))
     assert_allclose(found, expected, rtol=1e-8)
-
-
-def _csr(A, n):
-    from scipy.sparse import csr_matrix
-
-    starts, columns, values = A.getValuesCSR()
-    return csr_matrix((values, columns, starts), shape=(n, n))
 
 
 def test_a_sweep_never_returns_to_the_finite_elements(family, monkeypatch):
@@ -131,22 +126,16 @@ def test_a_sweep_never_returns_to_the_finite_elements(family, monkeypatch):
     assert family.at(E_core=3.0).stress.von_mises(np.ones(family.body.n_modes)).min() > 0
 
 
-@pytest.fixture(scope="module")
-def families(tmp_path_factory):
-    """The same script on one process and on several."""
-    folder, words = tmp_path_factory.mktemp("families"), (RANKS / "family_under_mpi.py", "material")
-    return written_on_each((1, *SHARED_BY), folder, *words, load=rom.load)
-
-
 @pytest.mark.long
 @pytest.mark.mpi
 @pytest.mark.slow
-@pytest.mark.parametrize("n", SHARED_BY)
-def test_a_family_is_blind_to_the_number_of_processes(families, n):
-    one, many = families[1], families[n]
-    assert many.body.n_modes == one.body.n_modes
-    for point in ({}, POINT, {"E_core": 0.2, "rho_core": 2.0}):
-        a, b = one.at(**point), many.at(**point)
+def test_a_family_is_blind_to_the_number_of_processes(tmp_path):
+    words = (RANKS / "family_under_mpi.py", "material")
+    families = written_on_each((1, *SHARED_BY), tmp_path, *words, load=rom.load)
+    one, points = families[1], ({}, POINT, {"E_core": 0.2, "rho_core": 2.0})
+    for n, point in product(SHARED_BY, points):
+        assert families[n].body.n_modes == one.body.n_modes
+        a, b = one.at(**point), families[n].at(**point)
         assert_allclose(b.mass, a.mass, rtol=1e-12)
         assert_allclose(b.inertia, a.inertia, rtol=1e-9, atol=1e-12)
         for fixed in ((), ("root",)):

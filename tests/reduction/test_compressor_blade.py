@@ -37,9 +37,8 @@ CROWNS = {"plane": 0.0, "crowned": 0.03} if ROM_LONG else {"crowned": 0.03}
 @pytest.fixture(scope="module", params=CROWNS.values(), ids=CROWNS)
 def blade(request):
     """(model, its ten frequencies [Hz] on an elastic bed, radius of its flanks)."""
-    model = rom.fe.model(
-        GEOMETRY, material=TITANIUM, parameters=COARSE | {"crown": request.param}, order=2
-    )
+    sizes = COARSE | {"crown": request.param}
+    model = rom.fe.model(GEOMETRY, material=TITANIUM, parameters=sizes, order=2)
     K = model.K.tocsc()
     for name in FLANKS:
         S = kron(model.interfaces[name].surface_mass, identity(3), "coo")
@@ -59,15 +58,10 @@ def seated(body):
 
 
 @pytest.mark.long
-def test_the_blade_is_accepted_without_a_remark(blade):
-    model, _, _ = blade
-    assert model.interface_names == FLANKS
-    assert model.provenance["warnings"] == []
-    assert model.provenance["gmsh_warnings"] == []
-
-
-@pytest.mark.long
-def test_the_mesh_is_fit_for_use_and_always_the_same():
+def test_the_mesh_is_accepted_without_a_remark_fit_for_use_and_always_the_same(blade):
+    told = blade[0].provenance
+    assert blade[0].interface_names == FLANKS
+    assert told["warnings"] == told["gmsh_warnings"] == []
     mesh, again = (read_mesh(GEOMETRY) for _ in range(2))
     assert np.array_equal(mesh.points, again.points) and np.array_equal(mesh.cells, again.cells)
     assert scaled_jacobian(mesh).min() > 0.01
@@ -241,9 +235,7 @@ def test_polynomials_of_the_comparison_are_those_of_dense_matrices(compared, den
 @pytest.mark.long
 @pytest.mark.parametrize("n", [12, 24, 60])
 @pytest.mark.parametrize("level", ["system", "local", "alone"])
-def test_characteristic_modes_of_the_comparison_are_those_of_dense_matrices(
-    compared, dense, level, n
-):
+def test_characteristic_modes_compared_are_those_of_dense_matrices(compared, dense, level, n):
     """Condensed to the flanks by hand; the rigid motions beside them, as in the demo."""
     K, K_bed, M, Psi, _, b, _ = dense
     K_b, M_b = (Psi.T @ A @ Psi for A in (K if level == "alone" else K_bed, M))
@@ -268,9 +260,8 @@ def test_the_comparison_puts_the_kinds_of_flanks_in_their_order(compared):
         few, many = table[kind.format(1)], table[kind.format(4)]
         assert table["all dofs"] < many < few < table["rbe2"]
     for n in (24, 60):
-        system, local, alone = (
-            table[f"characteristic, {level} {n}"] for level in ("system", "local", "alone")
-        )
+        by_level = {level: f"characteristic, {level} {n}" for level in ("system", "local", "alone")}
+        system, local, alone = (table[name] for name in by_level.values())
         assert system < table[f"snapshots {n}"] < local < alone
     lost = {label: row["lost"] for label, row in compared["table"].items()}
     assert lost["polynomial:4"] < lost["polynomial:2"] < lost["polynomial:1"] < lost["rbe2"]

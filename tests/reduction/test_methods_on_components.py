@@ -59,7 +59,6 @@ def component(name):
 
 
 def given(name, implementation):
-    """The matrices with PETSc's operators, or alone as a user of SciPy would bring them."""
     model = component(name)
     return model if implementation == "petsc" else replace(model, operators=None)
 
