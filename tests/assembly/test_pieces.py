@@ -18,15 +18,12 @@ from rom.assembly.pieces import Tree, together
 from rom.checks.glued import GluedSolid
 from rom.errors import ConfigError, InterfaceError, ModelError
 
-pytest.importorskip("dolfinx", reason="dolfinx is not installed")
-pytest.importorskip("gmsh", reason="gmsh is not installed")
 pytestmark = COARSE
 E, THICK = 210e9, 0.01
 EI = E * THICK**4 / 12
 
 
 def beam(n, cells, *, nu=0.0, thick=THICK):
-    """Models of the pieces of a beam 1 m long along x."""
     size = {"L": 1.0, "b": thick, "h": thick, "hex": 1, "nx": cells, "ny": 1, "nz": 1}
     material = rom.Material(E=E, nu=nu, rho=7850.0)
     if n == 1:
@@ -35,7 +32,6 @@ def beam(n, cells, *, nu=0.0, thick=THICK):
 
 
 def made(models, load=None, *, n_modes=2, active=2, **options):
-    """Pieces for a load on the tip, not certified."""
     large = load and rom.Geometric(loads={"tip": load}, n_modes=active, **options)
     how = {"reference": "root", "nonlinear": large, "certify": False}
     return rom.reduce_pieces(models, method=rom.CraigBampton(n_modes=n_modes), **how)
@@ -146,7 +142,6 @@ def test_pieces_that_repeat_each_other_are_reduced_once_for_the_largest_of_their
 
 @pytest.fixture(scope="module")
 def halves():
-    """Models of two pieces, their range, and how they are reduced."""
     how = {"reference": "root", "method": rom.CraigBampton(n_modes=4), "certify": False}
     loads = rom.Geometric(loads={"tip": (0, 0, 2 * EI, 0, 0, 0)}, n_modes=2)
     return beam(2, 8, nu=0.3), loads, how

@@ -74,7 +74,6 @@ def rotating(body, eta, axis=(0, 0, 1)):
 
 @pytest.fixture(scope="module")
 def blade():
-    """Clamped at its root, the frame of the whole body away from it."""
     return stiffened(solid(), {"root": "rbe2"}, reference="mean-axis", n_modes=20)
 
 

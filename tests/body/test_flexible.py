@@ -35,7 +35,6 @@ SUPPORTS = [(), ("root",), ("tip",), ("root", "tip"), ("root:xyz rx", "tip:yz")]
 
 
 def random_body(rng):
-    """A block of random size, away from the origin."""
     size = rng.uniform(0.05, 0.5, 3)
     model = block(size=size, cells=rng.integers(1, 4, 3), origin=rng.uniform(-1, 1, 3))
     n = int(rng.integers(0, 7))

@@ -16,7 +16,6 @@ import rom
 from cases.mbs.slender import cantilever
 from cases.solid import reduced
 
-pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = [
     pytest.mark.fenicsx,
     pytest.mark.skipif(shutil.which("ccx") is None,

@@ -17,7 +17,6 @@ from cases.refusals import refuses
 from rom.body.nonlinear.statics import follow
 from rom.errors import ConfigError, InterfaceError, ModelError, RomError, RomWarning
 
-pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = COARSE
 
 
@@ -86,7 +85,6 @@ def test_a_column_buckles_at_eulers_load():
 
 @pytest.mark.parametrize("nu, rtol", few(1, [(0.3, 3e-3), (0.0, 5e-3)]))
 def test_a_cantilever_bends_in_space_as_finite_elements_do(nu, rtol):
-    """Force along all axes and a twist at once, to a slope of half a radian."""
     model, EI = slender(50, 12, nu)
     loads = np.array([0.2, 1.0, 0.6, 0.3, 0, 0]) * EI
     body = reduced(model, loads, n_modes=10, active=2)
@@ -203,7 +201,6 @@ def test_a_guided_leaf_hardens_and_comes_back_as_its_elastica_says():
 
 @pytest.fixture(scope="module")
 def beam():
-    """A cantilever, its load, and where its finite elements are under it."""
     model, EI = slender(20, 6)
     load = np.array([0, EI, 0, 0, 0, 0])
     return model, load, Full(model).under(load)[6:9]
@@ -249,7 +246,6 @@ def test_frames_that_are_no_interface_are_refused(beam):
 @pytest.mark.parametrize("size", [30.0, pytest.param(1e3, marks=pytest.mark.long), 1e5])
 @pytest.mark.parametrize("component", range(6))
 def test_a_load_beyond_what_one_body_carries_is_refused_or_fails_its_certificate(component, size):
-    """Whatever it is, the load is named, and what helps; nothing is borne that is not certified."""
     model, EI = slender(20, 4)
     load = np.zeros(6)
     load[component] = size * EI

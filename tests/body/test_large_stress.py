@@ -24,7 +24,6 @@ from rom.components.updating.observers.operation import stress_rows
 from rom.errors import ConfigError, FileFormatError, ModelError, ResourceError
 from rom.updating import Channels
 
-pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = COARSE
 
 
@@ -132,7 +131,6 @@ def test_stress_under_a_load_is_that_of_the_full_solution(bent):
 
 
 def test_the_certificate_has_a_row_of_stress(monkeypatch):
-    """Over the whole surface, ends included; a body that locks has less of it."""
     model, EI = slender(50, 8)
     rows = {}
     for name in ("all", "locked"):
@@ -211,7 +209,6 @@ def test_rotation_has_no_stress_and_turns_the_one_there_is(homogeneous):
 
 
 def layered(materials):
-    """A box of four cells along x, two of each material."""
     from dolfinx import mesh as dm
 
     from rom.fe.elasticity import assemble
@@ -302,13 +299,11 @@ def all_points(model, E):
 
 @pytest.fixture(scope="module")
 def strip():
-    """A strip of rubber, one metre long, that bends to 26 degrees."""
     model = assembled((1.0, THICK, THICK), (12, 1, 2), material=RUBBER)
     return reduced(model, LOADS, n_modes=2, active=1, n_steps=2, sampling=1e-3, certify=True)
 
 
 def test_energy_force_and_tangent_are_those_of_the_finite_elements():
-    """Against the derivatives that UFL takes, and those of the matrices of the full solid."""
     import ufl
     from dolfinx import fem
 

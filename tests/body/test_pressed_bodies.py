@@ -11,7 +11,6 @@ from cases.mbs.slender import E_STEEL, assembled, cantilever
 from cases.solid import reduced
 from rom.errors import RomWarning
 
-pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = pytest.mark.fenicsx
 
 L, B, H = 1.0, 0.05, 0.01

@@ -10,9 +10,7 @@ from cases.solid import block, reduced
 from rom.process.stopwatch import FACTORISATION_PIECE as FACTORS
 from rom.process.stopwatch import FLOPS_NOTE, MISS_NOTE, REST_PIECE, piece, stopwatch
 from rom.report.pages import _stages
-from rom.workflow import Draft, stages
 
-ENDS = {"root": "rbe2", "tip": "rbe2"}
 STAGES = ["interfaces", "shapes", "energies", "body", "comparison"]
 
 
@@ -52,29 +50,6 @@ def test_time_after_an_error_belongs_to_what_was_under_way():
     with piece("nobody looks"):
         pass
     assert set(watch.table()) == {"one"}
-
-
-@pytest.mark.parametrize("asked, added", [
-    ({}, ""),
-    ({"method": rom.AssumedModes(3)}, "obey_reference"),
-    ({"method": rom.Characteristic(rom.CraigBampton(4), 8)}, "few_functions"),
-    ({"stress": True, "damping": rom.Rayleigh(beta=1e-5)}, "recover damp"),
-    ({"interfaces": {"root": rom.Polynomial(), "tip": "rbe2"}}, "choose_orders"),
-])  # fmt: skip
-def test_method_and_options_add_stages(asked, added):
-    road = stages(Draft(**({"model": block(), "interfaces": ENDS} | asked)))
-    names = [stage.__name__ for stage in road]
-    plain = ["connect", "basis", "project", "make_body", "place_frame", "certify"]
-    assert [name for name in names if name not in added.split()] == plain
-    assert set(names) == {*plain, *added.split()} and all(stage.__doc__ for stage in road)
-
-
-def test_large_deflection_has_stages_of_its_own():
-    far = rom.Geometric(loads={"tip": (0, 1.0, 0, 0, 0, 0)})
-    draft = Draft(model=block(), interfaces=ENDS, certify=False, nonlinear=far)
-    road = {stage.__name__: stage.__module__ for stage in stages(draft)}
-    assert list(road) == ["connect", "basis", "enrich", "project", "make_body", "place_frame"]
-    assert road["place_frame"] == road["enrich"] == "rom.stages.deflection"
 
 
 def test_a_body_its_file_and_its_report_say_where_its_time_went(tmp_path):

@@ -18,7 +18,6 @@ from rom.components.wheels.sector import region
 from rom.eigen.scipy import SciPyOperators
 from rom.errors import ConfigError, ModelError
 
-pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = COARSE
 N, ORDER, SPEED = 5, 2, 1500.0
 SIZES = {"cells": (7, 2, 4, 1), "blade": (3, 4), "width": 0.01, "tip": 0.18}
@@ -52,13 +51,11 @@ def disk(small):
 
 @pytest.fixture(scope="module")
 def short():
-    """A sector whose blade is shorter, with the nodes of the others below it."""
     return bladed_model(N, **SIZES | {"tip": 0.17})
 
 
 @pytest.fixture(scope="module")
 def blades(small, short):
-    """One has lost a fifth of its stiffness, one is denser, one is short."""
     soft, dense = small.blade.varied(stiffness=-0.2), small.blade.varied(density=0.15)
     return [small.blade, soft, dense, small.blade, rom.reduced_blade(small, short, n_modes=25)]
 

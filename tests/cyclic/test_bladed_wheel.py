@@ -16,7 +16,6 @@ from rom.eigen.scipy import SciPyOperators
 from rom.eigen.verbs import dofs_of
 from rom.errors import ConfigError, InterfaceError, ModelError
 
-pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = MARKS
 N, ORDER, ZETA = 6, 2, 2e-3
 SIZES = {"cells": (6, 2, 3, 2), "blade": (2, 4)}
@@ -46,7 +45,6 @@ def disk(small):
 
 @pytest.fixture(scope="module")
 def short():
-    """A sector whose blade is shorter, with the nodes of the others below it."""
     return bladed_model(N, tip=0.15, **SIZES)
 
 
@@ -60,12 +58,10 @@ def whole_wheel(full, changes, n_modes):
 
 
 def peaks(u):
-    """(N,) largest amplitude of each blade."""
     return np.linalg.norm(u, axis=-1).max(axis=0)
 
 
 def test_disk_and_blade_make_the_tuned_sector(full, small):
-    """Ten families at all nodal diameters within 0.1 %, never below."""
     assert small.free.size < 0.2 * full.free.size
     assert small.root_functions.shape[1] < small.root_points.shape[0]
     for n in full.diameters:
@@ -99,7 +95,6 @@ def test_the_certificates_of_sector_and_wheel(small, disk):
 
 @pytest.mark.long
 def test_every_blade_may_be_another_one(model, full, small, disk, short):
-    """A fifth of the stiffness lost, a denser one, a shorter one: frequencies, response, factor."""
     (K, M), (K_short, M_short) = region(model, "blade"), region(short, "blade")
     changes = {1: (-0.2 * K, 0 * M), 3: (0.05 * K, 0.1 * M), 4: (K_short - K, M_short - M)}
     omega, Phi = whole_wheel(full, changes, 48)
@@ -167,7 +162,6 @@ def test_a_blade_that_lost_most_of_its_stiffness(full, small, disk):
 
 
 def test_a_blade_of_another_mesh_fits_on_the_root(model, small, disk):
-    """Other nodes on the root, and a model of the blade alone, are the same blade."""
     finer = bladed_model(N, cells=(6, 2, 3, 3), blade=(2, 4))
     other = rom.reduced_blade(small, finer, n_modes=25)
     assert_allclose(other.omega[:8], small.blade.omega[:8], rtol=5e-3)
@@ -212,7 +206,3 @@ def test_wrong_arguments_are_named(model, full, small, disk):
     refuses(ConfigError, "does not move the tuned", disk.amplification, alike, force, **there)
     soft = replace(small.blade, K=-small.blade.K)
     refuses(ModelError, "without stiffness", disk.modes, [soft] * N)
-
-
-def test_dofs_of_nodes_count_three_per_node_in_the_order_of_the_axes():
-    assert dofs_of(np.array([2, 0])).tolist() == [6, 7, 8, 0, 1, 2]

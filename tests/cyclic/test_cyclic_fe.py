@@ -11,7 +11,6 @@ from cases.refusals import refuses
 from cases.wheels import MARKS, bladed_model, gathered, ring_frequency
 from rom.errors import InterfaceError
 
-pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = MARKS
 N = 6
 SIZES = {"degree": 1, "cells": (4, 2, 2, 2)}
@@ -48,7 +47,6 @@ def test_faces_may_be_curved(wheel):
 
 
 def test_sectors_whose_faces_have_different_nodes():
-    """Tied by interpolation: 1e-3 from the wheel whose nodes meet."""
     sizes = {"cells": (3, 2, 2, 2), "blade": (1, 2), "degree": 2}
     models = (bladed_model(N, offset=offset, **sizes) for offset in (0.0, 0.12))
     plain, shifted = (rom.CyclicSector.from_model(model, fixed=("bore",)) for model in models)
@@ -71,7 +69,6 @@ def test_a_thin_solid_ring(n):
 
 
 def test_the_cyclic_model_carries_masses(model):
-    """A point mass on the bore of each sector joins the wheel."""
     carried = replace(model, attachments=(rom.Attachment("bore", 0.1),))
     sector = rom.CyclicSector.from_model(carried)
     R = sector.rigid(0)[:, 0].real
@@ -102,7 +99,6 @@ def test_the_geometry_is_a_sector_with_a_blade():
 @pytest.mark.long
 @pytest.mark.parametrize("fixed", [pytest.param((), marks=pytest.mark.long), ("bore",)])
 def test_a_reduced_sector_of_few_dofs_has_ten_families(fixed):
-    """Polynomials on the cyclic face, under 5 % of the dofs: 0.1 % for all nodal diameters."""
     model = bladed_disk(N=12, lc=0.013, lc_blade=0.011)
     sector = rom.CyclicSector.from_model(model, fixed=fixed)
     small = rom.reduce_sector(sector, n_modes=60, functions=rom.Polynomial(7))

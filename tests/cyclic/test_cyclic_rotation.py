@@ -181,7 +181,6 @@ def test_waves_that_cross_keep_their_columns(n):
 
 
 def test_directions_start_together_and_part():
-    """Of a ring, as `travelling_modes` has them at each speed; supported at one node a sector."""
     ring = replace(beam_ring(6, 4, EA=1e3, rotary=0.1), held=np.array([0, 1]))
     found = rom.wheel_campbell(ring, 2, 4, speeds=[0.0, 0.05, 0.1])
     assert_allclose(found.forward[0], found.backward[0])

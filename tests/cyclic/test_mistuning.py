@@ -22,7 +22,6 @@ def spread(rng, shape, width=0.05):
 
 
 def whole_wheel(ring, delta):
-    """Frequencies and modes of the wheel assembled with its own blades."""
     K_j = [ring.K + d * ring.regions["blade"] for d in delta]
     _, M, K = ring.wheel(K_j)
     lam, Phi = eigh(K.toarray(), M.toarray())
@@ -95,7 +94,6 @@ def test_wrong_arguments_are_named():
 @pytest.mark.filterwarnings("ignore::rom.errors.RomWarning")
 @pytest.mark.filterwarnings("ignore:Number of integration points")
 def test_a_mistuned_wheel_of_finite_elements():
-    """Frequencies and peaks of the whole wheel within 1 %, from full and from reduced sectors."""
     N = 6
     model = bladed_model(N, degree=1, cells=(4, 2, 3, 2))
     sector = rom.CyclicSector.from_model(model, fixed=("bore",), regions=("blade",))

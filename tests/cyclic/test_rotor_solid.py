@@ -14,7 +14,6 @@ from cases.wheels import MARKS, model_of, revolved_mesh
 from rom.components.transmission import Disc
 from rom.errors import ConfigError, InterfaceError
 
-pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = MARKS
 STEEL = rom.Material(E=211e9, nu=211e9 / (2 * 81.2e9) - 1, rho=7810.0)
 

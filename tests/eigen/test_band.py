@@ -27,7 +27,6 @@ ROUND_OFF = 1e-10  # of frequencies of dense solutions, 1e-16 times the ratio of
 
 
 def body(size, cells, held=False):
-    """Stiffness, mass and rigid motions of a bar, held at its root or free."""
     model = bar(size, cells)
     if not held:
         return model.K, model.M, rigid_motions(model.points)
@@ -37,7 +36,6 @@ def body(size, cells, held=False):
 
 
 def exact(K, M, rigid):
-    """All circular frequencies by LAPACK, those of rigid motions zero."""
     lam = eigh(K.toarray(), M.toarray(), eigvals_only=True)
     lam[: 0 if rigid is None else 6] = 0.0
     return np.sqrt(lam)

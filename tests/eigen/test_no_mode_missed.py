@@ -65,7 +65,6 @@ def _largest_part(cells):
 
 
 def random_body(rng):
-    """A box of any proportions, tetrahedra or hexahedra, with holes where cells are missing."""
     size = rng.uniform(0.02, 1.0, 3)
     cells = tuple(int(c) for c in rng.integers([7, 4, 3], [12, 6, 5]))
     step = np.array(size) / cells
@@ -80,7 +79,6 @@ def random_body(rng):
 
 
 def dense(ops, held):
-    """All eigenvalues of the free dofs."""
     free, E = np.setdiff1d(np.arange(ops.n), held), np.eye(ops.n)
     K, M = (A[np.ix_(free, free)] for A in (ops.apply_K(E), ops.apply_M(E)))
     return eigh(K, M, eigvals_only=True)

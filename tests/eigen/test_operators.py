@@ -100,7 +100,6 @@ def forgetful(function, searches):
 
 
 def test_a_mode_that_was_skipped_is_sought_again(make, model, exact, monkeypatch):
-    """The solver is made to overlook one mode; the inertia count must tell."""
     ops, root, searches = make(model), model.interfaces["root"].dofs, []
     for name in ("by_blocks",) if isinstance(ops, SciPyOperators) else ("by_blocks", "lowest"):
         whole = forgetful(getattr(type(ops), name), searches)
@@ -182,7 +181,6 @@ def test_all_dofs_held_leaves_nothing_to_solve(make, model):
 
 
 def side_by_side(model):
-    """The body twice, the second five metres along y."""
     K, M = (block_diag([A, A], "csr") for A in (model.K, model.M))
     return rom.FEModel(K, M, np.vstack([model.points, model.points + np.array([0.0, 5.0, 0.0])]))
 

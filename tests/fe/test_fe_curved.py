@@ -292,7 +292,6 @@ def test_a_bore_is_an_interface_of_its_true_area(tmp_path):
 
 @pytest.mark.parametrize("kind", few(1, ["rbe2", "rbe3", "polynomial:2", "full"]))
 def test_bodies_are_reduced_to_curved_interfaces(tmp_path, kind):
-    """Compared with the full curved model: statics, mass and rigid motions exactly."""
     made = model(written(tmp_path, PLATE), material=STEEL, parameters=round_bore(10))
     body = rom.reduce(made, method=rom.CraigBampton(40), interfaces={"bore": kind, "end": "rbe3"},
                       reference="bore" if kind != "full" else "mean-axis", stress=True,

@@ -49,7 +49,6 @@ def bar(size, solver="auto"):
 
 
 def growth(work):
-    """What a piece of work takes at most beyond what was there [bytes]."""
     gc.collect()
     memory.collect(MPI.COMM_WORLD)
     Path("/proc/self/clear_refs").write_text("5")  # the largest so far is forgotten
@@ -90,7 +89,6 @@ def block():
 
 @pytest.fixture(scope="module")
 def needs(block):
-    """What each way to solve is predicted to take [bytes]."""
     K = operators(block).K
     found, beside = foreseen.analysed(K), foreseen.beside_factor(K, 0, foreseen.N_MATRICES)
     return {"direct": beside + found.in_core, "out-of-core": beside + found.out_of_core,

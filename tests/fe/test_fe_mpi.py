@@ -14,7 +14,6 @@ from rom.errors import MaterialError, RomError
 from rom.process.launcher import YIELD_VARIABLE
 from rom.process.mpirun import OPEN_MPI, found, version
 
-pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = [pytest.mark.fenicsx, pytest.mark.mpi]
 
 UNDER_MPI = RANKS / "under_mpi.py"

@@ -68,7 +68,7 @@ def stored(**other):
     return rom.read_model(HERE / "calculix.sti", HERE / "calculix.mas", **given)
 
 
-def test_stored_matrices_are_those_of_the_elements():
+def test_stored_matrices_are_those_of_the_elements_and_so_are_frequencies():
     """The node 5 of the deck belongs to no element and is left out."""
     model = stored()
     for found, expected in zip((model.K, model.M), six_tetrahedra(), strict=True):
@@ -79,14 +79,11 @@ def test_stored_matrices_are_those_of_the_elements():
     assert_allclose(root.origin, [0.0, 0.1, 0.05])
     unknown = r"'loose' needs nodes of the model; unknown are \[5\]"
     refuses(rom.RomError, unknown, stored, interfaces={"loose": [5]})
-
-
-def test_a_model_from_calculix_has_the_frequencies_of_its_matrices():
-    """One point per element leaves the mass singular: the highest frequencies are infinite."""
+    # one point per element leaves the mass singular: the highest frequencies are infinite
     K, M = six_tetrahedra()
     free = np.isin(np.repeat(np.sort(LABELS), 3), LABELS[4:])
     mu = eigh(M[np.ix_(free, free)], K[np.ix_(free, free)], eigvals_only=True)[:-5:-1]
-    found = rom.modes(stored(), 4, fixed=("root",)).frequencies
+    found = rom.modes(model, 4, fixed=("root",)).frequencies
     assert_allclose(found, 1 / np.sqrt(mu) / (2 * np.pi), rtol=1e-9)
 
 
@@ -157,7 +154,6 @@ test_a_damaged_user_element_is_named = changed(
 
 
 def copied(tmp_path, ending, change):
-    """The stored files, one of them changed."""
     for part in (".sti", ".dof"):
         shutil.copy(HERE / f"calculix{part}", tmp_path)
     path = tmp_path / f"calculix{ending}"
@@ -357,7 +353,6 @@ def test_the_command_line_goes_to_calculix_and_back(tmp_path, capsys, same_quadr
 
 @pytest.mark.parametrize("kind", ["tet4", "tet10"])
 def test_a_deck_is_read_back(kind, tmp_path):
-    """Curved edges, two regions, a facet that belongs to two interfaces."""
     mesh = solid(kind, (2, 1, 1))
     points = mesh.points + 0.02 * np.sin(3 * mesh.points[:, [1, 2, 0]])
     facets = mesh.facets | {"lower half": mesh.facets["root"][:1]}
@@ -389,7 +384,6 @@ def test_mid_edge_nodes_are_added_and_numbers_fit():
 
 
 def deck_of(kind="tet4", more=(), **options):
-    """A call that writes the deck of a box, some of its surfaces under another name, too."""
     mesh = solid(kind)
     other = {name: mesh.facets[old] for name, old in more}
     return lambda: input_deck(replace(mesh, facets=mesh.facets | other), **options)

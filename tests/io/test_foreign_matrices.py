@@ -38,7 +38,6 @@ def brick():
 
 
 def by_label(A):
-    """(24, 24) with the nodes in ascending order of their labels."""
     order = (3 * np.argsort(LABELS)[:, None] + np.arange(3)).ravel()
     return A.toarray()[np.ix_(order, order)]
 
@@ -118,7 +117,6 @@ def test_market_and_abaqus_text_with_nodes_of_an_input_deck(brick, whole, tmp_pa
 
 
 def has_the_sides_of(brick, model):
-    """Its nodes in the order of their labels, and those of each interface."""
     assert_allclose(model.points, brick.points[np.argsort(LABELS)])
     for name, labels in SIDES.items():
         found = np.sort(LABELS)[model.interfaces[name].nodes]
@@ -153,7 +151,6 @@ def test_sets_of_nodes_in_the_deck_are_interfaces(brick, tmp_path):
 
 
 def test_decks_in_several_files(brick, tmp_path):
-    """Nodes as data of *NODE in a file of their own, sets included, both beside the deck."""
     nodes, sets = DECK.partition("*NSET")[::2]
     rows = [line for line in nodes.splitlines() if line[0] != "*"]
     (tmp_path / "parts").mkdir()

@@ -48,7 +48,6 @@ with open_file("corner.vtkhdf") as file, open_file("cube.h5") as cube:
 
 @pytest.fixture(scope="module")
 def motion():
-    """A soft flexible pendulum with a rigid bob hinged to its tip."""
     model = block(cells=(4, 1, 1), material=rom.Material(E=2e6, nu=0.3, rho=1100.0))
     body = reduced(2, model, reference="root")
     mech = rom.Mechanism(gravity=(0.0, 0.0, -9.81))
@@ -185,7 +184,6 @@ def chunks(path):
 
 
 def numbers(film, data, accessor):
-    """(n, k) what a .glb has for an accessor."""
     a = film["accessors"][accessor]
     start, width = film["bufferViews"][a["bufferView"]]["byteOffset"], WIDTHS[a["type"]]
     return np.frombuffer(data, "<f4", a["count"] * width, start).reshape(a["count"], width)

@@ -64,7 +64,6 @@ def rewritten(file, path, change):
 
 
 def of_version(numbers):
-    """A change of the version in the manifest."""
     return lambda name, data: data.replace(b'"version": [1, 7]', b'"version": [%s]' % numbers)
 
 
@@ -178,7 +177,6 @@ def test_words_of_a_file_that_are_nonsense_are_refused(good, field, tmp_path, mo
 
 @pytest.mark.parametrize("part", ["quantity", "value", "limit", "ok"])
 def test_a_row_of_a_certificate_is_judged_by_its_value(good, part, tmp_path, monkeypatch):
-    """Also where it says that it holds."""
     monkeypatch.setattr("os.fsync", lambda handle: None)
     manifest, arrays = good
     report = manifest["certificate"]

@@ -72,7 +72,6 @@ def test_the_interface_has_the_condensed_stiffness_and_the_exact_sag(model, path
 
 
 def floating(model, m, folder):
-    """A body with m modes and its tip alone, and what is read of it."""
     body = rom.reduce(model, method=rom.CraigBampton(m), interfaces={"tip": "rbe2"}, certify=False)
     return body, read_openfast(rom.export(body, folder / "float.dat", to="openfast"))
 

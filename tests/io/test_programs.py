@@ -56,7 +56,6 @@ def equations(found, q, qd, qdd, a, omega, domega):
 
 
 def test_the_joint_moves_like_particles_to_second_order(tmp_path):
-    """All three rows, for deformations of any size."""
     nodes = random_nodes(np.random.default_rng(5), n=7, r=4)
     x, _, phi, _, _ = nodes
     body = nodal_body(*nodes, {"a": (x[0], phi[:, 0].T, np.zeros((3, 4)))})
@@ -107,7 +106,6 @@ KINDS = {"root": "rbe2", "tip": "rbe2", "side": "rbe2"}
 
 @pytest.fixture(scope="module")
 def model():
-    """A block with a third interface off its axis."""
     model = block(size=(1.0, 0.3, 0.2), cells=(4, 2, 1))
     x, y, _ = model.points.T
     return with_interface(model, "side", (y > 0.29) & (np.abs(x - 0.5) < 0.26))
@@ -159,13 +157,11 @@ def test_the_starter_finds_stiffness_and_mass_at_its_nodes(body, tmp_path):
         assert_allclose(B, A, atol=1e-9 * np.abs(A).max())
     rigid = np.tile(np.eye(6, 3), (3, 1))
     assert_allclose(rigid.T @ B @ rigid, body.mass * np.eye(3), atol=1e-8 * body.mass)
-
-
-def test_labels_count_from_one_and_matrices_come_back(body, tmp_path):
+    # labels count from one, and matrices come back
     path = rom.export(body, tmp_path / "b.pch")
     found = read_matrix((path, "KAAX"))
     assert_array_equal(found.dofs[::6, 0], [1, 2, 3])
-    assert_allclose(found.A.toarray(), np.tril(interface_form(body).K), rtol=1e-9)
+    assert_allclose(found.A.toarray(), np.tril(form.K), rtol=1e-9)
     assert "BAAX" not in path.read_text() and "GRID" not in path.read_text()
 
 
@@ -239,13 +235,8 @@ def test_arrays_are_the_integrals_over_the_nodes(tmp_path):
     for name, A in expected.items():
         assert_allclose(module["ARRAYS"][name], A, atol=1e-12, err_msg=name)
     assert set(module["ARRAYS"]) == set(arrays(body))
-
-
-def test_six_nodes_move_and_turn_like_their_interface():
-    x, Ms, phi, K, D = random_nodes(np.random.default_rng(8), n=5, r=3)
-    turn = np.random.default_rng(2).normal(size=(3, 3))
-    body = nodal_body(x, Ms, phi, K, D, {"a": (x[0], phi[:, 0].T, turn)})
-    found = arrays(body)
+    # six nodes move and turn like their interface
+    found, turn = arrays(body), markers['it"s'][2]
     X, q = found["referencePositions"].reshape(-1, 3), np.array([0.3, -0.2, 0.5])
     u = (found["modeBasis"] @ q).reshape(-1, 3)
     assert_allclose(X.mean(axis=0), x[0], atol=1e-14)

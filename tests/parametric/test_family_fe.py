@@ -19,7 +19,6 @@ from rom.eigen.scipy import SciPyOperators
 from rom.eigen.verbs import rigid_motions
 from rom.reduction.full_model import mesh_operators
 
-pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = pytest.mark.fenicsx
 WOOD = rom.Orthotropic((11e9, 0.9e9, 0.5e9), (0.4, 0.4, 0.5), (0.7e9, 0.7e9, 0.05e9), 450.0)
 CARBON = rom.Orthotropic((120e9, 9e9, 9e9), (0.3, 0.3, 0.4), (5e9, 5e9, 3e9), 1500.0)
@@ -89,7 +88,6 @@ def test_stress_of_the_body_is_that_of_its_material(family):
 
 
 def test_petsc_and_scipy_say_the_same(model, family):
-    """The same regions as plain matrices."""
     regions = {}
     for name in ("core", "faces"):
         parts = (getattr(model.regions[name], which).getValuesCSR() for which in "KM")

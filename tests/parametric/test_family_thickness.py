@@ -106,7 +106,6 @@ def test_with_all_modes_every_integral_is_that_of_the_stretched_block(reference)
 
 
 def invariants(body):
-    """Without dimension."""
     S, X = body.S / np.sqrt(body.mass), body.Ibar_kl / np.sqrt(body.mass * body.size**2)
     yield np.einsum("ak,bk->ab", S, S)
     yield np.einsum("abk,cdk->abcd", X, X)

@@ -12,13 +12,11 @@ import rom
 from cases.refusals import refuses
 from cases.wheels import bladed_model
 from rom.components import cosserat
-from rom.components.wheels.prestress.spin_up import lagrange
 from rom.components.wheels.prestress.steady_rotation import SteadyRotation
 from rom.components.wheels.prestress.thermal import finite_solid
 from rom.components.wheels.rotation import centrifugal_displacement
 from rom.errors import ConfigError, InterfaceError, ModelError, RomWarning
 
-pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = [
     pytest.mark.fenicsx,
     pytest.mark.filterwarnings("ignore:.*(soundly|sound would travel)"),
@@ -53,7 +51,6 @@ def run_up(bent, blade):
 
 
 def rod():
-    """The same blade as a geometrically exact rod."""
     radius, A, G = ARC / np.radians(BEND), B * H, E / 2
 
     def place(s):
@@ -157,7 +154,6 @@ def test_the_stress_of_the_linear_solid_is_wrong_by_a_quarter_and_few_states_are
 
 
 def test_a_reduced_blade_follows_the_speed(run_up):
-    """Between tabulated speeds, against the full solid in its own state there."""
     small = run_up.reduced(8)
     assert small.error < 3e-4
     assert small.certificate.ok and small.certificate.rows[-1].value == small.error
@@ -181,7 +177,6 @@ def wheel():
 
 
 def test_one_sector_is_the_whole_wheel(wheel):
-    """The whole wheel meshed and spun up as one solid held at its bore."""
     part, whole = wheel
     sector = rom.CyclicSector.from_model(part, fixed=("bore",))
     solid = rom.held_solid(whole, fixed=("bore",))
@@ -255,9 +250,3 @@ def test_wrong_arguments_are_named(bent, blade, run_up):
     refuses(InterfaceError, "no interface 'rim'", rom.held_solid, bent, fixed="rim")
     bare = replace(bent, stresses=None)
     refuses(ConfigError, "no finite elements", rom.spin_up, blade, bare, speed=1.0)
-
-
-def test_weights_are_one_at_their_nodes():
-    nodes = np.array([0.0, 0.3, 0.7, 1.0])
-    assert_allclose([lagrange(nodes, x) for x in nodes], np.eye(4), atol=1e-15)
-    assert_allclose(lagrange(nodes, 0.42) @ nodes**3, 0.42**3)

@@ -19,7 +19,6 @@ from rom.eigen.verbs import rigid_motions
 from rom.eigen.workers import ONE_PROCESS
 from rom.errors import ConfigError, InterfaceError, ModelError
 
-pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = MARKS
 E, RHO, L, B, H, ALPHA = 70e9, 2700.0, 1.0, 0.02, 0.01, 23e-6
 EULER = np.pi**2 * H**2 / (12 * L**2)  # strain at which a pinned column buckles
@@ -115,7 +114,6 @@ def test_a_disc_hot_at_its_rim_has_the_stress_of_timoshenko():
 
 @pytest.mark.long
 def test_one_hot_sector_is_the_hot_wheel():
-    """The whole wheel meshed, held and heated as a solid."""
     N, sizes = 6, {"degree": 1, "cells": (4, 2, 2, 2)}
     rim = rom.Heat(9e-6, lambda x: 8e4 * (x[:, 0] ** 2 + x[:, 1] ** 2))
     whole = rom.heated(bladed_model(N, N, **sizes), rim, fixed=("bore",))

@@ -64,7 +64,6 @@ def test_frequencies_fall_towards_the_full_ones_with_every_mode(ops, model, exac
 
 @pytest.mark.parametrize("method", [rom.Guyan, rom.CraigBampton, rom.Rubin, rom.Herting])
 def test_rigid_motions_and_statics_of_the_boundary_are_exact(ops, model, method):
-    """The flexibility under loads on the tip, root held, is that of the full model."""
     b = boundary(model)
     method = method() if method is rom.Guyan else method(6)
     basis = method.basis(ops, b, tuple(map(str, b)))

@@ -11,7 +11,6 @@ import rom
 from cases.long import few
 from cases.paths import ROOT
 
-pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = [pytest.mark.fenicsx, pytest.mark.filterwarnings("ignore:linear tetrahedra")]
 
 MESHES = ROOT / "meshes"

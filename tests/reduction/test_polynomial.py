@@ -164,7 +164,6 @@ def test_columns_of_a_large_surface_are_worked_on_few_at_a_time():
 
 
 def at_once(ops, held, boundary):
-    """Constraint modes by their definition."""
     E = np.zeros((ops.n_local, boundary.size))
     E[boundary, np.arange(boundary.size)] = 1.0
     return E - held(ops.apply_K(E))
@@ -198,7 +197,6 @@ RANDOM = np.random.default_rng(1).normal(size=(N, 60))
 
 @pytest.fixture(scope="module")
 def seen():
-    """What the surface does in the thirty lowest modes of the free body."""
     return rom.modes(MODEL, 30).shapes[ROOT.dofs]
 
 

@@ -62,7 +62,6 @@ def test_all_modes_give_the_full_model():
     "reference", ["root", "tip", "mean-axis", "buckens", "free", ("root", "tip")]
 )
 def test_the_frame_is_a_choice(body, reference):
-    """Whatever the reference condition, every supported frequency stays."""
     other = body.with_reference(reference)
     for fixed in SUPPORTS:
         seen, known = (b.frequencies(12, fixed=fixed) for b in (other, body))
@@ -213,7 +212,6 @@ def test_a_frequency_limit_keeps_the_modes_below_it(model):
 
 @pytest.mark.parametrize("mass", [5.0, 80.0])
 def test_an_attached_rigid_body_equals_the_same_mass_in_the_matrix(mass):
-    """A heavy lump on the tip, against mass and inertia added to the rigid tip by hand."""
     J, at = np.diag([0.02, 0.03, 0.04]) * mass, np.array([1.4, 0.02, 0.03])
     model = block()
     lump = rom.Attachment("tip", mass, J, at)
@@ -266,13 +264,16 @@ def test_messages_for_wrong_interfaces(model, body):
         refuses(error, words, call)
 
 
-def test_messages_for_wrong_methods_and_attachments(model):
+def test_messages_for_wrong_methods_attachments_and_operators_without_geometry(model):
     refuses(ConfigError, "the dofs off the interfaces", reduced, 10**6, model)
     for lump, message in (
         (rom.Attachment("tip", -1.0), "= -1 must be positive"),
         (rom.Attachment("tip", 1.0, np.diag([5.0, 1.0, 1.0])), "no body has this inertia"),
     ):
         refuses(MaterialError, message, rom.modes, replace(model, attachments=(lump,)), 3)
+    blind = replace(model, operators=SciPyOperators(model.K, model.M))
+    refuses(ModelError, "do not know its rigid motions", rom.check, blind)
+    refuses(ModelError, "do not know its rigid motions", reduced, 2, blind)
 
 
 def test_mass_properties_are_those_of_the_block_and_what_it_carries(model, body):
@@ -325,12 +326,6 @@ def test_a_single_interface_has_a_certificate(model):
     assert body.certificate.ok, body.certificate
     (row,) = [r for r in body.certificate.rows if r.quantity.startswith("constraint against")]
     assert row.value == 0.0
-
-
-def test_operators_without_geometry_are_told_what_they_lack(model):
-    blind = replace(model, operators=SciPyOperators(model.K, model.M))
-    refuses(ModelError, "do not know its rigid motions", rom.check, blind)
-    refuses(ModelError, "do not know its rigid motions", reduced, 2, blind)
 
 
 HOW = {"method": rom.CraigBampton(12), "interfaces": made.KINDS}

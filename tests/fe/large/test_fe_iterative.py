@@ -260,7 +260,6 @@ def test_modes_left_alone_are_looked_at_once_more(problem, monkeypatch):
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory):
-    """{case: what was found}, by a factor in one process, and without by one and more."""
     folder, found = tmp_path_factory.mktemp("iterative"), {}
     script = str(RANKS / "iterative_under_mpi.py")
     for solver, ranks in (("direct", 1), *(("iterative", n) for n in (1, *SHARED_BY))):

@@ -30,7 +30,6 @@ VTK = {
 
 
 def meshio_box(kind):
-    """A box as meshio sees it, and the record it must become."""
     meshio = pytest.importorskip("meshio", reason="meshio is not installed")
     mesh = solid("hex27" if kind == "hex20" else kind, (2, 2, 2), (2.0, 1.0, 1.0))
     used = np.unique(mesh.cells[:, :20])
@@ -148,7 +147,6 @@ def test_abaqus_side_numbers_follow_the_manual(kind):
 
 
 def test_nastran_skin_elements_and_fixed_fields(tmp_path):
-    """Small fields, THRU, and a skin of quadrilaterals with their own property."""
     mesh = solid("hex8", (1, 1, 1), (1.0, 1.0, 1.0))
     cards = ["SOL 101", "BEGIN BULK"]
     for i, (x, y, z) in enumerate(mesh.points):
@@ -377,6 +375,9 @@ test_what_is_wrong_with_a_card_is_named = changed(
 
 PART = "*PART, NAME=a\n" + RING.partition("*NODE\n")[0] + "*END PART\n"
 ONE, TWO = ("*INSTANCE, NAME=a-1, PART=a\n*END INSTANCE\n", "*INSTANCE, NAME=a-2, PART=a\n")
+TRUSS = "*ELEMENT, TYPE=T3D2, ELSET=e\n9, 1, 2\n"
+SKIN = "*ELEMENT, TYPE=S4, ELSET=e\n9, 1, 2, 12, 11\n"
+SECTION = "*SOLID SECTION, ELSET=e\n"
 PARTS = {
     "two instances": (PART + ONE + TWO, "2 instances, 'a-1', 'a-2'"),
     "two parts": (PART + PART.replace("=a\n", "=b\n"), "2 parts, 'a', 'b'"),
@@ -384,14 +385,8 @@ PARTS = {
     "a reference point": (PART + ONE + "*NODE\n1, 0., 0., 0.\n", r"\*NODE outside of the part"),
     "half a system": ("*SYSTEM\n1., 2., 3., 4., 5., 6.\n" + RING, "6 numbers instead of 0, 3 or 9"),
     "a flat system": ("*SYSTEM\n0., 0., 0., 1., 0., 0.\n2., 0., 0.\n" + RING, "on a line"),
-    "a section of trusses": (
-        RING + "*ELEMENT, TYPE=T3D2, ELSET=bar\n9, 1, 2\n*SOLID SECTION, ELSET=bar\n",
-        "elements that are no solids: 9",
-    ),
-    "a section of a skin": (
-        RING + "*ELEMENT, TYPE=S4, ELSET=skin\n9, 1, 2, 12, 11\n*SOLID SECTION, ELSET=skin\n",
-        "elements that are no solids: 9",
-    ),
+    "a section of trusses": (RING + TRUSS + SECTION, "elements that are no solids: 9"),
+    "a section of a skin": (RING + SKIN + SECTION, "elements that are no solids: 9"),
     "copies of nothing": (RING + "*ELGEN\n8, 3\n", "ring.inp, line .*element 8 is not defined"),
     "copies without end": (RING + "*ELGEN\n7, 99999999\n", r"\[99999999, 1, 1\] elements"),
     "an option": (RING + "*NODE, NSET=a, SHIFT=3\n", r"\*NODE, SHIFT \(1"),

@@ -50,7 +50,6 @@ def listed(path, **options):
 
 
 def one(faces, **wanted):
-    """The only face with these attributes."""
     found = [f for f in faces if all(getattr(f, k) == v for k, v in wanted.items())]
     assert len(found) == 1
     return found[0]
@@ -131,7 +130,6 @@ AREAS = {  # of what is picked
 
 @pytest.fixture
 def meshed(parts):
-    """The plate, open and meshed in this process."""
     with session(gmsh):
         make(gmsh, parts / "plate.step", {"parameters": {"lc": 0.02}})
         gmsh.model.mesh.generate(3)
@@ -146,7 +144,6 @@ def test_what_is_picked_has_its_area(meshed, text, area):
 
 
 def test_numbers_are_those_of_the_list(parts):
-    """The halves of the bore by its radius are the faces that the list gives this radius."""
     faces = {"bore": "radius:0.01", "face": "every"}
     mesh = read_mesh(parts / "plate.step", faces=faces)
     numbers = [f.number for f in mesh.faces if f.radius and f.radius > 0.008]

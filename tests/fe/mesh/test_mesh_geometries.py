@@ -14,7 +14,6 @@ from cases.refusals import refuses
 from rom.errors import ConfigError
 from rom.fe.mesh.read import read_mesh
 
-pytest.importorskip("gmsh", reason="gmsh is not installed")
 pytestmark = pytest.mark.fenicsx
 MESHES = ROOT / "meshes"
 ROD = {
@@ -85,7 +84,6 @@ def test_volume_of_the_rod_agrees_with_its_description(change):
 
 
 def test_the_rod_has_cylindrical_bores_fillets_and_pockets():
-    """Outer nodes on the fillet cylinders, and on both faces of the web."""
     p, mesh = ROD, read_mesh(MESHES / "connecting_rod.geo")
     for name, x, d, t in (("pin_a", 0.0, 0.030, 0.020), ("pin_b", 0.2, 0.016, 0.016)):
         points = mesh.points[np.unique(mesh.facets[name])]

@@ -37,7 +37,6 @@ Mesh.MeshSizeMin = 0.5; Mesh.MeshSizeMax = 0.5;
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """The same two-body mesh in all versions of .msh, and a box in STEP."""
     folder = tmp_path_factory.mktemp("meshes")
     (folder / "two.geo").write_text(TWO_BODIES)
     with session(gmsh):
@@ -58,7 +57,6 @@ def folder(tmp_path_factory):
 
 
 def volumes(mesh):
-    """Volume of each region of straight tetrahedra."""
     a, b, c, d = np.moveaxis(mesh.points[mesh.corners], 1, 0)
     volume = np.einsum("ij,ij->i", b - a, np.cross(c - a, d - a)) / 6
     return {name: volume[mesh.regions == tag].sum() for tag, name in mesh.region_names.items()}

@@ -36,7 +36,6 @@ def sample(kind, rows=7, columns=5):
 
 
 def strings(column):
-    """(first row, values) of each run of entries."""
     filled = np.flatnonzero(column)
     runs = np.split(filled, np.flatnonzero(np.diff(filled) > 1) + 1) if filled.size else []
     return [(run[0] + 1, column[run]) for run in runs]
