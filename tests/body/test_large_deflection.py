@@ -290,8 +290,6 @@ def test_centrifugal_force_is_a_load_that_is_certified_and_never_pushes():
 
 
 GOOD, FAR, SLACK = Step(1e-3, 1.0, 1e-3), Step(6e-3, 1.0, 1e-3), Step(1e-3, 1.0, 3e-2)
-
-
 # steps, how many hold, how many are found; what holds again further out does not count
 STEPS = [
     ((GOOD, GOOD, GOOD), 3, 3), ((GOOD, GOOD, FAR), 2, 3), ((GOOD, SLACK, GOOD), 1, 3),

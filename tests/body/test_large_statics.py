@@ -18,8 +18,6 @@ from rom.body.nonlinear.statics import follow
 from rom.errors import ConfigError, InterfaceError, ModelError, RomError, RomWarning
 
 pytestmark = COARSE
-
-
 HALF, RISE, HEIGHT, PRESSED = 0.5, 0.03, 0.01, 600.0  # of a clamped arch [m], and its load [N]
 
 

@@ -12,7 +12,6 @@ from cases.solid import reduced
 from rom.errors import RomWarning
 
 pytestmark = pytest.mark.fenicsx
-
 L, B, H = 1.0, 0.05, 0.01
 EULER = np.pi**2 * E_STEEL * B * H**3 / 12 / L**2
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import rom
-from cases.solid import block, reduced
+from cases.solid import STEEL, block, reduced
 from rom.process.stopwatch import FACTORISATION_PIECE as FACTORS
 from rom.process.stopwatch import FLOPS_NOTE, MISS_NOTE, REST_PIECE, piece, stopwatch
 from rom.report.pages import _stages
@@ -79,8 +79,7 @@ def test_pieces_of_a_model_in_petsc_are_counted():
     """Constraint shapes and modes take one factor of the inside, which no count follows."""
     import rom.fe
 
-    model = rom.fe.model("meshes/beam.geo", material=rom.Material(E=210e9, nu=0.3, rho=7850.0))
-    body = reduced(6, model)
+    body = reduced(6, rom.fe.model("meshes/beam.geo", material=STEEL))
     shapes = body.provenance["stages"]["shapes"]
     assert shapes["number of factorisations"] == shapes["ranks"] == 1
     assert 1e6 < shapes[FLOPS_NOTE] < 1e12 and 0.0 <= shapes[MISS_NOTE] < 1e-9

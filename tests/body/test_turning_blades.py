@@ -25,10 +25,6 @@ ROOM = {"n_modes": 40, "n_blade_modes": 25, "functions": rom.Polynomial(6),
         "root": rom.Polynomial(4)}  # fmt: skip
 
 
-def turning(model):
-    return rom.rotating_sector(rom.CyclicSector.from_model(model, fixed=("bore",)), model)
-
-
 @pytest.fixture(scope="module")
 def model():
     return bladed_model(N, **SIZES)
@@ -36,7 +32,7 @@ def model():
 
 @pytest.fixture(scope="module")
 def full(model):
-    return turning(model)
+    return rom.rotating_sector(rom.CyclicSector.from_model(model, fixed=("bore",)), model)
 
 
 @pytest.fixture(scope="module")

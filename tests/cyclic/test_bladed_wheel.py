@@ -70,7 +70,7 @@ def test_disk_and_blade_make_the_tuned_sector(full, small):
         assert np.all(found > exact * (1 - 1e-9))
 
 
-def test_equal_blades_are_the_tuned_wheel(small, disk):
+def test_equal_blades_are_the_tuned_wheel_and_certificates_notice_weak_ones(small, disk):
     """With all waves of the disk nothing is lost between sector and wheel; with few, little."""
     n_waves = small.free.size - small.root.size - small.cantilever.size
     omega, Phi = rom.bladed_wheel(small, n_waves).modes([small.blade] * N)
@@ -85,9 +85,6 @@ def test_equal_blades_are_the_tuned_wheel(small, disk):
     fewest = fewer.modes([small.blade] * N)[0][:30]
     assert_allclose(fewest, few, rtol=3e-4)
     assert np.all(fewest > few * (1 - 1e-9))
-
-
-def test_the_certificates_of_sector_and_wheel(small, disk):
     assert small.certificate.ok and disk.certificate.ok
     weak = replace(small.blade, K=0.5 * small.blade.K)
     assert not replace(disk, sector=replace(small, blade=weak)).certificate.ok

@@ -58,11 +58,9 @@ def test_sectors_whose_faces_have_different_nodes():
 def test_a_thin_solid_ring(n):
     """In its plane, Love's ring of rectangular section; bricks between 72 corners."""
     h, R, E, rho = 0.002, 0.1, 200e9, 7800.0
-    sizes = {"bore": R - h / 2, "rim": R + h / 2, "tip": R + h / 2, "width": 0.01}
-    steel = rom.Material(E=E, nu=0.0, rho=rho)
-    sector = rom.CyclicSector.from_model(
-        bladed_model(12, material=steel, cells=(6, 1, 0, 1), **sizes)
-    )
+    inner, outer, steel = R - h / 2, R + h / 2, rom.Material(E=E, nu=0.0, rho=rho)
+    sizes = {"bore": inner, "rim": outer, "tip": outer, "width": 0.01, "cells": (6, 1, 0, 1)}
+    sector = rom.CyclicSector.from_model(bladed_model(12, material=steel, **sizes))
     exact = ring_frequency(n, E * h**2 / 12, rho, R)
     found = rom.cyclic_modes(sector, n, 6).omega
     assert_allclose(found[np.argmin(abs(found - exact))], exact, rtol=5e-3)

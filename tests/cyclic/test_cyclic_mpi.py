@@ -9,15 +9,13 @@ from numpy.testing import assert_allclose
 
 from cases.paths import RANKS, ROOT
 from cases.ranks.environment import on_ranks
+from cases.wheels import MARKS
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 from cases.ranks.sectors_under_mpi import wheel
 from rom.fe.operators.workers import shared_out
 
-pytestmark = [
-    pytest.mark.fenicsx, pytest.mark.mpi,
-    pytest.mark.filterwarnings("ignore::rom.errors.RomWarning"),
-]  # fmt: skip
+pytestmark = [*MARKS, pytest.mark.mpi]
 
 
 @pytest.fixture(scope="module", params=[2, 3])

@@ -73,6 +73,11 @@ def test_a_sector_is_reduced_like_a_body():
     ):
         refuses(ConfigError, words, rom.reduce, bar, **{"method": rom.CraigBampton(8)} | options)
     refuses(ConfigError, "number of fixed-interface modes, not None", rom.reduce_sector, bar)
+    bar = periodic_bar()
+    refuses(ConfigError, "geometry", rom.reduce_sector, mass_ring(5), n_modes=0)
+    still = replace(bar, held=np.union1d(bar.slave, bar.master))
+    refuses(InterfaceError, "'root' are held", rom.reduce_sector, still, n_modes=2)
+    refuses(ConfigError, "must be a whole number from", rom.reduce_sector, bar, n_modes=10_000)
 
 
 def test_a_certificate_tells_good_from_poor_and_wrong():
@@ -122,11 +127,3 @@ def test_functions_rise_from_a_held_edge_within_half_the_thickness():
     assert_allclose(distance(points, points[at_rest]), s, atol=1e-12)
     assert_allclose(fading(face, at_rest), s / (s + h / 2), rtol=0.03, atol=1e-12)
     assert_allclose(distance(points, points[:1]), np.hypot(s, t), atol=1e-12)
-
-
-def test_what_cannot_be_reduced_is_named():
-    bar = periodic_bar()
-    refuses(ConfigError, "geometry", rom.reduce_sector, mass_ring(5), n_modes=0)
-    still = replace(bar, held=np.union1d(bar.slave, bar.master))
-    refuses(InterfaceError, "'root' are held", rom.reduce_sector, still, n_modes=2)
-    refuses(ConfigError, "must be a whole number from", rom.reduce_sector, bar, n_modes=10_000)

@@ -122,7 +122,7 @@ def published():
     return spinning(mesh, {"shaft": STEEL} | stiff, a=1e6, b=1e6)
 
 
-def test_a_solid_rotor_whirls_as_printed(published):
+def test_a_solid_rotor_whirls_as_printed_and_springs_that_hold_nothing_are_refused(published):
     """rad/s at rest and at 4000 1/min, above two critical speeds; forward positive."""
     still = rom.cyclic_modes(published, 1, 3).omega
     assert_allclose(still, [86.66, 274.31, 716.78], rtol=6e-3)
@@ -132,6 +132,9 @@ def test_a_solid_rotor_whirls_as_printed(published):
     assert_allclose(found, printed, rtol=6e-3)
     split = np.diff(abs(found))[::2] / still
     assert_allclose(split, [2.41 / 86.66, 42.93 / 274.31, 226.90 / 716.78], rtol=3e-2)
+    refuses(ConfigError, "hold nothing", rom.supported_sector, published, published.face)
+    small, held = rom.reduce_sector(published, n_modes=5), {"face": published.face, "across": 1.0}
+    refuses(InterfaceError, "'cyclic_low' is no interface", rom.supported_sector, small, **held)
 
 
 def edge(n, x, nu, free):
@@ -191,11 +194,3 @@ def test_a_thin_spinning_disc_splits_by_its_turning_alone():
         southwell = np.sqrt(still**2 + (5 - STEEL.nu) / 2 * speed**2)
         assert_allclose(waves.omega, southwell, rtol=3e-3)
         assert np.all(waves.omega > southwell)
-
-
-def test_springs_that_hold_nothing_are_refused(published):
-    face = published.face
-    refuses(ConfigError, "hold nothing", rom.supported_sector, published, face)
-    small = rom.reduce_sector(published, n_modes=5)
-    held = {"face": face, "across": 1.0}
-    refuses(InterfaceError, "'cyclic_low' is no interface", rom.supported_sector, small, **held)

@@ -14,14 +14,7 @@ from rom.eigen import band
 from rom.eigen.band import lehmann_bounds, substructured_modes
 from rom.eigen.scipy import SciPyOperators
 from rom.eigen.verbs import rigid_motions
-from rom.errors import (
-    ConfigError,
-    InterfaceError,
-    ModelError,
-    ModesMissedError,
-    ResourceError,
-    SolverError,
-)
+from rom.errors import ConfigError, InterfaceError, ModelError, ModesMissedError, SolverError
 
 ROUND_OFF = 1e-10  # of frequencies of dense solutions, 1e-16 times the ratio of the extremes
 
@@ -157,4 +150,4 @@ def test_a_mode_that_is_missed_is_said_and_before_too_little_memory(monkeypatch)
     refuses(ModesMissedError, "counts", substructured_modes, K, M, 1e4, rigid=rigid)
     monkeypatch.setattr(band, "free_bytes", lambda: 1e3)
     too_little = r"takes .* GiB; 9.31e-07 GiB are free"
-    refuses(ResourceError, too_little, substructured_modes, K, M, 2e4, rigid=rigid)
+    refuses(rom.ResourceError, too_little, substructured_modes, K, M, 2e4, rigid=rigid)

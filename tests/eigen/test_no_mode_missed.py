@@ -10,6 +10,7 @@ from scipy.sparse.csgraph import connected_components
 import rom
 from cases.boxes import FACES, box
 from cases.long import few
+from cases.solid import STEEL
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = pytest.mark.fenicsx
@@ -23,7 +24,6 @@ from rom.fe.elasticity import assemble  # noqa: E402
 from rom.reduction.full_model import operators  # noqa: E402
 from rom.reduction.interfaces.connection import connect  # noqa: E402
 
-STEEL = rom.Material(E=210e9, nu=0.3, rho=7850.0)
 KINDS = ("rbe2", "rbe3", rom.Polynomial(1), "full")
 
 
@@ -95,7 +95,6 @@ def agree(omega, exact, rigid=0):
 
 
 def agree_in_all_supports(model, kind, m):
-    """Modes with the interfaces held, of the free body and of the body held at one end."""
     connection = connect(operators(model), model, {"x0": kind, "x1": kind})
     ops = connection.ops
     held = ops.hold(connection.boundary)

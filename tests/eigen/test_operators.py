@@ -22,7 +22,7 @@ from rom.components import cosserat
 from rom.eigen import lanczos, search
 from rom.eigen.scipy import SciPyOperators
 from rom.eigen.supports import refuse_loose
-from rom.eigen.verbs import count_shift, mac, orthonormal, rigid_motions
+from rom.eigen.verbs import mac, orthonormal, rigid_motions
 from rom.errors import ConfigError, InterfaceError, ModelError, ModesMissedError, SolverError
 
 
@@ -216,12 +216,6 @@ def test_messages_for_too_many_modes_and_broken_numbers(make, model):
     refuses(SolverError, "M has an entry that is not finite", make, broken)
 
 
-def test_the_count_is_made_in_the_widest_gap():
-    lam = np.array([1.0, 4.0, 4.0 + 1e-9, 4.1, 9.0])
-    assert count_shift(lam, 2) == (4, 6.55)
-    assert count_shift(lam, 1) == (4, 6.55) or count_shift(lam, 1) == (1, 2.5)
-
-
 def test_rigid_motions_far_away_stay_orthonormal_and_mac_tells_modes_apart(make, model, exact):
     ops, Phi = make(model), exact[1][:, 6:9]
     assert_allclose(mac(ops, Phi, -3.0 * Phi), np.eye(3), atol=1e-9)
@@ -276,8 +270,6 @@ def test_frequencies_are_as_exact_as_the_stiffness_where_a_factor_is_not(make):
 
 ROD = cosserat.straight(1.0, 8, stretch=1e4, bend=1.0, mass=1.0, inertia=1e-3)
 FENICSX = [pytest.mark.fenicsx, pytest.mark.filterwarnings("ignore::rom.errors.RomWarning")]
-
-
 ASSEMBLY = cache(lambda: rom.Assembly(made.bodies(), made.TOGETHER))
 WAYS = {  # function, its arguments before the count
     "modes": lambda: (rom.modes, [made.model()], {}),

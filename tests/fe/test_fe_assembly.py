@@ -16,14 +16,12 @@ from rom.errors import ConfigError, InterfaceError, MaterialError, RomWarning, T
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 
-from mpi4py import MPI
 
 from dolfinx.mesh import compute_midpoints, meshtags
 
 from rom.fe.elasticity import assemble
 from rom.fe.forms import region
 from rom.fe.jit import cache_directory
-from rom.fe.operators.aij import aij, symmetric
 
 ELEMENTS = [(kind, degree) for kind in ("tetrahedron", "hexahedron") for degree in (1, 2)]
 every_element = pytest.mark.parametrize(("kind", "degree"), ELEMENTS)
@@ -193,19 +191,6 @@ def test_regions_are_assembled_when_they_are_asked_for_and_no_sooner(monkeypatch
     assert len(made) == 4 and np.abs(total - model.M).max() < 1e-12 * np.abs(model.M).max()
 
 
-@pytest.mark.parametrize("same_pattern", [True, False])
-def test_a_matrix_made_symmetric_is_the_mean_with_its_transpose(same_pattern):
-    A = np.random.default_rng(2).normal(size=(6, 6))
-    A[0, 1] = A[1, 0] = 0.0  # stands as an entry, and is dropped
-    rows = csr_matrix(A if same_pattern else np.triu(A))
-    if same_pattern:
-        rows = csr_matrix((A.ravel(), np.tile(np.arange(6), 6), np.arange(0, 37, 6)), shape=(6, 6))
-    found = symmetric(aij(rows, ((6, 6), (6, 6)), MPI.COMM_SELF))
-    wanted = rows.toarray()
-    assert_allclose(found.toarray(), (wanted + wanted.T) / 2, rtol=1e-15)
-    assert found.nnz == np.count_nonzero(wanted + wanted.T) and found.has_sorted_indices
-
-
 def test_regions_materials_interfaces_and_attachments_that_do_not_fit_are_named():
     mesh, tags = box(cells=(4, 1, 1))
     cells, named, none = regions_of(mesh), {"regions": NAMES}, np.zeros(0, dtype=np.int32)
@@ -241,7 +226,7 @@ def test_unusual_input_is_worth_a_warning(size, kind, degree, material, words):
     assert any(words in text for text in model.provenance["warnings"])
 
 
-def test_provenance_tells_how_the_model_was_made():
+def test_provenance_tells_how_the_model_was_made_and_other_numbers_are_not_compiled_anew():
     mesh, tags = box(cells=(2, 1, 1))
     model = assemble(mesh, None, tags, material=STEEL)
     assert set(model.provenance["versions"]) == {"dolfinx", "PETSc", "SLEPc"}
@@ -250,11 +235,6 @@ def test_provenance_tells_how_the_model_was_made():
         "cells": {"hexahedron": 2}, "degree": 2, "units": "SI", "warnings": [],
     }  # fmt: skip
     assert model.provenance | told == model.provenance
-
-
-def test_other_numbers_need_no_new_compilation():
-    mesh, _ = box(cells=(2, 1, 1))
-    assemble(mesh, material=STEEL)
     before = sorted(cache_directory().glob("*.c"))
     assemble(mesh, material=rom.Material(70.1234e9, 0.31, 2711.0))
     assert sorted(cache_directory().glob("*.c")) == before

@@ -59,16 +59,6 @@ def test_inertia_counts_the_modes_below_a_shift(small, exact, sigma):
     assert small.operators.indefinite(sigma).negative_pivots() == np.count_nonzero(exact < sigma)
 
 
-def test_a_restart_of_the_krylov_space_loses_nothing(monkeypatch):
-    model = beam((14, 4, 3))
-    held = model.operators.hold(model.interfaces["x0"].dofs)
-    monkeypatch.setattr(search, "MAX_DENSE_DOFS", 0)
-    expected, _ = model.operators.modes(held, 30)
-    monkeypatch.setattr(lanczos, "MAX_EXTRA_BLOCKS", 6)
-    found, _ = model.operators.modes(held, 30)
-    assert_allclose(found, expected, rtol=1e-10)
-
-
 def test_slepc_and_our_block_lanczos_find_the_same_modes(monkeypatch):
     """Dofs held go to SLEPc, a stiffness factored before to blocks; shapes and signs agree."""
     model, called = beam((14, 4, 3)), []

@@ -55,18 +55,3 @@ def test_every_mode_more_lowers_the_frequencies_towards_the_full_ones(body, full
     steps = np.array([frequencies(body(n), fixed) for n in (6, 12, 24, 48)])
     assert (np.diff(steps, axis=0) < 1e-9 * steps[1:]).all()
     assert_allclose(steps[-1], full[fixed], rtol=3e-4)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("kind", ["rbe2", "full", "rbe3"])
-def test_a_complete_basis_is_the_full_model(tmp_path, kind):
-    """A coarse rod without fillets, all fixed-interface modes kept."""
-    model = rom.fe.model(ROD, material=STEEL, degree=1, parameters={"lc": 0.016})
-    kinds = dict.fromkeys(KINDS, kind)
-    n_surface = sum(i.dofs.size for i in model.interfaces.values())
-    n_boundary = n_surface if kind == "full" else 12
-    n_inner = model.n_dofs - (12 if kind == "rbe3" else n_surface)
-    body = rom.reduce(model, method=rom.CraigBampton(n_inner), interfaces=kinds, certify=False)
-    assert body.n_modes == n_inner + n_boundary - 6
-    exact = rom.modes(model, 26, interfaces=kinds).frequencies[6:]
-    assert_allclose(body.frequencies(26)[6:], exact, rtol=1e-8)

@@ -10,7 +10,7 @@ import rom
 from cases.beam import N, gauss_hermite, hermite_beam
 from cases.paths import ROOT
 from cases.refusals import refuses
-from cases.solid import reduced
+from cases.solid import KINDS, reduced
 from rom.eigen.supports import supports
 from rom.errors import ConfigError, InterfaceError
 from rom.prestress import held_solid
@@ -27,7 +27,6 @@ ROOTS = {  # at the root, at the tip, (k L)^2 of the lowest bending along z
     "pinned, pinned": ("xyz" + PIN, "yz" + PIN, np.pi**2),
     "pinned, guided": ("xyz" + PIN, "y" + GUIDE, np.pi**2 / 4),
 }
-KINDS = {"root": "rbe2", "tip": "rbe2"}
 
 
 def beam(length=L, nx=20):
@@ -123,7 +122,7 @@ def test_solids_that_turn_or_are_heated_take_them_too(model):
     assert set(held) == set(model.interfaces["root"].dofs) | set(tip[tip % 3 != 0])
     expands = rom.heated(model, rom.Heat(1e-5, 100.0), fixed={"root": "xyz", "tip": "yz"})
     tight = rom.heated(model, rom.Heat(1e-5, 100.0), fixed=("root", "tip"))
-    free, pressed = (rom.modes(x, 1, fixed=["root", "tip"]).omega[0] for x in (expands, tight))
+    free, pressed = (rom.modes(x, 1, fixed=("root", "tip")).omega[0] for x in (expands, tight))
     assert pressed < 0.97 * free
 
 

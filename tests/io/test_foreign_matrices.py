@@ -29,7 +29,6 @@ from rom.io.programs.interface_form import interface_form
 HERE = TESTS / "reference" / "foreign"
 LABELS = np.array([7, 3, 12, 20, 101, 55, 41, 60])  # of the nodes of the block
 SIDES = {"root": [7, 3, 12, 20], "tip": [60, 101, 41, 55]}
-KINDS = {"root": "rbe2", "tip": "rbe2"}
 
 
 @pytest.fixture(scope="module")

@@ -26,7 +26,6 @@ BOX = (
     np.array([[0, 0, 0], [0.2, 0, 0], [0, 0.1, 0], [0, 0, 0.05]]),
     np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]),
 )
-
 WIDTHS = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}
 LOAD_BOTH = """
 import rom.fe.elasticity

@@ -126,17 +126,8 @@ def test_a_wrong_place_and_a_full_disk_are_named_and_leave_the_old_file(body, fi
 
 
 WRONG = (None, -1, 1e308, float("nan"), "nonsense", [1], {"x": 1}, [1, -1])
-
 # a value that fails, by the relation to its limit
 FAILED_BY = {"<=": 1e308, ">": -1e308}
-
-
-def contents(file):
-    with np.load(file) as found:
-        arrays = {name: found[name] for name in found.files}
-    manifest = json.loads(arrays.pop("manifest").tobytes())
-    del manifest["sha256"]
-    return manifest, arrays
 
 
 def is_noticed(path, manifest, arrays):
@@ -154,7 +145,11 @@ def good(tmp_path_factory):
     kinds = {"root": "rbe2", "tip": "rbe3"}
     body = rom.reduce(model, method=rom.CraigBampton(16), interfaces=kinds, reference="root")
     assert rom.check(body).ok
-    return contents(rom.save(body, tmp_path_factory.mktemp("good") / "x.npz"))
+    with np.load(rom.save(body, tmp_path_factory.mktemp("good") / "x.npz")) as found:
+        arrays = {name: found[name] for name in found.files}
+    manifest = json.loads(arrays.pop("manifest").tobytes())
+    del manifest["sha256"]
+    return manifest, arrays
 
 
 WORDS = ("version", "schema", "units", "name", "reference", "labels", "surface", "provenance",

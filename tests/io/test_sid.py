@@ -23,16 +23,8 @@ from rom.io.sid.dialect import check_sid, read_sid
 from rom.io.sid.format import DIALECTS, Taylor, write_sid
 
 RNG = np.random.default_rng(11)
-
-
-@pytest.fixture(scope="module")
-def nodes():
-    return random_nodes(np.random.default_rng(5), n=7, r=4)
-
-
-@pytest.fixture(scope="module")
-def stiffened():
-    return random_body(np.random.default_rng(7), stiffened=True)
+NODES = random_nodes(np.random.default_rng(5), n=7, r=4)
+STIFFENED = random_body(np.random.default_rng(7), stiffened=True)
 
 
 def rows(record, q, qd, qdd, a, omega, domega):
@@ -58,25 +50,25 @@ def rows(record, q, qd, qdd, a, omega, domega):
 
 
 @pytest.mark.parametrize("dialect", DIALECTS)
-def test_forces_and_elastic_rows_are_those_of_particles(nodes, dialect, tmp_path):
+def test_forces_and_elastic_rows_are_those_of_particles(dialect, tmp_path):
     """With blocks of first order these rows are exact, for deformations of any size."""
-    body = nodal_body(*nodes)
+    body = nodal_body(*NODES)
     record = read_sid(write_sid(standard_input(body), tmp_path / "b.SID_FEM", dialect=dialect))
-    got, expected = rows(record, *motion()), particles(nodes, *motion())
+    got, expected = rows(record, *motion()), particles(NODES, *motion())
     for row in (0, 2):
         assert_allclose(got[row], expected[row], atol=1e-9 * np.abs(expected[row]).max())
 
 
-def test_moments_are_those_of_particles_to_first_order(nodes):
+def test_moments_are_those_of_particles_to_first_order():
     """SID has no place for the second order of J and Gr: the error falls with the square."""
-    record = standard_input(nodal_body(*nodes))
-    apart = [rows(record, *motion(s))[1] - particles(nodes, *motion(s))[1] for s in (1e-2, 1e-3)]
+    record = standard_input(nodal_body(*NODES))
+    apart = [rows(record, *motion(s))[1] - particles(NODES, *motion(s))[1] for s in (1e-2, 1e-3)]
     assert 80 < np.abs(apart[0]).max() / np.abs(apart[1]).max() < 120
 
 
-def test_stiffening_adds_its_matrices_to_loads(stiffened):
+def test_stiffening_adds_its_matrices_to_loads():
     """The load l adds K_l to the stiffness; forces on nodes stand on the other side."""
-    full, plain = (standard_input(b) for b in (stiffened, replace(stiffened, K_geo={})))
+    full, plain = (standard_input(b) for b in (STIFFENED, replace(STIFFENED, K_geo={})))
     q, _, _, a, omega, domega = motion()
     more = rows(full, *motion())[2] - rows(plain, *motion())[2]
     x, y, z = omega
@@ -84,15 +76,15 @@ def test_stiffening_adds_its_matrices_to_loads(stiffened):
     loads |= dict(zip(("domega_x", "domega_y", "domega_z"), domega, strict=True))
     loads |= {"omega_x^2": x * x, "omega_y^2": y * y, "omega_z^2": z * z}
     loads |= {"omega_x omega_y": x * y, "omega_y omega_z": y * z, "omega_x omega_z": x * z}
-    assert_allclose(more, sum(s * stiffened.K_geo[load] @ q for load, s in loads.items()))
+    assert_allclose(more, sum(s * STIFFENED.K_geo[load] @ q for load, s in loads.items()))
     for kind, block in (("f", "phi"), ("m", "psi")):
         for axis, letter in enumerate("xyz"):
             change = np.tensordot(q, full.nodes["a"][block].M1, 1)[axis]
-            assert_allclose(change, -stiffened.K_geo[f"a {kind}_{letter}"] @ q)
+            assert_allclose(change, -STIFFENED.K_geo[f"a {kind}_{letter}"] @ q)
 
 
-def test_ge_does_no_work_even_with_angular_stiffening(stiffened):
-    record = standard_input(stiffened)
+def test_ge_does_no_work_even_with_angular_stiffening():
+    record = standard_input(STIFFENED)
     Ge = record.blocks["Ge"].M0.reshape(4, 3, 4)
     assert_allclose(Ge, -Ge.transpose(2, 1, 0), atol=1e-14)
     Cr1 = record.blocks["Cr"].M1
@@ -148,10 +140,10 @@ LAYOUTS = {  # mode second in Oe1, axes first in Gr and in Ge, six numbers of J
 
 
 @pytest.mark.parametrize("dialect", LAYOUTS)
-def test_dialects_have_the_layouts_measured_in_public_files(dialect, nodes, tmp_path):
+def test_dialects_have_the_layouts_measured_in_public_files(dialect, tmp_path):
     """Blocks from the nodes themselves: Gr_j = -2 int x~ phi~_j, Ge_j = 2 int phi_j x phi_i."""
     mode_second, gr_axis, ge_axis, six = LAYOUTS[dialect]
-    x, Ms, phi, K, D = nodes
+    x, Ms, phi, K, D = NODES
     record = standard_input(nodal_body(x, Ms, phi, K, D))
     path, r, j, axis = tmp_path / "b.SID_FEM", 4, 2, 1
     write_sid(record, path, dialect=dialect)
@@ -200,8 +192,8 @@ def test_each_block_is_checked_against_another():
         assert any(row.quantity.startswith(what) for row in check_sid(bad).failures), name
 
 
-def test_a_body_comes_back_from_its_sid_but_not_a_stiffened_one(nodes, stiffened, tmp_path):
-    x, Ms, phi, K, D = nodes
+def test_a_body_comes_back_from_its_sid_but_not_a_stiffened_one(tmp_path):
+    x, Ms, phi, K, D = NODES
     markers = {"a": (x[0], phi[:, 0].T, 0.2 * RNG.normal(size=(3, 4)))}
     body = nodal_body(x, Ms, phi, K, D, markers)
     rom.export(body, tmp_path / "b.SID_FEM")
@@ -213,7 +205,7 @@ def test_a_body_comes_back_from_its_sid_but_not_a_stiffened_one(nodes, stiffened
     turn = np.array([0.0, 0.0, 1.0])  # about the body origin: the marker moves across its arm
     moved = back.markers["a"].hold @ np.r_[0, 0, 0, turn, np.zeros(4)]
     assert_allclose(moved, np.r_[np.cross(turn, x[0]), turn], atol=1e-12)
-    rom.export(stiffened, tmp_path / "b.SID_FEM")
+    rom.export(STIFFENED, tmp_path / "b.SID_FEM")
     refuses(ConfigError, "geometric stiffness in Oe", sid_body, read_sid(tmp_path / "b.SID_FEM"))
 
 
@@ -306,8 +298,8 @@ def test_hostile_sizes_take_no_memory(tmp_path):
 
 
 @pytest.mark.once
-def test_the_command_line_writes_checks_and_reads_back(nodes, tmp_path):
-    body = nodal_body(*nodes)
+def test_the_command_line_writes_checks_and_reads_back(tmp_path):
+    body = nodal_body(*NODES)
     rom.save(body, tmp_path / "b.rom.npz")
     path = tmp_path / "b.SID_FEM"
     assert command("export", tmp_path / "b.rom.npz", path, "--to", "sid-pysid").returncode == 0

@@ -92,14 +92,10 @@ def test_broken_files_are_named(tmp_path):
     refuses(FileFormatError, "holds no function", read_universal, path)
 
 
-@pytest.fixture(scope="module")
-def body():
-    return reduced(3, block())
-
-
 @pytest.mark.fenicsx
-def test_vtk_reads_points_triangles_and_shapes(body, tmp_path):
+def test_vtk_reads_points_triangles_and_shapes(tmp_path):
     pyvista = pytest.importorskip("pyvista", reason="VTK comes with the pictures")
+    body = reduced(3, block())
     grid = pyvista.read(rom.export(body, tmp_path / "rod.vtu"))
     assert_allclose(grid.points, body.surface.points)
     assert_allclose(grid.cells.reshape(-1, 4)[:, 1:], body.surface.triangles)
@@ -109,7 +105,8 @@ def test_vtk_reads_points_triangles_and_shapes(body, tmp_path):
     assert grid.array_names[0] == f"mode 1, mean-axis frame, {body.omega[0] / 2 / np.pi:.6g} Hz"
 
 
-def test_an_unknown_ending_and_a_body_without_surface_are_named(body, tmp_path):
+def test_an_unknown_ending_and_a_body_without_surface_are_named(tmp_path):
+    body = reduced(3, block())
     bare = replace(body, surface=None)
     refuses(ConfigError, r"'.SID'; known|ending '.sid'", rom.export, body, tmp_path / "rod.SID")
     refuses(ConfigError, "has no surface; to be drawn", rom.export, bare, tmp_path / "rod.vtu")

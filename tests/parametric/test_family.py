@@ -10,13 +10,12 @@ from scipy.optimize import brentq
 import rom
 from cases.components.updating import refuse
 from cases.refusals import refuses
-from cases.solid import STEEL, block, composite
+from cases.solid import KINDS, STEEL, block, composite
 from rom.body.reference import rigid_elastic
 from rom.components.families.affine import AffineModel
 from rom.errors import ConfigError, FileFormatError, ParameterError, RomWarning
 
 ALLOY = rom.Material(E=70e9, nu=0.33, rho=2700.0)
-KINDS = {"root": "rbe2", "tip": "rbe2"}
 CELLS, SIZE, ORIGIN = (10, 2, 3), (1.0, 0.1, 0.08), (0.3, -0.2, 0.1)
 PARAMETERS = {
     "E_web": rom.YoungsModulus("web", 0.5, 2.0),

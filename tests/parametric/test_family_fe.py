@@ -100,30 +100,6 @@ def test_petsc_and_scipy_say_the_same(model, family):
     assert_allclose(found, expected, rtol=1e-8)
 
 
-def test_a_sweep_never_returns_to_the_finite_elements(family, monkeypatch):
-    import rom.fe.elasticity
-    import rom.fe.forms.stress
-    import rom.fe.operators.factor
-    import rom.fe.operators.petsc
-
-    def gone(*arguments, **options):
-        raise AssertionError("the finite elements were asked")
-
-    operators = rom.fe.operators.petsc.PETScOperators
-    for owner, names in (
-        (operators, ("apply_K", "apply_M", "gram", "hold", "modes", "varied")),
-        (rom.fe.operators.factor.Factor, ("__init__", "solve")),
-        (rom.fe.forms.stress.Stresses, ("__init__", "at_nodes")),
-        (rom.fe.elasticity, ("assemble", "assemble_matrix", "model")),
-    ):
-        for name in names:
-            monkeypatch.setattr(owner, name, gone)
-    E = np.geomspace(0.2, 5.0, 100)
-    first = [family.frequencies(1, fixed="root", E_core=e)[0] for e in E]
-    assert np.all(np.diff(first) > 0)
-    assert family.at(E_core=3.0).stress.von_mises(np.ones(family.body.n_modes)).min() > 0
-
-
 @pytest.mark.long
 @pytest.mark.mpi
 @pytest.mark.slow

@@ -159,9 +159,6 @@ def test_study_of_characteristic_modes_on_two_blocks(level):
         before = found
 
 
-# One body
-
-
 def body(kinds, n=None, m=15, **options):
     method = rom.CraigBampton(m) if n is None else rom.Characteristic(rom.CraigBampton(m), n)
     options = {"certify": False} | options
@@ -181,7 +178,7 @@ def test_functions_of_one_body_lead_to_its_full_interfaces():
     assert steps[2].marker("tip").hold.shape[0] == 12
     # they beat polynomials of the same number
     bodies = body(BOTH, 18), body(dict.fromkeys(BOTH, "polynomial:2"))
-    computed, polynomials = ((b.frequencies(12) / exact - 1)[6:].max() for b in bodies)
+    computed, polynomials = ((b.frequencies(12)[6:] / exact[6:] - 1).max() for b in bodies)
     assert computed < 0.01 * polynomials
 
 

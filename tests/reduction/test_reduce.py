@@ -13,7 +13,7 @@ import rom
 from cases.files import border_calls as made
 from cases.paths import ROOT
 from cases.refusals import refuses
-from cases.solid import block, reduced
+from cases.solid import KINDS, block, reduced
 from rom.body.reference import rigid_elastic, rigid_mass
 from rom.eigen.scipy import SciPyOperators
 from rom.eigen.verbs import mean_motion, rigid_motions
@@ -22,7 +22,6 @@ from rom.reduction.full_model import operators
 from rom.reduction.interfaces.connection import connect
 from rom.rows import N_COMPARED
 
-KINDS = {"root": "rbe2", "tip": "rbe2"}
 SUPPORTS = [(), ("root",), ("tip",)]
 
 
@@ -243,25 +242,19 @@ def test_messages_for_wrong_interfaces(model, body):
     twin = rom.Interface("twin", one.nodes[:3], one.points[:3], surface, one.origin)
     shared = replace(model, interfaces={"root": one, "twin": twin})
     other = replace(model, interfaces=model.interfaces | {"hub": model.interfaces["tip"]})
-
-    def between(interfaces, of=model):
-        return lambda: reduced(3, of, interfaces=interfaces)
-
-    for call, error, words in (
-        (lambda: rom.modes(model, 3, fixed="tipp"), InterfaceError,
-         r"model has no interface 'tipp'; it has \['root', 'tip'\]"),
-        (between("rbe2"), ConfigError, "interfaces = 'rbe2' must be a dictionary"),
-        (between({"root": "rbe4"}), ConfigError, "kind 'rbe4'; known kinds"),
-        (lambda: body.frequencies(fixed="toe"), InterfaceError, "'body' has no interface 'toe'"),
-        (lambda: body.with_reference(3), ConfigError, "not a reference condition"),
-        (lambda: body.with_reference(("root", "root")), ModelError, "lie in the same point"),
-        (between({}), ConfigError, "needs interfaces, and none"),
-        (lambda: connect(operators(other), other, {"hub": "rbe2"}), InterfaceError,
-         "'hub' of the model calls itself 'tip'"),
-        (between({"root": "rbe2", "twin": "rbe2"}, shared), InterfaceError,
-         "'root' and 'twin' share 3 nodes"),
-    ):  # fmt: skip
-        refuses(error, words, call)
+    for interfaces, of, error, words in (
+        ("rbe2", model, ConfigError, "interfaces = 'rbe2' must be a dictionary"),
+        ({"root": "rbe4"}, model, ConfigError, "kind 'rbe4'; known kinds"),
+        ({}, model, ConfigError, "needs interfaces, and none"),
+        ({"root": "rbe2", "twin": "rbe2"}, shared, InterfaceError, "'root' and 'twin' share 3"),
+    ):
+        refuses(error, words, reduced, 3, of, interfaces=interfaces)
+    hub, missing = {"hub": "rbe2"}, r"model has no interface 'tipp'; it has \['root', 'tip'\]"
+    refuses(InterfaceError, missing, rom.modes, model, 3, fixed="tipp")
+    refuses(InterfaceError, "'hub' of the model calls", connect, operators(other), other, hub)
+    refuses(InterfaceError, "'body' has no interface 'toe'", body.frequencies, fixed="toe")
+    refuses(ConfigError, "not a reference condition", body.with_reference, 3)
+    refuses(ModelError, "lie in the same point", body.with_reference, ("root", "root"))
 
 
 def test_messages_for_wrong_methods_attachments_and_operators_without_geometry(model):

@@ -5,11 +5,10 @@ import pytest
 
 import rom
 from cases.refusals import refused, refuses
-from cases.solid import block, reduced
+from cases.solid import KINDS, STEEL, block, reduced
 from rom.errors import ConfigError
 from rom.reduction.bases.method import judged_in
 
-KINDS = {"root": "rbe2", "tip": "rbe2"}
 BODIES = [  # size [m], cells
     ((1.0, 0.1, 0.08), (10, 2, 2)), ((1.0, 0.3, 0.05), (10, 4, 2)), ((0.3, 0.3, 0.3), (4, 4, 4)),
     ((1.0, 0.05, 0.05), (16, 1, 1)), ((0.6, 0.4, 0.02), (8, 6, 1)), ((0.2, 0.5, 0.1), (3, 6, 2)),
@@ -85,7 +84,7 @@ def meshed(size, cells):
     from rom.fe.elasticity import assemble
 
     mesh, tags = box(size, cells)
-    return assemble(mesh, None, tags, material=rom.Material(E=210e9, nu=0.3, rho=7850.0))
+    return assemble(mesh, None, tags, material=STEEL)
 
 
 @pytest.mark.fenicsx

@@ -103,14 +103,10 @@ def test_a_mode_withheld_is_found_also_one_of_three_that_share_a_frequency(probl
     assert (V.T @ problem[2] @ V) / (MASS * V.T @ V) < sigma
 
 
-def test_nothing_missing_is_said_with_its_probability(problem):
-    said, *_ = verdict(problem, [])
-    assert said.direction is None
-    assert 0.0 < said.chance < 1e-9
-
-
 def test_the_probability_follows_its_formula(problem, monkeypatch):
     """After ten steps, by numbers of its own: Chebyshev's polynomial by NumPy."""
+    said, *_ = verdict(problem, [])  # nothing is missing
+    assert said.direction is None and 0.0 < said.chance < 1e-9
     monkeypatch.setattr(module, "MAX_STEPS", 10)
     monkeypatch.setattr(module, "LEAST_SHARE", 1e7)  # so that the bound is below one
     ops, inverse, K, P = problem
@@ -150,10 +146,13 @@ def test_a_missed_mode_is_taken_in_and_a_search_that_goes_on_missing_has_failed(
     problem, monkeypatch
 ):
     forgetful(monkeypatch, 1)
-    search = found(problem, 11)
+    search, taken, take = found(problem, 11), [], BlockSearch._take
+    monkeypatch.setattr(BlockSearch, "_take", lambda self, X: taken.append(X) or take(self, X))
     assert not np.allclose(search.theta[:11], eigenvalues()[:11])
     assert search.prove() < 1e-9
     assert_allclose(search.theta[:11], eigenvalues()[:11], rtol=1e-12)
+    v = taken[0][:, -1]  # stands in the block
+    assert (v @ problem[2] @ v) / (MASS * v @ v) < eigenvalues()[11]
     forgetful(monkeypatch, 100)
     refuses(ModesMissedError, "after 3 modes that were missed below", found(problem, 11).prove)
 
@@ -219,15 +218,6 @@ def test_loads_are_independent_of_the_search_and_as_heavy_as_the_mass(problem, m
     for columns in (both, both**2):  # lengths and angles of normal numbers
         alike = np.corrcoef(columns, rowvar=False) - np.eye(search.width + 4)
         assert np.abs(alike).max() < 6.0 / np.sqrt(EDGE**3)
-
-
-def test_what_was_missed_stands_in_the_block(problem, monkeypatch):
-    forgetful(monkeypatch, 1)
-    search, taken, take = found(problem, 11), [], BlockSearch._take
-    monkeypatch.setattr(BlockSearch, "_take", lambda self, X: taken.append(X) or take(self, X))
-    search.prove()
-    v = taken[0][:, -1]
-    assert (v @ problem[2] @ v) / (MASS * v @ v) < eigenvalues()[11]
 
 
 def test_directions_that_depend_on_others_are_dropped(problem):

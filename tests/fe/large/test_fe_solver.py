@@ -5,12 +5,11 @@ import pytest
 import rom
 from cases.long import ROM_LONG
 from cases.refusals import refuses
-from cases.solid import STEEL, reduced
+from cases.solid import KINDS, STEEL, reduced
 from rom.errors import ConfigError, InterfaceError, SolverError
 from rom.reduction.full_model import operators
 
 pytestmark = pytest.mark.fenicsx
-KINDS = {"root": "rbe2", "tip": "rbe2"}
 SOLVERS = ["low-rank", "out-of-core", "iterative", *["low-rank:1e-3"] * ROM_LONG]
 BEAM = {"L": 1.0, "b": 0.2, "h": 0.1, "lc": 0.045}
 

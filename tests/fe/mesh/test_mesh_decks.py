@@ -12,6 +12,7 @@ from cases.files.damage import changed, damaged, outcome
 from cases.files.random_decks import CARDS, KEYWORDS, SIZE, random_deck
 from cases.long import few
 from cases.refusals import refuses
+from cases.solid import STEEL
 from rom.decks.bulk import cards
 from rom.errors import FileFormatError, MeshError, ResourceError, RomError, RomWarning, TagError
 from rom.fe.mesh import child
@@ -341,10 +342,9 @@ def test_every_card_that_would_be_lost_is_refused_by_name(name, tmp_path):
 
 def test_a_piece_of_a_ring_weighs_what_it_does(tmp_path):
     (tmp_path / "ring.inp").write_text(RING)
-    steel = rom.Material(E=210e9, nu=0.3, rho=7850.0)
     pytest.importorskip("dolfinx", reason="dolfinx is not installed")
     with pytest.warns(rom.errors.RomWarning, match="1 nodes belong to no solid .* 99; check"):
-        model = rom.fe.model(tmp_path / "ring.inp", material=steel, degree=1)
+        model = rom.fe.model(tmp_path / "ring.inp", material=STEEL, degree=1)
     area = 0.5 * (0.1**2 - 0.08**2) * np.sin(np.radians(ARC))
     assert model.mass() == pytest.approx(7850 * area * 0.03, rel=1e-12)
 
@@ -371,8 +371,6 @@ test_what_is_wrong_with_a_card_is_named = changed(
     ("$", "INCLUDE 'deck.bdf'", "include each other too deep"),
     error=RomError,
 )  # fmt: skip
-
-
 PART = "*PART, NAME=a\n" + RING.partition("*NODE\n")[0] + "*END PART\n"
 ONE, TWO = ("*INSTANCE, NAME=a-1, PART=a\n*END INSTANCE\n", "*INSTANCE, NAME=a-2, PART=a\n")
 TRUSS = "*ELEMENT, TYPE=T3D2, ELSET=e\n9, 1, 2\n"

@@ -6,15 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from cases.files.step_parts import (
-    SHIFT,
-    TURN_ANGLE,
-    TURN_AXIS,
-    in_inches,
-    step_box,
-    step_part,
-    step_plate,
-)
+from cases.files import step_parts
+from cases.files.step_parts import step_box, step_part, step_plate
 from cases.paths import ROOT
 from cases.refusals import refuses
 from rom.errors import ConfigError, MeshError, TagError
@@ -35,14 +28,14 @@ def parts(tmp_path_factory):
     folder = tmp_path_factory.mktemp("parts")
     step_plate(folder / "plate.step")
     step_plate(folder / "turned.step", turned=True)
-    in_inches(folder / "plate.step", folder / "inches.step")
+    step_parts.in_inches(folder / "plate.step", folder / "inches.step")
     return folder
 
 
 def turned(x):
     """A place of the plate [m] after the turn and the shift of the whole."""
-    axis = np.array(TURN_AXIS) / np.linalg.norm(TURN_AXIS)
-    return matrix(exp(TURN_ANGLE * axis)) @ x + 1e-3 * np.array(SHIFT)
+    axis = np.array(step_parts.TURN_AXIS) / np.linalg.norm(step_parts.TURN_AXIS)
+    return matrix(exp(step_parts.TURN_ANGLE * axis)) @ x + 1e-3 * np.array(step_parts.SHIFT)
 
 
 def listed(path, **options):
@@ -206,9 +199,7 @@ def test_the_axis_of_a_bore_is_that_of_the_drawing(parts, file, scale):
     mesh = read_mesh(parts / f"{file}.step", parameters={"lc": 0.02 * scale}, faces=faces)
     assert set(mesh.axes) == {"small", "large"}
     if file != "turned":
-        assert_allclose(
-            np.ptp(mesh.points, axis=0), np.multiply(scale, (0.1, 0.06, 0.01)), rtol=1e-9
-        )
+        assert_allclose(np.ptp(mesh.points, axis=0) / scale, (0.1, 0.06, 0.01), rtol=1e-9)
     for name, x, r in (("small", 0.03, 0.006), ("large", 0.07, 0.01)):
         axis = mesh.axes[name]
         exact = scale * place([x, 0.03, 0.005])

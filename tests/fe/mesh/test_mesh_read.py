@@ -18,7 +18,6 @@ from rom.fe.mesh.sources.gmsh_session import session
 
 gmsh = pytest.importorskip("gmsh", reason="gmsh is not installed")
 pytestmark = pytest.mark.fenicsx
-
 MESHES = ROOT / "meshes"
 TWO_BODIES = """
 SetFactory("OpenCASCADE");
@@ -232,8 +231,6 @@ test_wrong_options_are_refused = refused(
     (beam(faces={"pin": (0, 0, 0)}), "'pin'"),
     error=ConfigError,
 )
-
-
 PIN = """
 SetFactory("OpenCASCADE");
 Cylinder(1) = {0, 0, 0, 0, 0, %g, %g};
