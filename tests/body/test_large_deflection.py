@@ -414,7 +414,7 @@ def test_ranges_that_are_none_or_out_of_all_proportion_are_refused():
     spun = {"loads": {}, "spin": (0, 0, 1), "about": (0, 0)}
     loads = ({"tip": x} for x in ((1, 2, 3), (0,) * 6, (0, np.nan, 0, 0, 0, 0)))
     for wrong in ({"loads": {}}, {"about": (0, 0, 1)}, spun, *({"loads": x} for x in loads)):
-        refuses(ConfigError, "", rom.Geometric, **usual | wrong)
+        refuses(ConfigError, None, rom.Geometric, **usual | wrong)
     far = ((0, 1e140, 0, 0, 0, 0), 0), ((0, 0, 0, 1e20, 0, 0), 0), ((1, 0, 0, 0, 0, 0), 1e60)
     said = "no stable equilibrium|compresses the material"
     for load, spin in far:

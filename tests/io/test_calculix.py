@@ -124,8 +124,8 @@ def test_a_body_goes_to_abaqus_and_comes_back(tmp_path):
     # readers of such files put the comments together: a line that goes on ends in a comma
     comments = "".join(line[2:] for line in lines if line.startswith("**")).split("NODES")[1]
     assert [int(word) for word in comments.split(",")] == [1, 2, 1001, 1002, 1003]
-    mixed = [[1, 1], [2, 1], [1, 2]], path, {}
-    refuses(ConfigError, "node by node", write_user_element, {"MASS": np.eye(3)}, *mixed)
+    mixed = {"MASS": np.eye(3)}, [[1, 1], [2, 1], [1, 2]], path
+    refuses(ConfigError, "node by node", write_user_element, *mixed, nodes={})
 
 
 test_a_damaged_user_element_is_named = changed(

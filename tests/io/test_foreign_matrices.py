@@ -331,9 +331,9 @@ def test_what_is_no_matrix_market_is_named(tmp_path):
         ("coordinate pattern general", "2 2 1\n1 1\n", "not real"),
         ("coordinate complex general", "1 1 1\n1 1 1 1\n", "not real"),
         ("cordinate real general", "2 2 1\n1 1 1\n", "'cordinate real general' is unknown"),
-        ("coordinate real general", "3 3 999999999999\n1 1 1.0\n", ""),
-        ("coordinate real general", "999999999 999999999 1\n1 1 1.0\n", ""),
-        ("coordinate real general", "-1 3 x\n1 1 1.0\n", ""),
+        ("coordinate real general", "3 3 999999999999\n1 1 1.0\n", "A.mtx"),
+        ("coordinate real general", "999999999 999999999 1\n1 1 1.0\n", "A.mtx"),
+        ("coordinate real general", "-1 3 x\n1 1 1.0\n", "A.mtx"),
     ):
         (tmp_path / "A.mtx").write_text(f"%%MatrixMarket matrix {head}\n{rest}")
         refuses(FileFormatError, message, read_matrix, tmp_path / "A.mtx")
@@ -355,4 +355,4 @@ def test_files_cut_between_two_lines_are_no_model(brick, ending, tmp_path):
         for n in np.random.default_rng(k).integers(1, len(lines), 12):
             cut.write_text("".join(lines[:n]))
             files = ((cut, M), (K, cut))[k]
-            refuses(rom.RomError, "", read_model, *files, nodes=nodes, interfaces=SIDES)
+            refuses(rom.RomError, None, read_model, *files, nodes=nodes, interfaces=SIDES)

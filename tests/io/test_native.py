@@ -84,7 +84,7 @@ WRONG_MEMBERS = [
     ("K.npy", npy(np.eye(2)), FileFormatError, "'K' was changed after writing"),
     ("K.npy", npy(np.eye(3))[:-8], FileFormatError, "cut|claims"),
     ("K.npy", b"not an array", FileFormatError, "broken header"),
-    ("K.npy", TERABYTES, (UnsafeFileError, FileFormatError), ""),  # before memory is taken
+    ("K.npy", TERABYTES, (UnsafeFileError, FileFormatError), "x.npz"),  # before memory is taken
 ]
 
 

@@ -139,8 +139,9 @@ def test_the_certificate_says_where_such_a_body_is_right(model):
 
 
 def test_wrong_wishes_are_refused(model):
-    three = ("root", "tip", "root")
-    refuses(ConfigError, "n_modes = 100000 must .* that supports leave", reduced, model, 10**5)
+    clamped, three = {"reference": "root"}, ("root", "tip", "root")
+    many = "n_modes = 100000 must be .* the dofs that supports leave"
+    refuses(ConfigError, many, reduced, model, 10**5, **clamped)
     refuses(InterfaceError, "'foot'", reduced, model, 2, {"foot": "x"})
     refuses(InterfaceError, "of six motions to the body", reduced, model, 2, {"root": "xyz"})
     refuses(ConfigError, "does not say what the modes", reduced, model, 2, reference=three)
