@@ -188,7 +188,8 @@ def joined(mesh, shift, n_alike=None):
     """A second box, merged with the first where that many coordinates are those of the shift."""
     second, n = mesh.points + shift, len(mesh.points)
     number = np.arange(n) + n
-    for k in np.flatnonzero((second[:, :n_alike] == shift[:n_alike]).all(axis=1) & bool(n_alike)):
+    alike = (second[:, :n_alike] == shift[:n_alike]).all(axis=1)
+    for k in np.flatnonzero(alike) if n_alike else ():
         number[k] = np.flatnonzero(np.abs(mesh.points - second[k]).max(axis=1) < 1e-12)[0]
     points, cells = np.vstack([mesh.points, second]), np.vstack([mesh.cells, number[mesh.cells]])
     return replace(recelled(mesh, cells), points=points, facets={})
