@@ -355,7 +355,7 @@ CUBE = "".join(f"GRID,{k},,{x}\n" for k, x in enumerate(CORNERS, 1))
 CUBE += "CHEXA,1,1,1,2,3,4,5,6\n,7,8\n"
 SYSTEM = ("GRID,1,,", "GRID,1,3,")
 test_what_is_wrong_with_a_card_is_named = changed(
-    lambda: "$\n" + CUBE, "deck.bdf", lambda path: nastran.read(str(path)),
+    f"$\n{CUBE}", "deck.bdf", lambda path: nastran.read(str(path)),
     ("$\nGRID,1,,", "CORD2R,3,,0.,0.,0.,0.,0.,1.\n,0.,0.,2.\nGRID,1,3,", "on a line"),
     (*SYSTEM, "line 2: .* system 3 is not defined"),
     ("$\nGRID,1,,", "CORD1R,3,1,2,3\nGRID,1,3,", "3 is defined by itself"),
