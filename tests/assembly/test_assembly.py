@@ -23,26 +23,19 @@ from rom.model import Interface, Row
 
 @pytest.mark.parametrize("fixed", [(), (ROOT,), (ROOT, ("right", "tip"))])
 def test_two_halves_with_all_modes_are_the_whole(fixed):
-    """Conforming meshes, every dof of the cut kept."""
     names = tuple(interface for _, interface in fixed)
     found = joined("full").frequencies(12, fixed=fixed)
     assert_allclose(found, whole(fixed=names), rtol=1e-8, atol=1e-6)
     assert np.count_nonzero(found == 0.0) == (0 if fixed else 6)
 
 
-def test_shapes_of_both_halves_meet_at_the_cut():
+def test_shapes_meet_at_the_cut_and_are_the_same_when_asked_again_whatever_was_done_to_them():
     assembly = joined("polynomial:2", n_modes=10)
     omega, shapes = assembly.modes(8, fixed=(ROOT,))
-    assert omega.shape == (8,)
     left, right = (assembly.bodies[name] for name in ("left", "right"))
     ends = [left.marker("tip").hold @ shapes["left"], right.marker("root").hold @ shapes["right"]]
     assert_allclose(ends[0], ends[1], atol=1e-9 * np.abs(ends[0]).max())
     assert_allclose(left.marker("root").hold @ shapes["left"], 0, atol=1e-9 * np.abs(ends[0]).max())
-
-
-def test_modes_asked_for_again_are_the_same_whatever_was_done_to_them():
-    """And those with supports are others: they are kept apart."""
-    assembly = joined("polynomial:2", n_modes=10)
     omega, shapes = assembly.modes(8)
     before = omega.copy(), shapes["left"].copy()
     omega[:] = shapes["left"][:] = 7.0
@@ -59,16 +52,6 @@ def test_errors_are_one_sided_and_fall_with_the_order_of_the_functions():
     assert (steps >= exact * (1 - 1e-9)).all()
     assert (np.diff(steps, axis=0) <= 1e-9 * exact).all()
     assert_allclose(steps[-1], exact, rtol=2e-3)
-
-
-def test_meshes_that_do_not_match_are_coupled_by_their_functions():
-    """Two and three cells across the cut: between the whole on either mesh, or 0.1 % above."""
-    coarse, fine = whole((8, 2, 2)), whole((8, 3, 3))
-    assembly = joined("polynomial:2", ((4, 2, 2), (4, 3, 3)), n_modes=40)
-    found = assembly.frequencies(6, fixed=(ROOT,))
-    assert (found > np.minimum(coarse, fine)[:6]).all()
-    assert (found < 1.001 * np.maximum(coarse, fine)[:6]).all()
-    assert (np.abs(fine / coarse - 1)[:6] < 0.1).all()
 
 
 def test_a_chain_of_four_is_coupled_in_any_order():
@@ -137,33 +120,18 @@ def test_certificates_of_an_assembly_and_of_its_few_functions():
     assert poor.quantity == "2 interface functions: worst error of 6 frequencies"
 
 
-def random_row(rng):
-    """Two or three blocks in a row, and the three lowest elastic frequencies of the whole."""
+@pytest.mark.filterwarnings("ignore:.*fixed-interface modes are kept")
+@pytest.mark.parametrize("seed", few(1, range(4)))
+def test_enhanced_bodies_are_wrong_in_assemblies_and_that_is_said(seed):
+    """Their correction is that of one body. Two or three blocks in a row."""
+    rng = np.random.default_rng(seed)
     height, width, step = rng.uniform(0.05, 0.15, 3)
     cells = rng.integers(4, 7, rng.integers(2, 4))
     ends = np.r_[0, np.cumsum(cells)] * step
     parts = [block((n * step, height, width), (n, 2, 2), origin=(x, 0, 0))
              for n, x in zip(cells, ends[:-1], strict=True)]  # fmt: skip
     whole = block((ends[-1], height, width), (cells.sum(), 2, 2))
-    return parts, rom.modes(whole, 9).frequencies[6:]
-
-
-def in_a_row(parts, method):
-    bodies, couplings = {}, []
-    for i, part in enumerate(parts):
-        touched = (["root"] if i else []) + (["tip"] if i < len(parts) - 1 else [])
-        kinds = dict.fromkeys(touched, "full")
-        bodies[f"part {i}"] = rom.reduce(part, method=method, interfaces=kinds, certify=False)
-        if i:
-            couplings.append(((f"part {i - 1}", "tip"), (f"part {i}", "root")))
-    return rom.Assembly(bodies, tuple(couplings))
-
-
-@pytest.mark.filterwarnings("ignore:.*fixed-interface modes are kept")
-@pytest.mark.parametrize("seed", few(1, range(4)))
-def test_enhanced_bodies_are_wrong_in_assemblies_and_that_is_said(seed):
-    """Their correction is that of one body."""
-    parts, full = random_row(np.random.default_rng(seed))
+    full = rom.modes(whole, 9).frequencies[6:]
 
     def error(method):
         return np.abs(in_a_row(parts, method).frequencies()[6:9] / full - 1).max()
@@ -175,6 +143,17 @@ def test_enhanced_bodies_are_wrong_in_assemblies_and_that_is_said(seed):
         enhanced = error(rom.EnhancedCraigBampton(8))
     plain = error(rom.CraigBampton(8))
     assert moments < 1e-4 and moments < plain < 5e-3 and 5 * plain < enhanced
+
+
+def in_a_row(parts, method):
+    bodies, couplings = {}, []
+    for i, part in enumerate(parts):
+        touched = (["root"] if i else []) + (["tip"] if i < len(parts) - 1 else [])
+        kinds = dict.fromkeys(touched, "full")
+        bodies[f"part {i}"] = rom.reduce(part, method=method, interfaces=kinds, certify=False)
+        if i:
+            couplings.append(((f"part {i - 1}", "tip"), (f"part {i}", "root")))
+    return rom.Assembly(bodies, tuple(couplings))
 
 
 COARSE, FINE = (4, 2, 2), (4, 3, 3)
@@ -190,14 +169,11 @@ def turned(model, name, order):
 
 def bare(interface):
     """A full interface whose coordinates are its displacements."""
-    n = interface.dofs.size
-    none = np.zeros((3, n))
-    patch = Patch(interface.points, interface.surface_mass)
-    return Marker("s", interface.origin, none, none, "full", np.eye(n), patch)
+    n, patch = interface.dofs.size, Patch(interface.points, interface.surface_mass)
+    return Marker("s", interface.origin, *np.zeros((2, 3, n)), "full", np.eye(n), patch)
 
 
 def right_half(model, kind, n_modes=10):
-    """The body of a model of the right half, in place of the one of `half`."""
     return reduced(n_modes, model, interfaces={"root": kind, "tip": "rbe2"})
 
 
@@ -270,18 +246,13 @@ def test_equal_coefficients_mean_that_moments_of_the_difference_vanish():
     assert_allclose(mix @ moments[1], B, atol=1e-10 * np.abs(A).max())
 
 
-def test_a_projection_changes_nothing_where_nodes_match():
-    bodies = halves("full", n_modes=10)
-    exact = rom.Assembly(bodies, COUPLED)
-    projected = rom.Assembly(bodies, COUPLED, projection=rom.Polynomial(1))
-    assert projected.n_conditions == exact.n_conditions == (27,)
-    assert_allclose(projected.frequencies(12), exact.frequencies(12), rtol=1e-12)
-
-
 def test_moments_tend_from_below_to_coupling_node_by_node(monkeypatch):
-    """The same matching meshes, once with and once without knowing it."""
+    """The same matching meshes, once with, where a projection is none, once without knowing it."""
     bodies = halves("full", n_modes=20)
+    projected = rom.Assembly(bodies, COUPLED, projection=rom.Polynomial(1))
+    assert projected.n_conditions == rom.Assembly(bodies, COUPLED).n_conditions == (27,)
     exact = rom.Assembly(bodies, COUPLED).frequencies(10, fixed=(ROOT,))
+    assert_allclose(projected.frequencies(10, fixed=(ROOT,)), exact, rtol=1e-12)
     monkeypatch.setattr("rom.assembly.coupling._same_nodes", lambda *_: None)
     pairs = [rom.Assembly(bodies, COUPLED, projection=rom.Polynomial(p)) for p in (1, 2, 3, 4)]
     found = np.array([pair.frequencies(10, fixed=(ROOT,)) for pair in pairs])
@@ -293,16 +264,18 @@ def test_moments_tend_from_below_to_coupling_node_by_node(monkeypatch):
 
 
 def test_meshes_that_do_not_match_lie_between_the_matching_ones():
-    coarse, fine = whole((8, 2, 2)), whole((8, 3, 3))
+    coarse, fine = whole((8, 2, 2))[:6], whole((8, 3, 3))[:6]
+    low, high = np.minimum(coarse, fine), np.maximum(coarse, fine)
+    assert (np.abs(fine / coarse - 1) < 0.1).all()
+    by_functions = joined("polynomial:2", (COARSE, FINE), n_modes=40)
+    found = by_functions.frequencies(6, fixed=(ROOT,))
+    assert (found > low).all() and (found < 1.001 * high).all()
     bodies = halves("full", (COARSE, FINE), n_modes=40)
-    found = np.array([
-        rom.Assembly(bodies, COUPLED, projection=rom.Polynomial(p)).frequencies(6, fixed=(ROOT,))
-        for p in (1, 2, 3, 4, 6)
-    ])  # fmt: skip
+    pairs = [rom.Assembly(bodies, COUPLED, projection=rom.Polynomial(p)) for p in (1, 2, 3, 4, 6)]
+    found = np.array([pair.frequencies(6, fixed=(ROOT,)) for pair in pairs])
     # also beyond the degrees that three nodes along a side can tell apart
     assert_allclose(found[2:], found[[1, 1, 1]], rtol=1e-3)
-    assert (found > np.minimum(coarse, fine)[:6] * 0.999).all()
-    assert (found < np.maximum(coarse, fine)[:6] * 1.001).all()
+    assert (found > low * 0.999).all() and (found < high * 1.001).all()
 
 
 def test_a_free_assembly_of_meshes_that_do_not_match_moves_rigidly():
@@ -335,8 +308,8 @@ def test_functions_of_unequal_surfaces_need_a_projection():
     model = replace(model, interfaces=model.interfaces | {"root": wider})
     bodies = {"left": half("left", "polynomial:2", n_modes=10)}
     bodies["right"] = right_half(model, "polynomial:2")
-    with pytest.raises(InterfaceError, match=r"has 9 nodes, .* has 16, .* polynomial:2 coord"):
-        rom.Assembly(bodies, COUPLED)
+    said = r"has 9 nodes, .* has 16, .* polynomial:2 coord"
+    refuses(InterfaceError, said, rom.Assembly, bodies, COUPLED)
     expected = joined("polynomial:2", (COARSE, FINE), n_modes=10).frequencies(8, fixed=(ROOT,))
     pair = rom.Assembly(bodies, COUPLED, projection=rom.Polynomial(2))
     assert_allclose(pair.frequencies(8, fixed=(ROOT,)), expected, rtol=1e-3)
@@ -358,18 +331,17 @@ def test_a_saved_body_is_coupled_like_the_one_it_was(tmp_path):
 
 
 def test_messages_for_surfaces_that_do_not_meet():
-    left, right = half("left", "full", COARSE, 4), half("right", "full", FINE, 4)
-    with pytest.raises(InterfaceError, match=r"has 9 nodes, .* has 16, and they do not coincide"):
-        rom.Assembly({"left": left, "right": right}, COUPLED)
-    with pytest.raises(ConfigError, match="projection = 4 gives no functions"):
-        rom.Assembly({"left": left, "right": right}, COUPLED, projection=4)
+    bodies = halves("full", (COARSE, FINE), n_modes=4)
+    said = "has 9 nodes, .* has 16, and they do not coincide"
+    refuses(InterfaceError, said, rom.Assembly, bodies, COUPLED)
+    refuses(ConfigError, "projection = 4 gives no", rom.Assembly, bodies, COUPLED, projection=4)
     for size, origin, words in (
         ((0.5, 0.1, 0.08), (0.5, 0.02, 0), r"lie 0\.02 m apart"),
         ((0.5, 0.12, 0.1), (0.5, -0.01, -0.01), r"area of 0\.008, .* of 0\.012: they do not cover"),
     ):
-        other = right_half(block(size=size, cells=FINE, origin=origin), "full", 4)
-        with pytest.raises(InterfaceError, match=words):
-            rom.Assembly({"left": left, "right": other}, COUPLED, projection=rom.Polynomial(2))
+        bodies["right"] = right_half(block(size=size, cells=FINE, origin=origin), "full", 4)
+        by = {"projection": rom.Polynomial(2)}
+        refuses(InterfaceError, words, rom.Assembly, bodies, COUPLED, **by)
 
 
 @pytest.mark.long

@@ -18,8 +18,7 @@ from rom.reduction.interfaces.connection import connect
 
 
 def half(side, cells=(5, 2, 2)):
-    origin = (0.0 if side == "left" else 0.5, 0.0, 0.0)
-    return block(size=(0.5, 0.1, 0.08), cells=cells, origin=origin)
+    return block((0.5, 0.1, 0.08), cells, origin=(0.0 if side == "left" else 0.5, 0.0, 0.0))
 
 
 def joined(n_modes, make=None, inner="full", cells=(5, 2, 2)):
@@ -77,7 +76,6 @@ def test_a_dual_assembly_has_as_many_negative_eigenvalues_as_forces():
 
 
 def test_a_certificate_tells_good_from_missing_and_wrong():
-    """Each body with one interface held, and both kinds of interfaces against each other."""
     assembly = joined(8)
     report = assembly.certificate
     assert report.ok and report is assembly.certificate  # computed once
@@ -88,20 +86,18 @@ def test_a_certificate_tells_good_from_missing_and_wrong():
     found = {row.quantity: row.value for row in report.rows}
     assert_allclose(found["left: tip held: worst error of 6 frequencies"], error.max(), rtol=1e-4)
     left = assembly.bodies["left"]
-    assert not replaced(assembly, replace(left, certificate=None)).certificate.ok
-    weak = replaced(assembly, replace(left, mass=100 * left.mass)).certificate
+    unknown, weak = (
+        rom.DualAssembly(assembly.bodies | {"left": other}, assembly.couplings).certificate
+        for other in (replace(left, certificate=None), replace(left, mass=100 * left.mass))
+    )
+    assert not unknown.ok
     assert [row.quantity.partition(":")[0] for row in weak.failures] == ["dual"]
     kinds = {"root": "rbe2", "tip": "full"}
     poor = rom.substructure(half("left"), n_modes=1, interfaces=kinds).certificate
     assert not poor.ok and all("worst error" in row.quantity for row in poor.failures)
 
 
-def replaced(assembly, left):
-    return rom.DualAssembly(assembly.bodies | {"left": left}, assembly.couplings)
-
-
 def test_without_residual_mass_forces_are_those_of_macneal():
-    """Eliminating the forces of a dual assembly without residual mass gives MacNeal's matrices."""
     assembly = joined(6)
     K, M = assembly.matrices(kind="dual", fixed=(ROOT,))
     n = 2 * (6 + 6)
@@ -137,8 +133,8 @@ def test_messages():
     assembly = joined(4)
     refuses(ConfigError, "none of 'macneal', 'rubin', 'dual'", assembly.frequencies, kind="craig")
     refuses(ConfigError, "no body 'middle'", assembly.frequencies, fixed=(("middle", "root"),))
-    with pytest.raises(InterfaceError, match="has no interface 'side'"):
-        assembly.frequencies(fixed=(("left", "side"),))
+    side = {"fixed": (("left", "side"),)}
+    refuses(InterfaceError, "has no interface 'side'", assembly.frequencies, **side)
     for end, says in (("tip", r"27 coordinates and .* has 6"), ("root", "lie 1 m apart")):
         couplings = ((("left", end), ("right", "tip")),)
         refuses(InterfaceError, says, rom.DualAssembly, assembly.bodies, couplings)

@@ -18,15 +18,12 @@ from rom.assembly.pieces import Tree, together
 from rom.checks.glued import GluedSolid
 from rom.errors import ConfigError, InterfaceError, ModelError
 
-pytest.importorskip("dolfinx", reason="dolfinx is not installed")
-pytest.importorskip("gmsh", reason="gmsh is not installed")
 pytestmark = COARSE
 E, THICK = 210e9, 0.01
 EI = E * THICK**4 / 12
 
 
 def beam(n, cells, *, nu=0.0, thick=THICK):
-    """Models of the pieces of a beam 1 m long along x."""
     size = {"L": 1.0, "b": thick, "h": thick, "hex": 1, "nx": cells, "ny": 1, "nz": 1}
     material = rom.Material(E=E, nu=nu, rho=7850.0)
     if n == 1:
@@ -35,12 +32,9 @@ def beam(n, cells, *, nu=0.0, thick=THICK):
 
 
 def made(models, load=None, *, n_modes=2, active=2, **options):
-    """Pieces for a load on the tip, not certified."""
     large = load and rom.Geometric(loads={"tip": load}, n_modes=active, **options)
-    method = rom.CraigBampton(n_modes=n_modes)
-    return rom.reduce_pieces(
-        models, reference="root", method=method, nonlinear=large, certify=False
-    )
+    how = {"reference": "root", "nonlinear": large, "certify": False}
+    return rom.reduce_pieces(models, method=rom.CraigBampton(n_modes=n_modes), **how)
 
 
 def clamped(pieces):
@@ -93,6 +87,8 @@ def three():
 def test_frequencies_and_mass_are_those_of_one_body(three):
     """Flexible ones of the cantilever; rigid sections would stiffen the pieces."""
     pieces, models = three
+    mech = rom.Mechanism()
+    refuses(ConfigError, "pieces take no 'q'", pieces.add_to, mech, "beam", q=np.zeros(3))
     whole = beam(1, 12, nu=0.3, thick=0.05)
     assert_allclose(pieces.mass, whole.mass(), rtol=1e-12)
     body = rom.reduce(whole, method=rom.CraigBampton(n_modes=30), reference="root",
@@ -146,7 +142,6 @@ def test_pieces_that_repeat_each_other_are_reduced_once_for_the_largest_of_their
 
 @pytest.fixture(scope="module")
 def halves():
-    """Models of two pieces, their range, and how they are reduced."""
     how = {"reference": "root", "method": rom.CraigBampton(n_modes=4), "certify": False}
     loads = rom.Geometric(loads={"tip": (0, 0, 2 * EI, 0, 0, 0)}, n_modes=2)
     return beam(2, 8, nu=0.3), loads, how
@@ -177,10 +172,7 @@ TURNED = rom.Geometric(loads={"tip": (0, 0, 0.3 * EI, 0, 0.8 * EI, 0)}, n_modes=
 def test_pieces_are_certified_under_moments_that_turn_with_their_section(
     halves, large, snapshots, least, most
 ):
-    """With a force beside it, to a slope of 46 degrees; without states of full models worse.
-
-    Those of small deflection fail.
-    """
+    """With a force beside it, to a slope of 46 degrees; without states of full models worse."""
     models, _, how = halves
     turned = replace(TURNED, snapshots=snapshots)
     pieces = rom.reduce_pieces(models, nonlinear=turned if large else None, **how)
@@ -237,24 +229,21 @@ def test_the_solid_glued_of_pieces_is_the_one_that_was_cut(halves):
     assert_allclose(glued.M.sum(), 3 * whole.mass(), rtol=1e-10)
     shifted = replace(models["2"].interfaces["cut 1"], points=models["2"].points[:25] + 1.0)
     apart = replace(models["2"], interfaces={"cut 1": shifted})
-    with pytest.raises(ModelError, match="do not meet at 'cut 1'"):
-        GluedSolid.of(models | {"2": apart}, {"cut 1": ("1", "2")})
+    glue = models | {"2": apart}, {"cut 1": ("1", "2")}
+    refuses(ModelError, "do not meet at 'cut 1'", GluedSolid.of, *glue)
 
 
-@pytest.mark.parametrize(
-    "change, says",
-    [
-        ({"spin": (0, 0, 3.0)}, "certified for loads on interfaces; the range has 'omega_z"),
-        ({"fixed": ("tip",)}, "holds .*'tip'"),
-        ({"loads": {"cut 1": (1.0, 0, 0, 0, 0, 0)}}, "names 'cut 1'"),
-        ({}, "the models are '1', the pieces '1', '2'"),
-    ],
-)
-def test_pieces_are_certified_for_what_the_whole_can_bear_too(halves, change, says):
+def test_pieces_are_certified_for_what_the_whole_can_bear_too(halves):
     models, loads, how = halves
     pieces = rom.reduce_pieces(models, **how)
-    few = {"1": models["1"]} if not change else models
-    refuses(ConfigError, says, rom.certify_pieces, pieces, few, nonlinear=replace(loads, **change))
+    for given, change, says in (
+        (models, {"spin": (0, 0, 3.0)}, "loads on interfaces; the range has 'omega_z"),
+        (models, {"fixed": ("tip",)}, "holds .*'tip'"),
+        (models, {"loads": {"cut 1": (1.0, 0, 0, 0, 0, 0)}}, "names 'cut 1'"),
+        ({"1": models["1"]}, {}, "the models are '1', the pieces '1', '2'"),
+    ):
+        other = replace(loads, **change)
+        refuses(ConfigError, says, rom.certify_pieces, pieces, given, nonlinear=other)
 
 
 def drift_of_spin(pieces, dt):
@@ -325,11 +314,6 @@ def test_pieces_that_make_no_body_are_refused_by_name():
         refuses(error, says, call, *given)
     how = {"reference": "root", "interfaces": {"hub": "rbe3"}}
     refuses(InterfaceError, "no interface 'hub'", rom.reduce_pieces, models, **how)
-
-
-def test_a_mechanism_takes_pieces_as_one_body_only(three):
-    mech, q = rom.Mechanism(), np.zeros(3)
-    refuses(ConfigError, "pieces take no 'q'", three[0].add_to, mech, "beam", q=q)
 
 
 @pytest.mark.mpi

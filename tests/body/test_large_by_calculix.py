@@ -14,8 +14,8 @@ from scipy.spatial import cKDTree
 
 import rom
 from cases.mbs.slender import cantilever
+from cases.solid import reduced
 
-pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = [
     pytest.mark.fenicsx,
     pytest.mark.skipif(shutil.which("ccx") is None,
@@ -67,9 +67,9 @@ def test_an_angle_bends_and_twists_as_in_calculix(tmp_path):
     path = tmp_path / "angle.geo"
     path.write_text(ANGLE)
     model = rom.fe.model(path, material=ALUMINIUM)
-    ends, loads = {"root": "rbe2", "tip": "rbe3"}, {"tip": (*np.sqrt(2) * FORCE, 0, 0, 0)}
-    body = rom.reduce(model, method=rom.CraigBampton(6), interfaces=ends, reference="root",
-                      nonlinear=rom.Geometric(loads=loads))  # fmt: skip
+    far = rom.Geometric(loads={"tip": (*np.sqrt(2) * FORCE, 0, 0, 0)})
+    how = {"interfaces": {"root": "rbe2", "tip": "rbe3"}, "reference": "root", "certify": True}
+    body = reduced(6, model, nonlinear=far, **how)
     states = body.equilibria({"tip": (*FORCE, 0, 0, 0)}, shares=SHARES)
     ours = states @ body.marker("tip").translation.T
     theirs = by_calculix(tmp_path, path, model.interfaces["tip"])

@@ -6,13 +6,11 @@ import numpy as np
 import pytest
 
 import rom
-from cases.solid import block, reduced
+from cases.solid import STEEL, block, reduced
 from rom.process.stopwatch import FACTORISATION_PIECE as FACTORS
 from rom.process.stopwatch import FLOPS_NOTE, MISS_NOTE, REST_PIECE, piece, stopwatch
 from rom.report.pages import _stages
-from rom.workflow import Draft, stages
 
-ENDS = {"root": "rbe2", "tip": "rbe2"}
 STAGES = ["interfaces", "shapes", "energies", "body", "comparison"]
 
 
@@ -54,30 +52,7 @@ def test_time_after_an_error_belongs_to_what_was_under_way():
     assert set(watch.table()) == {"one"}
 
 
-@pytest.mark.parametrize("asked, added", [
-    ({}, ""),
-    ({"method": rom.AssumedModes(3)}, "obey_reference"),
-    ({"method": rom.Characteristic(rom.CraigBampton(4), 8)}, "few_functions"),
-    ({"stress": True, "damping": rom.Rayleigh(beta=1e-5)}, "recover damp"),
-    ({"interfaces": {"root": rom.Polynomial(), "tip": "rbe2"}}, "choose_orders"),
-])  # fmt: skip
-def test_method_and_options_add_stages(asked, added):
-    road = stages(Draft(**({"model": block(), "interfaces": ENDS} | asked)))
-    names = [stage.__name__ for stage in road]
-    plain = ["connect", "basis", "project", "make_body", "place_frame", "certify"]
-    assert [name for name in names if name not in added.split()] == plain
-    assert set(names) == {*plain, *added.split()} and all(stage.__doc__ for stage in road)
-
-
-def test_large_deflection_has_stages_of_its_own():
-    draft = Draft(model=block(), interfaces=ENDS, certify=False,
-                  nonlinear=rom.Geometric(loads={"tip": (0, 1.0, 0, 0, 0, 0)}))  # fmt: skip
-    road = {stage.__name__: stage.__module__ for stage in stages(draft)}
-    assert list(road) == ["connect", "basis", "enrich", "project", "make_body", "place_frame"]
-    assert road["place_frame"] == road["enrich"] == "rom.stages.deflection"
-
-
-def test_a_body_says_where_its_time_went():
+def test_a_body_its_file_and_its_report_say_where_its_time_went(tmp_path):
     """Stages in their order; together they are the time it took."""
     assert list(reduced(4, block()).provenance["stages"]) == STAGES[:-1]
     start = time.perf_counter()
@@ -91,15 +66,9 @@ def test_a_body_says_where_its_time_went():
     assert stages["shapes"]["number of factorisations"] >= 1
     assert stages["shapes"][FACTORS] < stages["shapes"]["seconds"]
     assert all(np.isfinite(list(stage.values())).all() for stage in stages.values())
-
-
-def test_a_body_from_a_file_and_its_report_say_so_too(tmp_path):
-    body = reduced(4, block(), certify=True)
-    rom.save(body, tmp_path / "body.rom.npz")
-    again = rom.load(tmp_path / "body.rom.npz")
-    assert again.provenance["stages"] == body.provenance["stages"]
-    page = "".join(_stages(again.provenance["stages"]))
-    number = body.provenance["stages"]["comparison"]["number of factorisations"]
+    again = rom.load(rom.save(body, tmp_path / "body.rom.npz"))
+    assert again.provenance["stages"] == stages
+    page, number = "".join(_stages(stages)), stages["comparison"]["number of factorisations"]
     for words in ("comparison", "factorisations", f"({number})", "memory [MB]"):
         assert words in page
     assert _stages({}) == []
@@ -110,8 +79,7 @@ def test_pieces_of_a_model_in_petsc_are_counted():
     """Constraint shapes and modes take one factor of the inside, which no count follows."""
     import rom.fe
 
-    model = rom.fe.model("meshes/beam.geo", material=rom.Material(E=210e9, nu=0.3, rho=7850.0))
-    body = reduced(6, model)
+    body = reduced(6, rom.fe.model("meshes/beam.geo", material=STEEL))
     shapes = body.provenance["stages"]["shapes"]
     assert shapes["number of factorisations"] == shapes["ranks"] == 1
     assert 1e6 < shapes[FLOPS_NOTE] < 1e12 and 0.0 <= shapes[MISS_NOTE] < 1e-9

@@ -9,6 +9,7 @@ import rom
 from rom.model import FEModel, Interface, Material, Region, SurfaceMesh
 
 STEEL = Material(E=210e9, nu=0.3, rho=7850.0)
+KINDS = {"root": "rbe2", "tip": "rbe2"}
 GAUSS = np.array([-1.0, 1.0]) / np.sqrt(3.0)
 CORNERS = np.array([[i, j, k] for k in (-1, 1) for j in (-1, 1) for i in (-1, 1)], dtype=float)
 
@@ -60,7 +61,7 @@ def block(size=(1.0, 0.1, 0.08), cells=(8, 2, 2), material=STEEL, origin=(0.0, 0
 
 def reduced(n_modes, model, **how):
     """A model between rigid ends "root" and "tip", with modes of the held one, uncertified."""
-    how = {"interfaces": {"root": "rbe2", "tip": "rbe2"}, "certify": False} | how
+    how = {"interfaces": KINDS, "certify": False} | how
     return rom.reduce(model, method=rom.CraigBampton(n_modes), **how)
 
 

@@ -206,6 +206,21 @@ def model_of(mesh, degree=2, material=None):
                     material=material or rom.Material(E=114e9, nu=0.33, rho=4430.0))  # fmt: skip
 
 
+def tip_of(model):
+    """First dof of a node farthest out."""
+    return 3 * int(np.argmax(np.hypot(*model.points[:, :2].T)))
+
+
+def response_of(sector, modes, force, sweep, *, engine_order, damping, at):
+    """(sweep, sectors, dofs) motion of a wheel, of whose modes all have one damping ratio."""
+    omega, Phi = modes
+    phase = np.exp(1j * engine_order * sector.angle * np.arange(sector.n_sectors))
+    load = Phi.T @ np.kron(phase, force[sector.free])
+    gap = omega**2 - sweep[:, None] ** 2 + 2j * damping * sweep[:, None] * omega
+    rows = np.searchsorted(sector.free, at)
+    return ((load / gap) @ Phi.T).reshape(len(sweep), sector.n_sectors, -1)[:, :, rows]
+
+
 def gathered(sector, n_modes, **speed):
     """All frequencies of a wheel [rad/s], ascending, each as often as the wheel has it."""
     families = [cyclic_modes(sector, n, n_modes, **speed) for n in sector.diameters]

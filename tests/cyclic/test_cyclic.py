@@ -12,7 +12,7 @@ import rom
 from cases.refusals import refuses
 from cases.solid import block
 from cases.wheels import beam_ring, gathered, mass_ring, ring_frequency
-from rom.components.wheels.faces import interpolation, paired
+from rom.components.wheels.faces import interpolation, paired, turned
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Interface
 
@@ -37,7 +37,6 @@ def test_a_thin_ring_vibrates_as_love_says(n):
 
 @pytest.mark.parametrize("N", [2, 5, 6])
 def test_sectors_know_all_frequencies_of_the_wheel(N):
-    """The wheel assembled as a whole, each frequency as often as it should be there."""
     ring = beam_ring(N, per_sector=5, **SOFT)
     K, M = (A.toarray() for A in ring.wheel())
     whole = np.sqrt(np.maximum(eigh(K, M, eigvals_only=True), 0.0))
@@ -63,11 +62,9 @@ def test_shapes_are_modes_of_the_wheel():
 
 
 def test_the_slave_may_be_either_face():
-    """Turned round, low follows high of the sector before."""
     ring = beam_ring(6, per_sector=4, **SOFT)
-    other = replace(
-        ring, slave=ring.master, master=ring.slave, coupling=csr_matrix(ring.coupling.T), step=-1
-    )
+    turned_round = {"slave": ring.master, "master": ring.slave, "step": -1}
+    other = replace(ring, coupling=csr_matrix(ring.coupling.T), **turned_round)
     for n in ring.diameters:
         one, two = (rom.cyclic_modes(r, n, 5).omega for r in (ring, other))
         assert_allclose(one, two, rtol=1e-9, atol=1e-5)
@@ -86,8 +83,6 @@ def test_held_dofs_stay_on_both_faces():
 
 def face(name, angle, n=6, size=(0.1, 0.05), about=Z, at=ORIGIN):
     """A radial face of n x n nodes from radius 0.2, turned about the axis."""
-    from rom.components.wheels.faces import turned
-
     r, z = np.meshgrid(np.linspace(0.2, 0.2 + size[0], n), np.linspace(0.0, size[1], n))
     points = np.column_stack([r.ravel(), 0 * r.ravel(), z.ravel()])
     points = points @ turned(about, np.radians(angle)).T + at
@@ -110,8 +105,6 @@ def test_the_finer_face_follows_the_coarser(finer, angle):
     faces = [face("low", 0.0, n["low"]), face("high", angle, n["high"])]
     pair = paired(*faces, Z, ORIGIN)
     assert (pair.slave.name, pair.matching) == (finer, False)
-    from rom.components.wheels.faces import turned
-
     R = turned(Z, pair.step * np.pi / 6)
     assert_allclose(pair.weights @ pair.master.points @ R.T, pair.slave.points, atol=1e-12)
 
@@ -126,21 +119,15 @@ def test_interpolation_is_exact_for_quadratic_fields_on_any_plane():
     assert_allclose(interpolation(nodes, nodes).toarray(), np.eye(60), atol=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("high", "message"),
-    [
+def test_faces_that_cannot_close_a_wheel_and_wrong_arguments_are_named():
+    for high, message in (
         (face("high", 37.0), r"enclose 37 degrees, .* 360 degrees hold 9\.72973 sectors"),
         (face("high", 0.0), "does not divide the circle"),
         (face("high", 30.0, size=(0.1, 0.08)), "areas are 0.005 and 0.008 m"),
         (face("high", 30.0, at=np.array([0, 0, 0.02])), "do not match"),
         (face("high", 30.0, at=np.array([-0.2 * 0.75**0.5, -0.1, 0])), "lie on the axis"),
-    ],
-)
-def test_faces_that_cannot_close_a_wheel_are_refused(high, message):
-    refuses(InterfaceError, message, lambda: paired(face("low", 0.0), high, Z, ORIGIN))
-
-
-def test_wrong_arguments_are_named():
+    ):
+        refuses(InterfaceError, message, paired, face("low", 0.0), high, Z, ORIGIN)
     ring, model = mass_ring(6), block()
     refuses(ConfigError, "diameter = 4 must", rom.cyclic_modes, ring, 4, 1)
     refuses(ConfigError, "n = 2 must be a whole number from 1 to 1", rom.cyclic_modes, ring, 1, 2)

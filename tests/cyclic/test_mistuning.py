@@ -9,7 +9,7 @@ from scipy.linalg import eigh
 
 import rom
 from cases.refusals import refuses
-from cases.wheels import bladed_model, bladed_ring
+from cases.wheels import bladed_model, bladed_ring, response_of, tip_of
 from rom.components.wheels.blades.mistuning import whitehead
 from rom.errors import ConfigError, ModelError
 
@@ -22,7 +22,6 @@ def spread(rng, shape, width=0.05):
 
 
 def whole_wheel(ring, delta):
-    """Frequencies and modes of the wheel assembled with its own blades."""
     K_j = [ring.K + d * ring.regions["blade"] for d in delta]
     _, M, K = ring.wheel(K_j)
     lam, Phi = eigh(K.toarray(), M.toarray())
@@ -40,30 +39,19 @@ def test_all_families_give_the_whole_wheel(N):
 @pytest.mark.parametrize("order", [0, 2, 3, 11])
 def test_the_response_is_that_of_the_whole_wheel(order):
     """Same modal damping, forces with the phase of the engine order on each blade."""
-    N, zeta = 8, 2e-3
-    ring, delta = bladed_ring(N), spread(np.random.default_rng(1), N, 0.1)
+    ring, delta = bladed_ring(8), spread(np.random.default_rng(1), 8, 0.1)
     sweep = np.array([1.0e3, 5.7e3, 6.1e3, 6.3e3])
-    omega, Phi = whole_wheel(ring, delta)
-    phase = np.exp(1j * order * ring.angle * np.arange(N))
-    load = Phi.T @ np.kron(phase, FORCE[ring.free])
-    gap = omega**2 - sweep[:, None] ** 2 + 2j * zeta * sweep[:, None] * omega
-    exact = ((load / gap) @ Phi.T).reshape(len(sweep), N, -1)[:, :, list(ring.free).index(1)]
-    found = rom.mistuned_wheel(ring, 2).response(
-        delta, FORCE, engine_order=order, omega=sweep, damping=zeta, at=[1]
-    )
-    assert_allclose(found[:, :, 0], exact, rtol=1e-9, atol=1e-12 * abs(exact).max())
+    drive = {"engine_order": order, "damping": 2e-3, "at": [1]}
+    exact = response_of(ring, whole_wheel(ring, delta), FORCE, sweep, **drive)
+    found = rom.mistuned_wheel(ring, 2).response(delta, FORCE, omega=sweep, **drive)
+    assert_allclose(found, exact, rtol=1e-9, atol=1e-12 * abs(exact).max())
 
 
-def test_the_certificate_compares_with_a_wheel_of_other_blades():
+def test_equal_blades_amplify_nothing_and_the_certificate_compares_with_others():
     """All blades 5 % stiffer or softer is again one sector, which is solved without the waves."""
     wheel = rom.mistuned_wheel(bladed_ring(12), 2)
     assert wheel.certificate.ok and len(wheel.certificate.rows) == 4
-    wrong = replace(wheel, blade=0.5 * wheel.blade).certificate
-    assert not wrong.ok
-
-
-def test_equal_blades_amplify_nothing():
-    wheel = rom.mistuned_wheel(bladed_ring(12), 2)
+    assert not replace(wheel, blade=0.5 * wheel.blade).certificate.ok
     assert_allclose(wheel.amplification(np.zeros((2, 12)), FORCE, **SWEEP), [1.0, 1.0])
     shifted = wheel.modes(np.full(12, 0.02))[0]
     exact, _ = whole_wheel(bladed_ring(12, k_blade=1.02 * 4.3e5), np.zeros(12))
@@ -106,27 +94,19 @@ def test_wrong_arguments_are_named():
 @pytest.mark.filterwarnings("ignore::rom.errors.RomWarning")
 @pytest.mark.filterwarnings("ignore:Number of integration points")
 def test_a_mistuned_wheel_of_finite_elements():
-    """Frequencies and peaks of the whole wheel within 1 %, from full and from reduced sectors."""
-    N, order, zeta = 6, 2, 2e-3
+    N = 6
     model = bladed_model(N, degree=1, cells=(4, 2, 3, 2))
     sector = rom.CyclicSector.from_model(model, fixed=("bore",), regions=("blade",))
     delta = spread(np.random.default_rng(5), N, 0.08)
     omega, Phi = whole_wheel(sector, delta)
-    tip = int(np.argmax(np.hypot(*model.points[:, :2].T)))
-    force = np.zeros(sector.n)
-    force[3 * tip + 2] = 1.0
+    at = [tip_of(model) + 2]
+    force, drive = np.eye(sector.n)[at[0]], {"engine_order": 2, "damping": 2e-3}
     sweep = np.linspace(0.94, 1.05, 600) * omega[N // 2]
-    load = Phi.T @ np.kron(np.exp(1j * order * sector.angle * np.arange(N)), force[sector.free])
-    gap = omega**2 - sweep[:, None] ** 2 + 2j * zeta * sweep[:, None] * omega
-    place = list(sector.free).index(3 * tip + 2)
-    exact = ((load / gap) @ Phi.T).reshape(len(sweep), N, -1)[:, :, place]
+    exact = response_of(sector, (omega, Phi), force, sweep, at=at, **drive)
     small = rom.reduce_sector(sector, n_modes=40, functions=rom.Polynomial(4))
     for one, tolerance in ((sector, 1e-3), (small, 1e-2)):
         wheel = rom.mistuned_wheel(one, 3)
         assert_allclose(wheel.modes(delta)[0][: 2 * N], omega[: 2 * N], rtol=0.02 * tolerance)
-        f, rows = (force, [3 * tip + 2])
-        if one is small:
-            f, rows = small.Psi.T @ force, small.Psi[[3 * tip + 2]]
-        found = wheel.response(delta, f, engine_order=order, omega=sweep, damping=zeta, at=rows)
-        peaks = abs(found[:, :, 0]).max(axis=0)
-        assert_allclose(peaks, abs(exact).max(axis=0), rtol=tolerance)
+        f, rows = (small.Psi.T @ force, small.Psi[at]) if one is small else (force, at)
+        found = wheel.response(delta, f, omega=sweep, at=rows, **drive)
+        assert_allclose(abs(found).max(axis=0), abs(exact).max(axis=0), rtol=tolerance)

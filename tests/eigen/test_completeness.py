@@ -83,7 +83,6 @@ def test_what_a_search_has_missed_had_no_larger_part_in_the_start(growth, n_bloc
 
 @pytest.mark.parametrize("n_blocks", [9, 13])
 def test_the_bound_is_that_of_the_page(n_blocks):
-    """The polynomials, the norm beside what was found and the law of chance, written out."""
     rng = np.random.default_rng(9)
     theta, m = body(300, 1.0, rng), 4
     T, R, residual = searched(theta, rng.standard_normal((300, BLOCK)), n_blocks)
@@ -102,14 +101,12 @@ def test_the_bound_is_that_of_the_page(n_blocks):
     assert_allclose(part, c2, rtol=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("part", "c2"), [(1e-3, 2.0), (1e-12, 2e-5), (0.0, 2e-5), (np.inf, np.inf)]
-)
-def test_a_part_is_as_improbable_as_normal_numbers_say(monkeypatch, part, c2):
+def test_a_part_is_as_improbable_as_normal_numbers_say(monkeypatch):
     """Three rows of eight: a hundred times the bound over a variance of 0.05, or the angle 1e-3."""
-    monkeypatch.setattr(completeness, "unseen_part", lambda *_: (20, part))
-    chance = miss_probability(np.eye(8), np.eye(8), np.zeros(8), 4)
-    assert_allclose(chance, min(1.0, 21 * 3 * chi2.cdf(3 * c2, 6)), rtol=1e-9)
+    for part, c2 in ((1e-3, 2.0), (1e-12, 2e-5), (0.0, 2e-5), (np.inf, np.inf)):
+        monkeypatch.setattr(completeness, "unseen_part", lambda *_, part=part: (20, part))
+        chance = miss_probability(np.eye(8), np.eye(8), np.zeros(8), 4)
+        assert_allclose(chance, min(1.0, 21 * 3 * chi2.cdf(3 * c2, 6)), rtol=1e-9)
 
 
 @pytest.mark.parametrize("share", [1e-2, 1e-4, 1e-6])
@@ -128,7 +125,7 @@ def test_misses_are_as_rare_as_is_said(share):
 
 
 @pytest.mark.parametrize("members", [3, 8, 40])
-def test_many_members_of_one_frequency_are_left_to_a_count(members):
+def test_many_members_of_one_frequency_are_left_to_a_count_and_a_pair_is_not(members):
     rng = np.random.default_rng(5)
     theta = body(400, 1.0, rng)
     theta[3 : 3 + members] = theta[3]
@@ -137,9 +134,6 @@ def test_many_members_of_one_frequency_are_left_to_a_count(members):
     for n_blocks in range(4, 24, 4):
         T, R, residual = searched(theta, start, n_blocks)
         assert miss_probability(T, R, residual, 5) == 1.0
-
-
-def test_a_pair_is_no_crowd():
     rng = np.random.default_rng(6)
     theta = body(400, 1.0, rng)
     theta[4] = theta[3]

@@ -4,7 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from numpy.polynomial import Legendre
+from numpy.polynomial import Legendre, Polynomial
 from numpy.polynomial.legendre import leggauss
 from numpy.testing import assert_allclose, assert_array_equal
 
@@ -63,11 +63,6 @@ def round_bore(n, radius=0.02):
     return {"lc": 2 * np.pi * radius / n}
 
 
-def cuboid(a, b, c):
-    volume = a * b * c
-    return volume, volume / 12 * np.array([b * b + c * c, a * a + c * c, a * a + b * b])
-
-
 def cylinder(r, h):
     volume = np.pi * r * r * h
     across = volume * (3 * r * r + h * h) / 12
@@ -76,7 +71,8 @@ def cylinder(r, h):
 
 def plate_with_a_bore():
     """Volume, and moments of inertia over the density about the mass centre."""
-    (V, I), (v, i) = cuboid(0.08, 0.05, 0.016), cylinder(0.02, 0.016)
+    (v, i), V = cylinder(0.02, 0.016), 0.08 * 0.05 * 0.016
+    I = V / 12 * np.array([0.05**2 + 0.016**2, 0.08**2 + 0.016**2, 0.08**2 + 0.05**2])
     centre = V * 0.01 / (V - v)  # the box stands 10 mm from the bore
     shift = V * 0.01**2 - (V - v) * centre**2
     return V - v, I - i + shift * np.array([0, 1, 1])
@@ -98,9 +94,7 @@ def ball(r):
             (BALL, {}, ball(0.02), 2e-4)]),
     ids=["plate with a bore", "hollow cylinder", "sphere"],
 )  # fmt: skip
-def test_mass_and_inertia_of_round_bodies_converge_with_the_fourth_power(
-    tmp_path, text, more, exact, limit
-):
+def test_mass_and_inertia_of_round_bodies_are_of_order_four(tmp_path, text, more, exact, limit):
     """12, 16 and 24 edges round the bore or the equator; the limit is for the last."""
     path, counts, errors = written(tmp_path, text), (12, 16, 24), []
     for n in counts:
@@ -158,21 +152,17 @@ def harmonic(a, b, L, n, N):
 
 def radial(a, b, n, N):
     """Radial functions of the three displacements."""
-
-    def power(k):
-        return np.polynomial.Polynomial([0.0] * k + [b**-k])
-
-    zero = np.polynomial.Polynomial([0.0])
+    zero, power = Polynomial([0.0]), [Polynomial([0.0] * k + [b**-k]) for k in range(n + N + 3)]
     if a > 0:
         every = [Legendre.basis(k, domain=(a, b)) for k in range(N + 1)]
         return [row for f in every for row in ((f, zero, zero), (zero, f, zero), (zero, zero, f))]
     if n == 0:
-        pieces = ((power(2 * k + 1), power(2 * k)) for k in range(N // 2 + 1))
+        pieces = ((power[2 * k + 1], power[2 * k]) for k in range(N // 2 + 1))
         return [row for f, h in pieces
                 for row in ((f, zero, zero), (zero, f, zero), (zero, zero, h))]  # fmt: skip
     rows = []
     for k in range(n, n + N + 1, 2):
-        f, g, h = power(k - 1), power(k + 1), power(k)
+        f, g, h = power[k - 1], power[k + 1], power[k]
         rows += [(f, -f, zero), (g, g, zero), (zero, zero, h)]
     return rows
 
@@ -206,11 +196,9 @@ def test_a_round_rod_bends_and_twists_as_it_should(tmp_path):
     path, exact = written(tmp_path, ROD), spectrum(0.0, 0.01, 0.1, 6)
     size = round_bore(12, 0.01)
     straight, curved = (errors(path, exact, parameters=size, order=k) for k in (1, 2))
-    bending = [0, 1]
-    assert np.all(straight[bending] < -0.012) and np.all(np.abs(curved[bending]) < 4e-4)
+    assert np.all(straight[:2] < -0.012) and np.all(np.abs(curved[:2]) < 4e-4)  # bending
     assert np.abs(curved).max() < 1e-3 < 0.012 < np.abs(straight).max()
-    default = errors(path, exact, parameters=size)
-    assert_array_equal(default, curved)
+    assert_array_equal(errors(path, exact, parameters=size), curved)  # by default
 
 
 def test_more_quadrature_would_change_nothing(tmp_path, monkeypatch):
@@ -266,8 +254,8 @@ def test_linear_fields_are_exact_on_curved_cells(tmp_path, degree):
     For a dilatation e the stress is 3 K e, and shapes A x get 3 K e |skew A|^2 V; a finite rotation
     needs no force.
     """
-    made = model(written(tmp_path, PLATE), material=STEEL, degree=degree,
-                 parameters=round_bore(8))  # fmt: skip
+    file = written(tmp_path, PLATE)
+    made = model(file, material=STEEL, degree=degree, parameters=round_bore(8))
     x, volume = made.points, made.mass() / STEEL.rho
     assert_allclose(volume, plate_with_a_bore()[0], rtol=1e-3)
     R = rigid_motions(x)
@@ -299,13 +287,11 @@ def test_a_bore_is_an_interface_of_its_true_area(tmp_path):
     errors = np.abs([face.surface_mass.sum() / exact - 1 for face in found])
     assert errors[1] < 5e-6 and errors[0] / errors[1] > 10, errors
     assert_allclose(found[1].origin, [0, 0, 0.008], atol=1e-7)
-    r = np.hypot(*found[1].points[:, :2].T)
-    assert_allclose(r, 0.02, rtol=1e-9)
+    assert_allclose(np.hypot(*found[1].points[:, :2].T), 0.02, rtol=1e-9)
 
 
 @pytest.mark.parametrize("kind", few(1, ["rbe2", "rbe3", "polynomial:2", "full"]))
 def test_bodies_are_reduced_to_curved_interfaces(tmp_path, kind):
-    """Compared with the full curved model: statics, mass and rigid motions exactly."""
     made = model(written(tmp_path, PLATE), material=STEEL, parameters=round_bore(10))
     body = rom.reduce(made, method=rom.CraigBampton(40), interfaces={"bore": kind, "end": "rbe3"},
                       reference="bore" if kind != "full" else "mean-axis", stress=True,
@@ -331,8 +317,7 @@ def test_pictures_of_a_bore_are_round(tmp_path):
     assert 3.5 < defects[0] / defects[1] < 4.5, defects
 
 
-def test_second_order_meshes_come_back_from_files_as_curved_as_they_were(tmp_path):
-    """A deck with quadratic elements, for CalculiX and Abaqus."""
+def test_second_order_meshes_come_back_from_decks_as_curved_or_straight_as_they_were(tmp_path):
     mesh = read_mesh(written(tmp_path, PLATE), parameters=round_bore(12))
     (tmp_path / "body.inp").write_text(input_deck(mesh))
     back = read_mesh(tmp_path / "body.inp")
@@ -341,10 +326,7 @@ def test_second_order_meshes_come_back_from_files_as_curved_as_they_were(tmp_pat
     made = model(tmp_path / "body.inp", material=STEEL)
     assert made.provenance["degree of the geometry"] == 2
     assert_allclose(made.mass(), STEEL.rho * plate_with_a_bore()[0], rtol=1e-4)
-
-
-def test_straight_second_order_meshes_are_read_as_straight(tmp_path):
-    """Nodes amid straight edges say nothing; elements of degree 1 can do without them."""
+    # nodes amid straight edges say nothing; elements of degree 1 can do without them
     box, fine = solid("tet4"), tmp_path / "box.inp"
     fine.write_text(input_deck(second_order(box)))
     made = {k: model(fine, material=STEEL, degree=k) for k in (1, 2)}
@@ -354,7 +336,6 @@ def test_straight_second_order_meshes_are_read_as_straight(tmp_path):
 
 @pytest.mark.long
 def test_curved_models_are_the_same_on_any_number_of_ranks(tmp_path):
-    """Mass, frequencies, area and stress of a plate with a bore on one, two and three ranks."""
     words, more = (RANKS / "curved_under_mpi.py", written(tmp_path, PLATE)), {"ending": "json"}
     found = written_on_each((1, 2, 3), tmp_path, *words, timeout=300, **more)
     for n in (2, 3):

@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -48,7 +49,6 @@ def bar(size, solver="auto"):
 
 
 def growth(work):
-    """What a piece of work takes at most beyond what was there [bytes]."""
     gc.collect()
     memory.collect(MPI.COMM_WORLD)
     Path("/proc/self/clear_refs").write_text("5")  # the largest so far is forgotten
@@ -64,18 +64,15 @@ def taken_and_foreseen(shape, solver):
     beside = foreseen.beside_factor(K, 12, foreseen.N_MATRICES)
     direct = solver == "direct"
     solved = foreseen.analysed(K).in_core if direct else foreseen.multigrid_bytes(K)
-
     reduced(20, bar((1.0, 0.1, 0.1, 0.1), solver))  # compiles what is not foreseen
     return growth(lambda: reduced(20, model)), beside + solved
 
 
-@pytest.mark.parametrize(
-    ("shape", "solver"),
-    [
-        *few(1, [(shape, "direct") for shape in SHAPES]),
-        *few(0, [("plate", "iterative"), ("rod", "iterative")]),
-    ],
-)
+REDUCED = few(1, [(shape, "direct") for shape in SHAPES])
+REDUCED += few(0, [("plate", "iterative"), ("rod", "iterative")])
+
+
+@pytest.mark.parametrize(("shape", "solver"), REDUCED)
 def test_a_reduction_takes_the_memory_foreseen(shape, solver):
     """In a process of its own: what other tests leave in the heap is no part of it."""
     code = f"import test_fe_foreseen as t; print(*t.taken_and_foreseen{shape, solver})"
@@ -92,23 +89,17 @@ def block():
 
 @pytest.fixture(scope="module")
 def needs(block):
-    """What each way to solve is predicted to take [bytes]."""
     K = operators(block).K
     found, beside = foreseen.analysed(K), foreseen.beside_factor(K, 0, foreseen.N_MATRICES)
-    multigrid = foreseen.multigrid_bytes(K)
     return {"direct": beside + found.in_core, "out-of-core": beside + found.out_of_core,
-            "iterative": beside + multigrid, "disk": found.on_disk}  # fmt: skip
+            "iterative": beside + foreseen.multigrid_bytes(K), "disk": found.on_disk}  # fmt: skip
 
 
 def limited(monkeypatch, memory_bytes, disk_bytes=1e15):
     """As if the machine had no more than that."""
     monkeypatch.setattr(memory, "MAX_MEMORY_SHARE", 1.0)
     monkeypatch.setattr(memory, "free_bytes", lambda: memory_bytes)
-    monkeypatch.setattr(disk.shutil, "disk_usage", lambda _: disk_type(disk_bytes))
-
-
-def disk_type(free):
-    return type("Usage", (), {"free": free})
+    monkeypatch.setattr(disk.shutil, "disk_usage", lambda _: SimpleNamespace(free=disk_bytes))
 
 
 def test_the_first_way_that_fits_is_taken(block, needs, monkeypatch):
@@ -217,16 +208,12 @@ def test_a_disk_that_another_fills_ends_all_ranks_by_name(tmp_path, n_ranks):
     assert re.search(named, ran.stderr), ran.stderr
 
 
-@pytest.mark.parametrize("kind", ["direct", "out-of-core"])
-def test_the_disk_is_watched_while_a_factor_is_written(block, monkeypatch, kind):
+def test_the_disk_is_watched_while_a_factor_is_written_into_a_folder(block, monkeypatch, tmp_path):
     seen, watched = [], factor.watched
     monkeypatch.setattr(factor, "watched", lambda: seen.append(1) or watched())
-    F = factor.Factor(operators(block).K, definite=True, solver=parsed(kind))
-    assert len(seen) == (kind == "out-of-core")
-    F.release()
-
-
-def test_a_folder_that_is_missing_is_named(block, monkeypatch, tmp_path):
+    for kind, times in (("direct", 0), ("out-of-core", 1)):
+        factor.Factor(operators(block).K, definite=True, solver=parsed(kind)).release()
+        assert len(seen) == times
     monkeypatch.setenv("MUMPS_OOC_TMPDIR", str(tmp_path / "none"))
     with pytest.raises(ResourceError, match=f"cannot be kept in {tmp_path}/none: No such file"):
         factor.Factor(operators(block).K, definite=True, solver=parsed("out-of-core"))

@@ -9,26 +9,18 @@ from numpy.testing import assert_allclose
 import rom
 from cases.long import ROM_LONG, SHARED_BY
 from cases.paths import RANKS, ROOT
-from cases.ranks.environment import ENVIRONMENT, on_ranks, written_on, written_on_each
-from rom.errors import MaterialError, RomError
+from cases.ranks.environment import ENVIRONMENT, on_ranks, written_on_each
 from rom.process.launcher import YIELD_VARIABLE
 from rom.process.mpirun import OPEN_MPI, found, version
 
-pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = [pytest.mark.fenicsx, pytest.mark.mpi]
-
 UNDER_MPI = RANKS / "under_mpi.py"
-
-
-def run_model(folder, n, cells, degree):
-    path = folder / f"{n}.npz"
-    return written_on(n, path, UNDER_MPI, "model", path, cells, degree)
 
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("ranks")
-    return {n: run_model(folder, n, "6,2,2", 2) for n in (1, *SHARED_BY)}
+    folder, words = tmp_path_factory.mktemp("ranks"), (UNDER_MPI, "model", "6,2,2", 2)
+    return written_on_each((1, *SHARED_BY), folder, *words)
 
 
 @pytest.mark.parametrize("n", SHARED_BY)
@@ -50,11 +42,9 @@ def test_ranks_agree_with_one_process(runs, n):
 
 @pytest.mark.long
 def test_fewer_cells_than_ranks(tmp_path):
-    """Six tetrahedra on eight ranks: some own nothing."""
-    one = run_model(tmp_path, 1, "1,1,1", 1)
-    many = run_model(tmp_path, 8, "1,1,1", 1)
+    found = written_on_each((1, 8), tmp_path, UNDER_MPI, "model", "1,1,1", 1)
     for name in ("free", "fixed", "mass"):
-        assert_allclose(many[name], one[name], rtol=1e-9)
+        assert_allclose(found[8][name], found[1][name], rtol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -70,51 +60,28 @@ def test_fewer_cells_than_ranks(tmp_path):
 def test_a_rank_that_fails_ends_all_within_seconds(kind, code, words):
     done = on_ranks(2, UNDER_MPI, "fail", kind, timeout=60)
     assert done.returncode == code
-    assert words in done.stderr
     assert done.stderr.count(words) == 1
-
-
-def test_on_one_rank_errors_pass_as_they_are():
-    from mpi4py import MPI
-
-    from rom.fe.parallel import collective, on_root
-
-    assert on_root(MPI.COMM_SELF, lambda a, b: a + b, 1, b=2) == 3
-    with pytest.raises(ZeroDivisionError):
-        on_root(MPI.COMM_SELF, lambda: 1 / 0)
-    with pytest.raises(MaterialError), collective(MPI.COMM_SELF):
-        raise MaterialError("no")
-    assert issubclass(MaterialError, RomError)
 
 
 @pytest.mark.parametrize("n", SHARED_BY)
 def test_interfaces_of_one_rank_and_of_all_ranks(n, tmp_path):
-    """All ranks ask for the interface of one of them; one of all is gathered from each."""
-    one, many = (reduced_on(ranks, tmp_path) for ranks in (1, n))
+    script = RANKS / "interfaces_under_mpi.py"
+    one, many = written_on_each((1, n), tmp_path, script, timeout=120).values()
     assert many["ranks of end"] < n
     assert many["ranks of side"] == n
     for name in set(one) - {"ranks of end", "ranks of side"}:
         assert_allclose(many[name], one[name], rtol=1e-9, err_msg=name)
 
 
-def reduced_on(n, folder):
-    path = folder / f"{n}.npz"
-    return written_on(n, path, RANKS / "interfaces_under_mpi.py", path, timeout=120)
-
-
-@pytest.fixture(scope="module")
-def by_methods(tmp_path_factory):
-    folder, script = tmp_path_factory.mktemp("methods"), RANKS / "methods_under_mpi.py"
-    return written_on_each((1, *SHARED_BY), folder, script, ending="json")
-
-
 @pytest.mark.long
-@pytest.mark.parametrize("n", SHARED_BY)
-def test_every_method_is_blind_to_the_number_of_processes(by_methods, n):
-    assert len(by_methods[1]) == 18
-    for name, one in by_methods[1].items():
+def test_every_method_is_blind_to_the_number_of_processes(tmp_path):
+    script = RANKS / "methods_under_mpi.py"
+    found = written_on_each((1, *SHARED_BY), tmp_path, script, ending="json")
+    assert len(found[1]) == 18
+    for name, one in found[1].items():
         assert len(one) >= 4, name
-        assert_allclose(by_methods[n][name], one, rtol=1e-9, err_msg=name)
+        for n in SHARED_BY:
+            assert_allclose(found[n][name], one, rtol=1e-9, err_msg=name)
 
 
 def test_a_rank_that_dies_ends_the_others():
@@ -138,22 +105,15 @@ def run(request, tmp_path_factory):
     return json.loads(file.read_text()), done.stderr
 
 
-def test_whoever_waits_for_the_first_rank_sleeps(run):
+def test_whoever_waits_for_the_first_rank_sleeps_and_is_told_that_one_is_faster(run):
+    """Open MPI is told so by the variable before it starts, by a call after that."""
     first, other = run[0]["spent"]
     assert first > WORK_SECONDS
     assert other < 0.25 * WORK_SECONDS
-
-
-def test_open_mpi_is_told_to_let_others_run(run):
-    """By the variable before it starts, by a call after that."""
-    if not version(found()).startswith(OPEN_MPI):
-        pytest.skip("another MPI, which has no such word")
-    assert run[0]["told"] == [[True], [True]]
-
-
-def test_a_small_model_says_that_one_process_is_faster(run):
     assert run[1].count("one process is faster") == 1
     assert "dofs are shared by 2 processes; below 30000" in run[1]
+    if version(found()).startswith(OPEN_MPI):
+        assert run[0]["told"] == [[True], [True]]
 
 
 ROD = ROOT / "meshes" / "connecting_rod.geo"
@@ -162,15 +122,12 @@ ROD = ROOT / "meshes" / "connecting_rod.geo"
 SIZE = "8e-3" if ROM_LONG else "14e-3"
 KINDS = {"average and functions": ["pin_a=rbe3", "pin_b=polynomial:1"]}
 if ROM_LONG:
-    KINDS |= {
-        "stiff and average": ["pin_a=rbe2", "pin_b=rbe3"],
-        "functions": ["pin_a=polynomial:1", "pin_b=fourier:1,1"],
-    }
+    KINDS["stiff and average"] = ["pin_a=rbe2", "pin_b=rbe3"]
+    KINDS["functions"] = ["pin_a=polynomial:1", "pin_b=fourier:1,1"]
 
 
 @pytest.fixture(scope="module", params=KINDS)
 def bodies(request, tmp_path_factory):
-    """The same command on one process and on several."""
     folder, written = tmp_path_factory.mktemp("bodies"), {}
     for n in (1, *SHARED_BY):
         written[n] = folder / f"{n}.rom.npz"
@@ -202,9 +159,8 @@ def contents(body):
 
 @pytest.mark.parametrize("n", SHARED_BY)
 def test_the_body_has_the_same_content_on_any_number_of_processes(bodies, n):
-    for (name, one, size), (_, many, _) in zip(
-        contents(bodies[1]), contents(bodies[n]), strict=True
-    ):
+    pairs = zip(contents(bodies[1]), contents(bodies[n]), strict=True)
+    for (name, one, size), (_, many, _) in pairs:
         assert_allclose(many, one, rtol=0, atol=1e-9 * size, err_msg=name)
     assert bodies[n].labels == bodies[1].labels
     for one, many in zip(bodies[1].certificate.rows, bodies[n].certificate.rows, strict=True):

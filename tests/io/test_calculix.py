@@ -27,8 +27,8 @@ from cases.files.damage import changed
 from cases.files.decks import BY_HAND
 from cases.long import few
 from cases.paths import ROOT, TESTS
-from cases.refusals import refused
-from cases.solid import block, reduced
+from cases.refusals import refused, refuses
+from cases.solid import STEEL, block, reduced
 from rom.cli.main import main
 from rom.errors import ConfigError, FileFormatError, MeshError, TagError
 from rom.fe.mesh.input_deck import input_deck
@@ -40,7 +40,6 @@ from rom.io.programs.interface_form import interface_form
 
 HERE = TESTS / "reference" / "foreign"
 LABELS = np.array([12, 3, 40, 7, 101, 55, 20, 60])  # of the corners, z fastest
-STEEL = rom.Material(E=210e9, nu=0.3, rho=7850.0)
 
 
 def six_tetrahedra():
@@ -68,7 +67,7 @@ def stored(**other):
     return rom.read_model(HERE / "calculix.sti", HERE / "calculix.mas", **given)
 
 
-def test_stored_matrices_are_those_of_the_elements():
+def test_stored_matrices_are_those_of_the_elements_and_so_are_frequencies_and_substructures():
     """The node 5 of the deck belongs to no element and is left out."""
     model = stored()
     for found, expected in zip((model.K, model.M), six_tetrahedra(), strict=True):
@@ -77,25 +76,19 @@ def test_stored_matrices_are_those_of_the_elements():
     root = model.interfaces["root"]
     assert_array_equal(np.sort(LABELS)[root.nodes], [12, 3, 40, 7])  # by coordinates
     assert_allclose(root.origin, [0.0, 0.1, 0.05])
-    with pytest.raises(rom.RomError, match=r"'loose' needs nodes of the model; unknown are \[5\]"):
-        stored(interfaces={"loose": [5]})
-
-
-def test_a_model_from_calculix_has_the_frequencies_of_its_matrices():
-    """One point per element leaves the mass singular: the highest frequencies are infinite."""
+    unknown = r"'loose' needs nodes of the model; unknown are \[5\]"
+    refuses(rom.RomError, unknown, stored, interfaces={"loose": [5]})
+    # one point per element leaves the mass singular: the highest frequencies are infinite
     K, M = six_tetrahedra()
     free = np.isin(np.repeat(np.sort(LABELS), 3), LABELS[4:])
     mu = eigh(M[np.ix_(free, free)], K[np.ix_(free, free)], eigvals_only=True)[:-5:-1]
-    found = rom.modes(stored(), 4, fixed=("root",)).frequencies
+    found = rom.modes(model, 4, fixed=("root",)).frequencies
     assert_allclose(found, 1 / np.sqrt(mu) / (2 * np.pi), rtol=1e-9)
-
-
-def test_a_substructure_is_the_rows_calculix_left_alone():
-    """Version 2.20 does not condense: what it writes are rows and columns of the stiffness."""
+    # version 2.20 does not condense: a substructure is rows and columns of the stiffness
     found = read_matrix(HERE / "calculix.mtx")
     assert_array_equal(found.dofs, [[12, 1], [12, 2], [12, 3], [55, 1], [55, 2]])
     rows = [np.searchsorted(np.sort(LABELS), n) * 3 + c - 1 for n, c in found.dofs]
-    expected = np.tril(six_tetrahedra()[0][np.ix_(rows, rows)])
+    expected = np.tril(K[np.ix_(rows, rows)])
     assert_allclose(found.A.toarray(), expected, atol=1e-12 * np.abs(expected).max())
 
 
@@ -121,8 +114,7 @@ def test_a_body_goes_to_abaqus_and_comes_back(tmp_path):
         found = read_matrix((path, name))
         assert_allclose(found.A.toarray(), np.tril(A), rtol=1e-13)
         assert_array_equal(found.dofs, np.where(form.dofs == 0, 1, form.dofs))
-    with pytest.raises(ConfigError, match="Name one"):
-        read_matrix(path)
+    refuses(ConfigError, "Name one", read_matrix, path)
     labels, points = read_nodes(path)
     assert_array_equal(labels, [1, 2, 1001, 1002, 1003])
     assert_allclose(points[:2], [form.points[1], form.points[2]], atol=1e-15)
@@ -132,8 +124,8 @@ def test_a_body_goes_to_abaqus_and_comes_back(tmp_path):
     # readers of such files put the comments together: a line that goes on ends in a comma
     comments = "".join(line[2:] for line in lines if line.startswith("**")).split("NODES")[1]
     assert [int(word) for word in comments.split(",")] == [1, 2, 1001, 1002, 1003]
-    with pytest.raises(ConfigError, match="node by node"):
-        write_user_element({"MASS": np.eye(3)}, [[1, 1], [2, 1], [1, 2]], path, nodes={})
+    mixed = {"MASS": np.eye(3)}, [[1, 1], [2, 1], [1, 2]], path
+    refuses(ConfigError, "node by node", write_user_element, *mixed, nodes={})
 
 
 test_a_damaged_user_element_is_named = changed(
@@ -158,7 +150,6 @@ test_a_damaged_user_element_is_named = changed(
 
 
 def copied(tmp_path, ending, change):
-    """The stored files, one of them changed."""
     for part in (".sti", ".dof"):
         shutil.copy(HERE / f"calculix{part}", tmp_path)
     path = tmp_path / f"calculix{ending}"
@@ -166,37 +157,34 @@ def copied(tmp_path, ending, change):
     return tmp_path / "calculix.sti"
 
 
-@pytest.mark.parametrize(
-    ("ending", "change", "message"),
-    [
-        (".sti", lambda t: t[:-30], r"calculix\.sti: the last line is cut"),
-        (".sti", lambda t: "", r"calculix\.sti: the file is empty"),
-        (".sti", lambda t: t[: t.rindex("\n", 0, -1) + 1], "1 of 24 diagonal entries are missing"),
-        (".sti", lambda t: t + t.splitlines()[4] + "\n", "1 entries come twice"),
-        (".sti", lambda t: t.replace("\n1 3 ", "\n1 3.5 ", 1), r"sti, line 4: rows and columns"),
-        (".sti", lambda t: t.replace("\n1 3 ", "\n1 33 ", 1), "line 4: rows and columns are 1 to"),
-        (".sti", lambda t: t.replace("\n1 3 ", "\n1 x ", 1), "line 4: an entry is row, column"),
-        (".sti", lambda t: t.replace("\n1 3 ", "\n3 ", 1), "line 4: an entry is row, column"),
-        (".dof", lambda t: t[:-1], r"calculix\.dof: the last line is cut"),
-        (".dof", lambda t: t[:-6], r"line \d+: rows and columns are 1 to 23"),
-        (".dof", lambda t: t.replace("7.2", "7.0"), r"dof, line 5: a row is node\.component"),
-        (".dof", lambda t: t.replace("7.2", "7.1"), "7.1 is listed twice"),
-    ],
-)
-def test_damaged_matrices_are_named(ending, change, message, tmp_path):
-    with pytest.raises(FileFormatError, match=message):
-        read_stored_matrix(copied(tmp_path, ending, change))
-
-
-def test_missing_parts_and_supports_are_named(tmp_path):
-    shutil.copy(HERE / "calculix.sti", tmp_path)
-    with pytest.raises(FileFormatError, match=r"calculix\.dof: there is no such file"):
-        read_matrix(tmp_path / "calculix.sti")
-    with pytest.raises(FileFormatError, match="a number is not finite"):
-        read_matrix(copied(tmp_path, ".sti", lambda t: t.replace("2.1314102564103e+10", "nan")))
+DAMAGED = [
+    (".sti", lambda t: t[:-30], r"calculix\.sti: the last line is cut"),
+    (".sti", lambda t: "", r"calculix\.sti: the file is empty"),
+    (".sti", lambda t: t[: t.rindex("\n", 0, -1) + 1], "1 of 24 diagonal entries are missing"),
+    (".sti", lambda t: t + t.splitlines()[4] + "\n", "1 entries come twice"),
+    (".sti", lambda t: t.replace("\n1 3 ", "\n1 3.5 ", 1), r"sti, line 4: rows and columns"),
+    (".sti", lambda t: t.replace("\n1 3 ", "\n1 33 ", 1), "line 4: rows and columns are 1 to"),
+    (".sti", lambda t: t.replace("\n1 3 ", "\n1 x ", 1), "line 4: an entry is row, column"),
+    (".sti", lambda t: t.replace("\n1 3 ", "\n3 ", 1), "line 4: an entry is row, column"),
+    (".dof", lambda t: t[:-1], r"calculix\.dof: the last line is cut"),
+    (".dof", lambda t: t[:-6], r"line \d+: rows and columns are 1 to 23"),
+    (".dof", lambda t: t.replace("7.2", "7.0"), r"dof, line 5: a row is node\.component"),
+    (".dof", lambda t: t.replace("7.2", "7.1"), "7.1 is listed twice"),
     # component 10 of a node would be read as 1 if the label were a number
-    with pytest.raises(FileFormatError, match=r"a row is node\.component"):
-        read_matrix(copied(tmp_path, ".dof", lambda t: t.replace("7.1\n", "7.10\n")))
+    (".dof", lambda t: t.replace("7.1\n", "7.10\n"), r"a row is node\.component"),
+]
+
+
+@pytest.mark.parametrize(("ending", "change", "message"), DAMAGED)
+def test_damaged_matrices_are_named(ending, change, message, tmp_path):
+    refuses(FileFormatError, message, read_stored_matrix, copied(tmp_path, ending, change))
+
+
+def test_a_missing_part_is_named(tmp_path):
+    path = shutil.copy(HERE / "calculix.sti", tmp_path)
+    refuses(FileFormatError, r"calculix\.dof: there is no such file", read_matrix, path)
+    nan = copied(tmp_path, ".sti", lambda t: t.replace("2.1314102564103e+10", "nan"))
+    refuses(FileFormatError, "a number is not finite", read_matrix, nan)
 
 
 BEAM = {"path": str(ROOT / "meshes" / "beam.geo"), "parameters": {"L": 0.3, "lc": 0.04}}
@@ -205,9 +193,8 @@ WOOD = rom.Orthotropic(
     axes=((0.6, 0.8, 0.0), (-0.8, 0.6, 0.0), (0.0, 0.0, 1.0)),
 )  # fmt: skip
 GAUSS = {1: 1, 2: 2}  # degree of the displacement: what CalculiX's points of the mass are exact for
-needs_ccx = pytest.mark.skipif(
-    shutil.which("ccx") is None, reason="CalculiX (ccx, Debian's calculix-ccx) is not installed"
-)
+NO_CCX = "CalculiX (ccx, Debian's calculix-ccx) is not installed"
+needs_ccx = pytest.mark.skipif(shutil.which("ccx") is None, reason=NO_CCX)
 
 
 def run(folder, deck):
@@ -221,13 +208,6 @@ def frequencies(text):
     """(m,) the fourth column of the table [Hz], seven digits."""
     rows = [line.split() for line in text.partition("P A R T I C I P")[0].splitlines()]
     return np.array([float(row[3]) for row in rows if len(row) == 5 and row[0].isdecimal()])
-
-
-def total_force(text):
-    """(steps, 3) sums of the reactions [N]."""
-    lines = text.splitlines()
-    return np.array([lines[k + 2].split() for k, x in enumerate(lines) if "total force" in x],
-                    dtype=float)  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -244,8 +224,14 @@ def same_quadrature(monkeypatch):
 
 
 def model(degree, material=STEEL):
-    return rom.fe.model(BEAM["path"], parameters=BEAM["parameters"], material=material,
-                        degree=degree)  # fmt: skip
+    return rom.fe.model(**BEAM, material=material, degree=degree)
+
+
+def by_calculix(folder, deck):
+    """The model of the matrices that CalculiX makes of a deck."""
+    run(folder, deck)
+    files = (folder / f"job.{ending}" for ending in ("sti", "mas"))
+    return rom.read_model(*files, nodes=folder / "job.inp", interfaces=["root", "tip"])
 
 
 def order(theirs, ours):
@@ -264,9 +250,8 @@ def difference(A, B):
 @pytest.mark.filterwarnings("ignore:.*linear tetrahedra lock")
 @pytest.mark.parametrize(("degree", "material"), few(1, [(2, WOOD), (1, STEEL), (2, STEEL)]))
 def test_stiffness_and_mass_are_equal(beam, degree, material, same_quadrature, tmp_path):
-    run(tmp_path, input_deck(beam, material=material, degree=degree, step="matrices"))
-    theirs = rom.read_model(tmp_path / "job.sti", tmp_path / "job.mas", nodes=tmp_path / "job.inp",
-                            interfaces=["root", "tip"])  # fmt: skip
+    deck = input_deck(beam, material=material, degree=degree, step="matrices")
+    theirs = by_calculix(tmp_path, deck)
     ours = model(degree, material)
     p = order(theirs, ours)
     assert difference(theirs.K, ours.K[p][:, p]) < 1e-12
@@ -299,12 +284,8 @@ def test_ten_frequencies_are_equal(beam, degree, apart, fixed, same_quadrature, 
 @needs_ccx
 @pytest.mark.fenicsx
 def test_a_body_of_their_matrices_is_a_body_of_ours(beam, same_quadrature, tmp_path):
-    run(tmp_path, input_deck(beam, material=STEEL, step="matrices"))
-    theirs = rom.read_model(tmp_path / "job.sti", tmp_path / "job.mas", nodes=tmp_path / "job.inp",
-                            interfaces=["root", "tip"])  # fmt: skip
-    kinds = {"root": "rbe2", "tip": "rbe2"}
-    bodies = [rom.reduce(m, method=rom.CraigBampton(6), interfaces=kinds, certify=m is theirs)
-              for m in (theirs, model(2))]  # fmt: skip
+    theirs = by_calculix(tmp_path, input_deck(beam, material=STEEL, step="matrices"))
+    bodies = [reduced(6, m, certify=m is theirs) for m in (theirs, model(2))]
     rows = bodies[0].certificate.rows
     assert all(row.ok for row in rows if "reduced never below" in row.quantity)
     for fixed in ((), ("root",), ("root", "tip")):
@@ -319,16 +300,15 @@ def test_guyan_stiffness_is_the_reaction_to_unit_motions(beam, tmp_path):
     """The tip moves as a rigid body by a unit along x, y, z; root held."""
     head, step = input_deck(beam, material=STEEL, fixed=("root",)).split("*STEP\n")
     assert step.startswith("*FREQUENCY")
-    steps = [
-        "*STEP\n*STATIC\n*BOUNDARY\n"
-        + "".join(f"tip, {b + 1}, {b + 1}, {float(a == b)}\n" for b in range(3))
-        + "*NODE PRINT, NSET=tip, TOTALS=ONLY\nRF\n*END STEP\n"
-        for a in range(3)
-    ]
-    reactions = total_force(run(tmp_path, head + "".join(steps)))
-    body = rom.reduce(model(2), method=rom.Guyan(), interfaces={"root": "rbe2", "tip": "rbe2"},
-                      certify=False)  # fmt: skip
-    expected = interface_form(body).K[6:9, 6:9]
+    deck = head
+    for row in np.eye(3):
+        moved = "".join(f"tip, {axis}, {axis}, {u}\n" for axis, u in enumerate(row, 1))
+        deck += f"*STEP\n*STATIC\n*BOUNDARY\n{moved}"
+        deck += "*NODE PRINT, NSET=tip, TOTALS=ONLY\nRF\n*END STEP\n"
+    lines = run(tmp_path, deck).splitlines()
+    totals = [k + 2 for k, line in enumerate(lines) if "total force" in line]
+    reactions = np.array([lines[k].split() for k in totals], dtype=float)
+    expected = interface_form(reduced(0, model(2))).K[6:9, 6:9]
     assert_allclose(reactions, expected, rtol=1e-6, atol=2e-6 * expected.max())
 
 
@@ -354,7 +334,6 @@ def test_a_substructure_is_not_condensed(beam, tmp_path):
 @needs_ccx
 @pytest.mark.fenicsx
 def test_the_command_line_goes_to_calculix_and_back(tmp_path, capsys, same_quadrature):
-    """Mesh here, matrices there, frequencies here."""
     steel = ("--E", "210e9", "--nu", "0.3", "--rho", "7850")
     mesh = (BEAM["path"], "-p", "L=0.3", "-p", "lc=0.04", *steel)
     assert main(["mesh", *mesh, "--save", str(tmp_path / "job.inp")]) == 0
@@ -371,14 +350,12 @@ def test_the_command_line_goes_to_calculix_and_back(tmp_path, capsys, same_quadr
 
 @pytest.mark.parametrize("kind", ["tet4", "tet10"])
 def test_a_deck_is_read_back(kind, tmp_path):
-    """Curved edges, two regions, a facet that belongs to two interfaces."""
     mesh = solid(kind, (2, 1, 1))
     points = mesh.points + 0.02 * np.sin(3 * mesh.points[:, [1, 2, 0]])
     facets = mesh.facets | {"lower half": mesh.facets["root"][:1]}
     mesh = replace(mesh, points=points, regions=np.arange(len(mesh.cells)) // 6 + 1,
                    region_names={1: "left", 2: "right"}, facets=facets)  # fmt: skip
-    with pytest.raises(TagError, match="'lower half' is no name"):
-        input_deck(mesh)
+    refuses(TagError, "'lower half' is no name", input_deck, mesh)
     mesh.facets["lower_half"] = mesh.facets.pop("lower half")
     path = tmp_path / "box.inp"
     path.write_text(input_deck(mesh, degree=1 if kind == "tet4" else 2))
@@ -404,7 +381,6 @@ def test_mid_edge_nodes_are_added_and_numbers_fit():
 
 
 def deck_of(kind="tet4", more=(), **options):
-    """A call that writes the deck of a box, some of its surfaces under another name, too."""
     mesh = solid(kind)
     other = {name: mesh.facets[old] for name, old in more}
     return lambda: input_deck(replace(mesh, facets=mesh.facets | other), **options)

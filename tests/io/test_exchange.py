@@ -34,8 +34,7 @@ def body(model):
     return rom.reduce(model, method=rom.CraigBampton(5), interfaces=KINDS, certify=False)
 
 
-def full(A):
-    """From the lower triangle, or both."""
+def full(A):  # from the lower triangle, or both
     A = A.toarray()
     return np.tril(A) + np.tril(A, -1).T
 
@@ -135,8 +134,7 @@ def test_a_modal_joint_is_the_same_body(body, tmp_path):
     found = groups(rom.export(body, tmp_path / "rod.fem"))
     r = body.n_modes
     M, K = (numbers(found[k], r, r) for k in (9, 10))
-    m, rest = float(found[12][0]), numbers(found[12][1:], 4, 3)
-    c, about = rest[0], rest[1:]
+    m, (c, *about) = float(found[12][0]), numbers(found[12][1:], 4, 3)
     C = m * np.cross(np.eye(3), c).T
     J = about + m * (c @ c * np.eye(3) - np.outer(c, c))
     rigid = np.block([[m * np.eye(3), C], [C.T, J]])

@@ -13,6 +13,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import rom
 from cases.command import ran
 from cases.mbs.mechanisms import random_body
+from cases.refusals import refuses
 from cases.solid import block, reduced
 from rom.errors import ConfigError, ResourceError
 from rom.io.fields.gltf import upright
@@ -25,7 +26,6 @@ BOX = (
     np.array([[0, 0, 0], [0.2, 0, 0], [0, 0.1, 0], [0, 0, 0.05]]),
     np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]),
 )
-
 WIDTHS = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}
 LOAD_BOTH = """
 import rom.fe.elasticity
@@ -47,15 +47,13 @@ with open_file("corner.vtkhdf") as file, open_file("cube.h5") as cube:
 
 @pytest.fixture(scope="module")
 def motion():
-    """A soft flexible pendulum with a rigid bob hinged to its tip."""
     model = block(cells=(4, 1, 1), material=rom.Material(E=2e6, nu=0.3, rho=1100.0))
     body = reduced(2, model, reference="root")
     mech = rom.Mechanism(gravity=(0.0, 0.0, -9.81))
     rod = mech.add_flexible("rod", body)
     at = rod.point(rod.marker("tip")) + np.array([0.1, 0.0, 0.0])
-    bob = mech.add_rigid(
-        "bob", mass=0.5, inertia=(1e-3, 2e-3, 2e-3), at=at, markers={"pin": (-0.1, 0.0, 0.0)}
-    )
+    pin = {"pin": (-0.1, 0.0, 0.0)}
+    bob = mech.add_rigid("bob", mass=0.5, inertia=(1e-3, 2e-3, 2e-3), at=at, markers=pin)
     root = rod.point(rod.marker("root"))
     mech.revolute("hinge", mech.ground.marker(root), rod.marker("root"), axis=(0, 1, 0))
     mech.spherical("wrist", rod.marker("tip"), bob.marker("pin"))
@@ -84,11 +82,10 @@ def test_the_table_has_units_in_its_head_and_every_quantity(motion, tmp_path):
 
 @pytest.fixture(scope="module")
 def mixed():
-    """A flexible body in a cylindrical joint, and a ball."""
     mech = rom.Mechanism(gravity=(0, 0, -9.81))
     body = mech.add_flexible("one", random_body(np.random.default_rng(3)), omega=(0, 0, 1.0))
-    mech.cylindrical("pin", mech.ground.marker(mech.design_point(body.marker("a"))),
-                     body.marker("a"), axis=(0, 0, 1))  # fmt: skip
+    a = body.marker("a")
+    mech.cylindrical("pin", mech.ground.marker(mech.design_point(a)), a, axis=(0, 0, 1))
     mech.add_rigid("ball", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0), velocity=(1, 0, 0))
     return rom.simulate(mech, t_end=0.02, dt=1e-3, assemble=True)
 
@@ -122,9 +119,8 @@ def test_a_data_set_has_units_and_names(mixed):
 @pytest.mark.parametrize("name", ["pandas", "xarray"])
 def test_what_is_missing_is_named_with_the_cure(name, mixed, monkeypatch):
     monkeypatch.setitem(sys.modules, name, None)
-    with pytest.raises(ResourceError, match=f"{name} is not installed") as caught:
-        getattr(mixed, f"to_{name}")()
-    assert "pip install 'fenicsx-rom[data]'" in caught.value.hint
+    cure = f"{name} is not installed.*pip install 'fenicsx-rom\\[data\\]'"
+    refuses(ResourceError, cure, getattr(mixed, f"to_{name}"))
 
 
 @pytest.mark.once
@@ -160,8 +156,7 @@ def test_what_cannot_be_written_is_named(motion, tmp_path):
         (rom.write_animation, "m.glb", {"frames": 1}, "got 1 in"),
         (rom.write_animation, "m.glb", {"up": (0, 0, 0)}, "has length zero"),
     ):  # fmt: skip
-        with pytest.raises(ConfigError, match=message):
-            write(motion, tmp_path / name, **how)
+        refuses(ConfigError, message, write, motion, tmp_path / name, **how)
     assert not list(tmp_path.iterdir())
 
 
@@ -188,7 +183,6 @@ def chunks(path):
 
 
 def numbers(film, data, accessor):
-    """(n, k) what a .glb has for an accessor."""
     a = film["accessors"][accessor]
     start, width = film["bufferViews"][a["bufferView"]]["byteOffset"], WIDTHS[a["type"]]
     return np.frombuffer(data, "<f4", a["count"] * width, start).reshape(a["count"], width)
@@ -226,9 +220,8 @@ def test_vtk_plays_the_film_as_the_bodies_moved(motion, magnify, tmp_path):
     gltf = pytest.importorskip("vtkmodules.vtkIOGeometry", reason="VTK comes with the pictures")
     from vtkmodules.util.numpy_support import vtk_to_numpy
 
-    path = rom.write_animation(
-        motion, tmp_path / "m.glb", frames=11, shapes={"bob": BOX}, seconds=None, magnify=magnify
-    )
+    how = {"frames": 11, "shapes": {"bob": BOX}, "seconds": None, "magnify": magnify}
+    path = rom.write_animation(motion, tmp_path / "m.glb", **how)
     reader = gltf.vtkGLTFReader()
     reader.SetFileName(str(path))
     reader.SetApplyDeformationsToGeometry(True)
@@ -266,9 +259,8 @@ def test_vtk_reads_the_series_in_one_file(motion, tmp_path):
         grid = reader.GetOutput()
         expected = world_points(motion, 25 * step, magnify=2.0)
         order = list(motion.mechanism.parts)
-        assert_allclose(
-            vtk_to_numpy(grid.GetPoints().GetData()), np.vstack([expected[n] for n in order])
-        )
+        points = vtk_to_numpy(grid.GetPoints().GetData())
+        assert_allclose(points, np.vstack([expected[name] for name in order]))
         rod = motion.mechanism.parts["rod"].flexible.surface
         u = np.linalg.norm((rod.shape @ motion.elastic("rod")[25 * step]).reshape(-1, 3), axis=1)
         field = vtk_to_numpy(grid.GetPointData().GetArray("displacement [m]"))
@@ -288,7 +280,7 @@ def test_upright_becomes_y(up):
     assert_allclose(matrix(p) @ up / np.linalg.norm(up), [0, 1, 0], atol=1e-12)
 
 
-def test_quaternions_in_a_film_never_jump_to_the_other_sign(motion, tmp_path):
+def test_quaternions_in_a_film_never_jump_and_a_body_at_rest_has_no_weights(motion, tmp_path):
     """Players interpolate the four numbers: a jump would turn the body once around."""
     signs = np.where(np.arange(len(motion.t)) % 3 == 1, -1.0, 1.0)[:, None]
     at = motion.packed.system.bodies.q_at[motion._number("rod")] + 3
@@ -299,9 +291,6 @@ def test_quaternions_in_a_film_never_jump_to_the_other_sign(motion, tmp_path):
         if c["target"]["path"] == "rotation":
             p = numbers(film, data, film["animations"][0]["samplers"][c["sampler"]]["output"])
             assert np.einsum("fi,fi->f", p[1:], p[:-1]).min() > 0.9
-
-
-def test_a_film_without_flexible_bodies_or_with_one_at_rest_is_written(motion, tmp_path):
     still = replace(motion, q=np.repeat(motion.q[:1], len(motion.t), axis=0))
     film, _ = chunks(rom.write_animation(still, tmp_path / "m.glb"))
     assert not any("weights" in mesh for mesh in film["meshes"])
@@ -315,27 +304,21 @@ class Broken:
             raise ValueError("Not a datatype")
 
 
-def test_a_missing_h5py_is_named(monkeypatch, tmp_path):
-    monkeypatch.setitem(sys.modules, "h5py", None)
-    with pytest.raises(ResourceError, match=r"h5py is not installed.*rom doctor.*\.glb"):
-        write_vtkhdf(np.zeros((1, 3, 3)), np.array([[0, 1, 2]]), np.zeros(1),
-                     tmp_path / "a.vtkhdf", fields={})  # fmt: skip
-    assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.parametrize(
-    ("beside", "match"),
-    [(True, r"dolfinx has loaded another HDF5 before \(Not a datatype\)\. Import h5py first"),
-     (False, r"cannot be loaded \(Not a datatype\)\. rom doctor")],
-)  # fmt: skip
-def test_an_h5py_that_does_not_load_is_told_with_the_cure(beside, match, monkeypatch):
+def test_an_h5py_that_is_missing_or_does_not_load_is_told_with_the_cure(monkeypatch, tmp_path):
     for name in [name for name in sys.modules if name.partition(".")[0] in ("h5py", "dolfinx")]:
         monkeypatch.delitem(sys.modules, name)
-    if beside:
-        monkeypatch.setitem(sys.modules, "dolfinx", sys)
+    with monkeypatch.context() as patch:
+        patch.setitem(sys.modules, "h5py", None)
+        corner = np.zeros((1, 3, 3)), np.array([[0, 1, 2]]), np.zeros(1), tmp_path / "a.vtkhdf"
+        cure = r"h5py is not installed.*rom doctor.*\.glb"
+        refuses(ResourceError, cure, write_vtkhdf, *corner, fields={})
+    assert not list(tmp_path.iterdir())
     monkeypatch.setattr(sys, "meta_path", [Broken(), *sys.meta_path])
-    with pytest.raises(ResourceError, match=rf"{match}.*\.csv needs nothing"):
-        h5py(".csv")
+    alone = r"cannot be loaded \(Not a datatype\)\. rom doctor.*\.csv needs nothing"
+    refuses(ResourceError, alone, h5py, ".csv")
+    monkeypatch.setitem(sys.modules, "dolfinx", sys)
+    beside = r"dolfinx has loaded another HDF5 before \(Not a datatype\)\. Import h5py first"
+    refuses(ResourceError, rf"{beside}.*\.csv needs nothing", h5py, ".csv")
 
 
 @pytest.mark.fenicsx

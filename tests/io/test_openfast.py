@@ -8,13 +8,13 @@ from scipy.linalg import eigh
 import rom
 from cases.files.damage import changed
 from cases.paths import TESTS
-from cases.solid import block, reduced
+from cases.refusals import refuses
+from cases.solid import KINDS, block, reduced
 from rom.cli.main import main
 from rom.errors import ConfigError, QualityGateError, UnsafeFileError
 from rom.io.programs.openfast import LOAD_DURATION, read_openfast, superelement, write_openfast
 
 HERE = TESTS / "reference" / "foreign"
-KINDS = {"root": "rbe2", "tip": "rbe2"}
 G = np.array([0.0, 0.0, -9.81])
 
 
@@ -33,13 +33,11 @@ def path(request, body, tmp_path):
     return write_openfast(body, tmp_path / "jacket.dat", held=["root"], version=request.param)
 
 
-def weight_of(found):
-    """In the weight, or in the first line of the loads."""
-    return found.weight + (found.loads[0] if found.t.size else 0.0)
+def test_the_interface_has_the_condensed_stiffness_and_the_exact_sag(model, path):
+    """Statics of the interface is exact whatever the number of modes.
 
-
-def stiff_tip(model):
-    """K, M and weight of the full model, root held, tip rigid: free nodes, then six of the tip."""
+    K and weight of the full model, root held, tip rigid: free nodes, then six of the tip.
+    """
     root, tip = (model.interfaces[name] for name in KINDS)
     n = len(model.points)
     inner = np.setdiff1d(np.arange(n), [*root.nodes, *tip.nodes])
@@ -47,8 +45,14 @@ def stiff_tip(model):
     T[(3 * inner[:, None] + np.arange(3)).ravel(), np.arange(3 * inner.size)] = 1.0
     for node, x in zip(tip.nodes, tip.points - tip.origin, strict=True):
         T[3 * node : 3 * node + 3, -6:] = np.hstack([np.eye(3), np.cross(np.eye(3), x).T])
-    f = model.M @ np.tile(G, n)
-    return T.T @ model.K @ T, T.T @ model.M @ T, T.T @ f
+    K, f = T.T @ model.K @ T, T.T @ model.M @ np.tile(G, n)
+    found = read_openfast(path)
+    flexibility, ours = np.linalg.inv(K)[-6:, -6:], np.linalg.inv(found.K[:6, :6])
+    assert_allclose(ours, flexibility, rtol=1e-7, atol=1e-8 * np.abs(flexibility).max())
+    sag = np.linalg.solve(K, f)[-6:]
+    assert sag[2] < 0
+    weight = found.weight + (found.loads[0] if found.t.size else 0.0)
+    assert_allclose(ours @ weight[:6], sag, rtol=1e-7, atol=1e-9 * np.abs(sag).max())
 
 
 def test_modes_and_frequencies_are_those_of_the_body(body, path):
@@ -63,21 +67,7 @@ def test_modes_and_frequencies_are_those_of_the_body(body, path):
     assert_allclose(found.D, 1e-6 * found.K, atol=1e-9 * np.abs(found.K).max() * 1e-6)
 
 
-def test_the_interface_has_the_condensed_stiffness_and_the_exact_sag(model, path):
-    """Statics of the interface is exact whatever the number of modes."""
-    K, _, f = stiff_tip(model)
-    found = read_openfast(path)
-    flexibility = np.linalg.inv(K)[-6:, -6:]
-    assert_allclose(np.linalg.inv(found.K[:6, :6]), flexibility, rtol=1e-7,
-                    atol=1e-8 * np.abs(flexibility).max())  # fmt: skip
-    sag = np.linalg.solve(K, f)[-6:]
-    assert sag[2] < 0
-    assert_allclose(np.linalg.solve(found.K[:6, :6], weight_of(found)[:6]), sag, rtol=1e-7,
-                    atol=1e-9 * np.abs(sag).max())  # fmt: skip
-
-
 def floating(model, m, folder):
-    """A body with m modes and its tip alone, and what is read of it."""
     body = rom.reduce(model, method=rom.CraigBampton(m), interfaces={"tip": "rbe2"}, certify=False)
     return body, read_openfast(rom.export(body, folder / "float.dat", to="openfast"))
 
@@ -196,12 +186,11 @@ def test_one_interface_is_free(body, tmp_path, capsys):
         ("has 0 free interfaces", {"held": ("root", "tip")}),
         ("dmig holds no interfaces, openfast does", {"held": ["root"], "to": "dmig"}),
     ):
-        with pytest.raises(ConfigError, match=message):
-            rom.export(body, path, **{"to": "openfast"} | how)
-    with pytest.raises(ConfigError, match="version 3 of OpenFAST is unknown"):
-        write_openfast(body, path, held=["root"], version=3)
+        refuses(ConfigError, message, rom.export, body, path, **{"to": "openfast"} | how)
+    third = {"held": ["root"], "version": 3}
+    refuses(ConfigError, "version 3 of OpenFAST is unknown", write_openfast, body, path, **third)
     file = rom.save(body, tmp_path / "b.rom.npz")
     assert main(["export", str(file), str(path), "--to", "openfast", "--held", "root"]) == 0
     assert "as openfast" in capsys.readouterr().out
-    assert_array_equal(read_openfast(path).M, read_openfast(write_openfast(
-        body, tmp_path / "c.dat", held=["root"])).M)  # fmt: skip
+    same = write_openfast(body, tmp_path / "c.dat", held=["root"])
+    assert_array_equal(read_openfast(path).M, read_openfast(same).M)

@@ -1,10 +1,12 @@
 """Bodies with parameters from finite elements: named regions, stress, any number of processes."""
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.sparse import csr_matrix
 
 import rom
 from cases.long import SHARED_BY
@@ -17,7 +19,6 @@ from rom.eigen.scipy import SciPyOperators
 from rom.eigen.verbs import rigid_motions
 from rom.reduction.full_model import mesh_operators
 
-pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = pytest.mark.fenicsx
 WOOD = rom.Orthotropic((11e9, 0.9e9, 0.5e9), (0.4, 0.4, 0.5), (0.7e9, 0.7e9, 0.05e9), 450.0)
 CARBON = rom.Orthotropic((120e9, 9e9, 9e9), (0.3, 0.3, 0.4), (5e9, 5e9, 3e9), 1500.0)
@@ -87,11 +88,10 @@ def test_stress_of_the_body_is_that_of_its_material(family):
 
 
 def test_petsc_and_scipy_say_the_same(model, family):
-    """The same regions as plain matrices."""
     regions = {}
     for name in ("core", "faces"):
-        K, M = (_csr(A, model.n_dofs) for A in (model.regions[name].K, model.regions[name].M))
-        regions[name] = rom.Region(K, M)
+        parts = (getattr(model.regions[name], which).getValuesCSR() for which in "KM")
+        regions[name] = rom.Region(*(csr_matrix(A[::-1], (model.n_dofs,) * 2) for A in parts))
     plain = replace(model, operators=None, regions=regions, stresses=None)
     assert isinstance(mesh_operators(plain), SciPyOperators)
     assert np.abs(regions["core"].K @ rigid_motions(model.points)).max() < 1e-3
@@ -100,53 +100,16 @@ def test_petsc_and_scipy_say_the_same(model, family):
     assert_allclose(found, expected, rtol=1e-8)
 
 
-def _csr(A, n):
-    from scipy.sparse import csr_matrix
-
-    starts, columns, values = A.getValuesCSR()
-    return csr_matrix((values, columns, starts), shape=(n, n))
-
-
-def test_a_sweep_never_returns_to_the_finite_elements(family, monkeypatch):
-    import rom.fe.elasticity
-    import rom.fe.forms.stress
-    import rom.fe.operators.factor
-    import rom.fe.operators.petsc
-
-    def gone(*arguments, **options):
-        raise AssertionError("the finite elements were asked")
-
-    operators = rom.fe.operators.petsc.PETScOperators
-    for owner, names in (
-        (operators, ("apply_K", "apply_M", "gram", "hold", "modes", "varied")),
-        (rom.fe.operators.factor.Factor, ("__init__", "solve")),
-        (rom.fe.forms.stress.Stresses, ("__init__", "at_nodes")),
-        (rom.fe.elasticity, ("assemble", "assemble_matrix", "model")),
-    ):
-        for name in names:
-            monkeypatch.setattr(owner, name, gone)
-    E = np.geomspace(0.2, 5.0, 100)
-    first = [family.frequencies(1, fixed="root", E_core=e)[0] for e in E]
-    assert np.all(np.diff(first) > 0)
-    assert family.at(E_core=3.0).stress.von_mises(np.ones(family.body.n_modes)).min() > 0
-
-
-@pytest.fixture(scope="module")
-def families(tmp_path_factory):
-    """The same script on one process and on several."""
-    folder, words = tmp_path_factory.mktemp("families"), (RANKS / "family_under_mpi.py", "material")
-    return written_on_each((1, *SHARED_BY), folder, *words, load=rom.load)
-
-
 @pytest.mark.long
 @pytest.mark.mpi
 @pytest.mark.slow
-@pytest.mark.parametrize("n", SHARED_BY)
-def test_a_family_is_blind_to_the_number_of_processes(families, n):
-    one, many = families[1], families[n]
-    assert many.body.n_modes == one.body.n_modes
-    for point in ({}, POINT, {"E_core": 0.2, "rho_core": 2.0}):
-        a, b = one.at(**point), many.at(**point)
+def test_a_family_is_blind_to_the_number_of_processes(tmp_path):
+    words = (RANKS / "family_under_mpi.py", "material")
+    families = written_on_each((1, *SHARED_BY), tmp_path, *words, load=rom.load)
+    one, points = families[1], ({}, POINT, {"E_core": 0.2, "rho_core": 2.0})
+    for n, point in product(SHARED_BY, points):
+        assert families[n].body.n_modes == one.body.n_modes
+        a, b = one.at(**point), families[n].at(**point)
         assert_allclose(b.mass, a.mass, rtol=1e-12)
         assert_allclose(b.inertia, a.inertia, rtol=1e-9, atol=1e-12)
         for fixed in ((), ("root",)):

@@ -12,13 +12,13 @@ from scipy.sparse.linalg import eigsh
 
 import rom
 from cases.refusals import refuses
+from cases.solid import reduced
 from cases.wheels import MARKS, bladed_model, gathered
 from rom.components.wheels.prestress.thermal import _stressed, _thermal, finite_solid
 from rom.eigen.verbs import rigid_motions
 from rom.eigen.workers import ONE_PROCESS
 from rom.errors import ConfigError, InterfaceError, ModelError
 
-pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = MARKS
 E, RHO, L, B, H, ALPHA = 70e9, 2700.0, 1.0, 0.02, 0.01, 23e-6
 EULER = np.pi**2 * H**2 / (12 * L**2)  # strain at which a pinned column buckles
@@ -32,10 +32,8 @@ def heat(strain, **given):
 
 @pytest.fixture(scope="module")
 def bar():
-    return rom.fe.model(
-        "meshes/beam.geo", material=rom.Material(E=E, nu=0.0, rho=RHO),
-        parameters={"L": L, "b": B, "h": H, "hex": 1, "nx": 30, "ny": 1, "nz": 1},
-    )  # fmt: skip
+    sizes = {"L": L, "b": B, "h": H, "hex": 1, "nx": 30, "ny": 1, "nz": 1}
+    return rom.fe.model("meshes/beam.geo", material=rom.Material(E, 0.0, RHO), parameters=sizes)
 
 
 @pytest.mark.long
@@ -62,44 +60,34 @@ def test_a_pinned_bar_softens_as_the_beam_does(bar, share):
     on_axis = ends[np.abs(x[ends, 2]) < 1e-9]
     guided = np.r_[3 * ends, 3 * on_axis[:3] + 2, 3 * on_axis[0] + 1]
     solid = finite_solid(bar, heat(share * EULER))
-    K, K_geo = _thermal(
-        solid, identity(bar.n_dofs, format="csr"), np.unique(guided), bar.M, ONE_PROCESS
-    )
+    one = identity(bar.n_dofs, format="csr")
+    K, K_geo = _thermal(solid, one, np.unique(guided), bar.M, ONE_PROCESS)
     held = np.concatenate([3 * on_axis, 3 * ends + 1, 3 * ends + 2])  # ends turn about y
     loose = np.setdiff1d(np.arange(bar.n_dofs), held)
-    lowest = [
-        eigsh(A[loose][:, loose].tocsc(), 1, bar.M[loose][:, loose].tocsc(), sigma=0.0)[0][0]
-        for A in (K, K + K_geo)
-    ]
+    cold, warm, M = (A[loose][:, loose].tocsc() for A in (K, K + K_geo, bar.M))
+    lowest = [eigsh(A, 1, M, sigma=0.0)[0][0] for A in (cold, warm)]
     assert_allclose(lowest[1] / lowest[0], 1 - share, atol=1e-3 * abs(share))
 
 
 def test_the_reduced_body_is_warm(bar):
     """Below a quarter of the critical temperature, where the free bar is stable too."""
     hot = rom.heated(bar, heat(0.8 * EULER), fixed=ENDS)
-    body = rom.reduce(hot, method=rom.CraigBampton(12), interfaces=dict.fromkeys(ENDS, "rbe2"))
+    body = reduced(12, hot)
     full = rom.modes(hot, 4, fixed=ENDS).frequencies
     assert_allclose(body.frequencies(fixed=ENDS)[:4], full, rtol=1e-4)
     assert full[0] < 0.95 * rom.modes(bar, 1, fixed=ENDS).frequencies[0]
     motion = rigid_motions(hot.points)
     assert abs(hot.K @ motion).max() < 1e-9 * abs(hot.K).max() * L
+    hotter = rom.heated(bar, heat(2 * EULER), fixed=ENDS)  # only its supports keep it straight
+    refuses(ModelError, "1 shapes .* without its supports it would buckle", reduced, 4, hotter)
 
 
-def test_a_bar_that_only_its_supports_keep_straight_is_not_reduced(bar):
-    hot = rom.heated(bar, heat(2 * EULER), fixed=ENDS)
-    with pytest.raises(ModelError, match=r"1 shapes .* without its supports it would buckle"):
-        rom.reduce(hot, method=rom.CraigBampton(4), interfaces=dict.fromkeys(ENDS, "rbe2"))
-
-
-def test_a_free_body_expands_without_stress(bar):
+def test_a_free_body_expands_without_stress_and_keeps_its_rigid_motions(bar):
     """At uniform temperature, and at one that grows linearly: plane sections stay plane."""
     for temperature in (300.0, lambda x: 500.0 * x[:, 0] - 2e4 * x[:, 2], 100.0 * bar.points[:, 1]):
         hot = rom.heated(bar, rom.Heat(ALPHA, temperature))
         # to round-off of the solve, 1e-9 of a stress that would change K by 3e-3
         assert abs(hot.K - bar.K).max() < 1e-11 * abs(bar.K).max()
-
-
-def test_a_free_bar_hot_inside_keeps_its_rigid_motions(bar):
     hot = rom.heated(bar, rom.Heat(ALPHA, lambda x: 2e6 * x[:, 2] ** 2))
     assert abs(hot.K - bar.K).max() > 1e-6 * abs(bar.K).max()
     assert abs(hot.K @ rigid_motions(hot.points)).max() < 1e-11 * abs(hot.K).max()
@@ -126,7 +114,6 @@ def test_a_disc_hot_at_its_rim_has_the_stress_of_timoshenko():
 
 @pytest.mark.long
 def test_one_hot_sector_is_the_hot_wheel():
-    """The whole wheel meshed, held and heated as a solid."""
     N, sizes = 6, {"degree": 1, "cells": (4, 2, 2, 2)}
     rim = rom.Heat(9e-6, lambda x: 8e4 * (x[:, 0] ** 2 + x[:, 1] ** 2))
     whole = rom.heated(bladed_model(N, N, **sizes), rim, fixed=("bore",))
@@ -165,12 +152,9 @@ def test_blades_hotter_than_the_disc_by_region_and_by_node():
     assert abs(alone - model.K).max() < 1e-12 * abs(model.K).max()
 
 
-def test_beyond_buckling_the_temperature_is_named(bar):
+def test_too_much_and_wrong_heat_are_named(bar):
     hot = rom.Heat(ALPHA, 40.0)
     refuses(ModelError, r"temperature change of 14\.3\d* K", rom.heated, bar, hot, fixed=ENDS)
-
-
-def test_wrong_heat_is_named(bar):
     refuses(ConfigError, "needs its temperature", rom.Heat, expansion=12e-6)
     refuses(ConfigError, "needs its expansion", rom.Heat, temperature=20.0)
     for wrong, match in (

@@ -58,9 +58,7 @@ def test_a_twist_held_at_both_ends_is_held_once_by_modes_that_do_not_twist(model
 
 
 def test_a_repeated_frequency_is_kept_whole():
-    square = bar((1.0, 0.02, 0.02), (8, 1, 1))
-    assert rom.reduce(square, method=rom.AssumedModes(1, fixed=("root",)), interfaces=KINDS,
-                      certify=False).n_modes == 2  # fmt: skip
+    assert reduced(bar((1.0, 0.02, 0.02), (8, 1, 1)), 1, ("root",)).n_modes == 2
 
 
 def in_joints(model, body, motion=lambda t: 0.0 * t):
@@ -84,11 +82,9 @@ def sweep(t):
 
 def test_one_resonance_in_time_and_by_linearisation(model):
     """Pinned and clamped modes, whose own frequencies differ by 2.8, and Craig-Bampton."""
-    damping = rom.Rayleigh(0.0, 3e-4)
-    bodies = [reduced(model, 4, PINNED, damping=damping),
-              reduced(model, 24, ("root",), damping=damping),
-              rom.reduce(model, method=rom.CraigBampton(4), interfaces=KINDS, damping=damping,
-                         certify=False)]  # fmt: skip
+    methods = (rom.AssumedModes(4, PINNED), rom.AssumedModes(24, ("root",)), rom.CraigBampton(4))
+    how = {"interfaces": KINDS, "damping": rom.Rayleigh(0.0, 3e-4), "certify": False}
+    bodies = [rom.reduce(model, method=method, **how) for method in methods]
     found, slopes, answers = [], [], []
     for body in bodies:
         still, root = in_joints(model, body)
@@ -143,17 +139,13 @@ def test_the_certificate_says_where_such_a_body_is_right(model):
 
 
 def test_wrong_wishes_are_refused(model):
-    with pytest.raises(
-        ConfigError, match=r"n_modes = 100000 must be .* the dofs that supports leave"
-    ):
-        reduced(model, 100_000, reference="root")
+    clamped, three = {"reference": "root"}, ("root", "tip", "root")
+    many = "n_modes = 100000 must be .* the dofs that supports leave"
+    refuses(ConfigError, many, reduced, model, 10**5, **clamped)
     refuses(InterfaceError, "'foot'", reduced, model, 2, {"foot": "x"})
-    with pytest.raises(InterfaceError, match="of six motions to the body as a whole"):
-        reduced(model, 2, {"root": "xyz"})
-    with pytest.raises(ConfigError, match="does not say what the modes obey"):
-        reduced(model, 2, reference=("root", "tip", "root"))
-    free = reduced(model, 2)
-    refuses(ModelError, "free-free modes only", in_joints, model, free)
+    refuses(InterfaceError, "of six motions to the body", reduced, model, 2, {"root": "xyz"})
+    refuses(ConfigError, "does not say what the modes", reduced, model, 2, reference=three)
+    refuses(ModelError, "free-free modes only", in_joints, model, reduced(model, 2))
 
 
 THIN = (1.0, 0.02, 0.01)
@@ -169,7 +161,7 @@ def body(thin):
     return rom.reduce(thin, method=rom.FreeFree(4), interfaces=KINDS)
 
 
-def test_a_free_body_has_its_frequencies_and_a_certificate(thin, body):
+def test_a_free_body_has_its_frequencies_and_a_certificate(thin, body, tmp_path):
     full = rom.modes(thin, 10, interfaces=KINDS).frequencies
     assert body.frequencies()[:6] == pytest.approx(0.0)
     assert body.frequencies()[6:] == pytest.approx(full[6:], rel=1e-8)
@@ -177,14 +169,7 @@ def test_a_free_body_has_its_frequencies_and_a_certificate(thin, body):
     # Euler and Bernoulli: (4.730041)^2 sqrt(E I / (m L^4)), bending about the thin side first
     bending = 4.730041**2 * np.sqrt(210e9 * THIN[2] ** 2 / (12 * 7850.0)) / (2 * np.pi)
     assert body.frequencies()[6] == pytest.approx(bending, rel=0.01)
-
-
-def test_holding_an_interface_is_refused(body):
-    with pytest.raises(ModelError, match="free-free modes only; with 'root' held"):
-        body.frequencies(fixed=("root",))
-
-
-def test_the_body_file_remembers(body, tmp_path):
+    refuses(ModelError, "free-free modes only; with 'root' held", body.frequencies, fixed=("root",))
     rom.save(body, tmp_path / "free.rom.npz")
     assert not rom.load(tmp_path / "free.rom.npz").has_static_shapes
 

@@ -8,6 +8,7 @@ import rom
 from cases.operators import KINDS
 from cases.refusals import refused, refuses
 from cases.solid import block
+from rom import second_order_balanced_truncation
 from rom.errors import ConfigError, InterfaceError, ModelError, ResourceError, SolverError
 from rom.reduction.interfaces.connection import connect
 
@@ -26,10 +27,8 @@ def connection(request, model):
 
 def dynamic_stiffness(K, M, s, b):
     """What the boundary feels of K - s M."""
-    S, inner = K - s * M, np.setdiff1d(np.arange(len(K)), b)
-    return S[np.ix_(b, b)] - S[np.ix_(b, inner)] @ np.linalg.solve(
-        S[np.ix_(inner, inner)], S[np.ix_(inner, b)]
-    )
+    S, i = K - s * M, np.setdiff1d(np.arange(len(K)), b)
+    return S[np.ix_(b, b)] - S[np.ix_(b, i)] @ np.linalg.solve(S[np.ix_(i, i)], S[np.ix_(i, b)])
 
 
 def errors(connection, method, shifts):
@@ -41,10 +40,8 @@ def errors(connection, method, shifts):
     K_r, M_r = basis.Psi.T @ K @ basis.Psi, basis.Psi.T @ M @ basis.Psi
     found = []
     for s in shifts:
-        exact, ours = (
-            dynamic_stiffness(*pair, s, dofs)
-            for pair, dofs in (((K, M), b), ((K_r, M_r), np.arange(b.size)))
-        )
+        exact = dynamic_stiffness(K, M, s, b)
+        ours = dynamic_stiffness(K_r, M_r, s, np.arange(b.size))
         size = np.sqrt(np.abs(np.diag(K_r)[: b.size]))
         found.append(np.abs((ours - exact) / np.outer(size, size)).max())
     return np.array(found)
@@ -70,9 +67,13 @@ def test_twice_the_order_is_matched(connection, order):
     assert np.log2(near[1] / near[0]) == pytest.approx(2 * order, abs=0.5)
 
 
-def test_at_rest_the_static_set_counts_as_one_more(connection):
+def test_at_rest_the_static_set_counts_as_one_more_and_a_resonance_is_refused(connection):
     near = errors(connection, rom.MomentMatching((0.0,), 1), [shift(100.0), 2 * shift(100.0)])
     assert np.log2(near[1] / near[0]) == pytest.approx(4, abs=0.3)
+    ops, b = connection.ops, connection.boundary
+    f = float(ops.modes(b, 2)[0][0]) / (2 * np.pi)
+    basis = rom.MomentMatching((f,), 1).basis
+    refuses(SolverError, "interfaces held|is singular", basis, ops, b, connection.labels)
 
 
 def test_frequencies_are_upper_bounds_and_converge(connection, model):
@@ -93,23 +94,6 @@ def test_the_body_has_a_certificate(model):
     for method, kinds in ((rom.MomentMatching((0.0, 1500.0), 3), INTERFACES), (loaded, MIXED)):
         body = rom.reduce(model, method=method, interfaces=kinds)
         assert body.certificate.ok, body.certificate
-
-
-def test_enough_moments_are_the_whole_body():
-    model = block(cells=(2, 1, 1))
-    kinds = {"root": "full", "tip": "full"}
-    body = rom.reduce(model, method=rom.MomentMatching((0.0,), 3), interfaces=kinds, certify=False)
-    full = rom.modes(model, model.n_dofs, interfaces=kinds).frequencies
-    assert body.n_modes + 6 == model.n_dofs
-    assert_allclose(body.frequencies()[6:], full[6:], rtol=1e-8)
-
-
-def test_a_resonance_is_refused(connection):
-    ops, b = connection.ops, connection.boundary
-    omega, _ = ops.modes(b, 2)
-    f = float(omega[0]) / (2 * np.pi)
-    with pytest.raises(SolverError, match=r"interfaces held|is singular"):
-        rom.MomentMatching((f,), 1).basis(ops, b, connection.labels)
 
 
 test_wrong_frequencies_are_refused = refused(
@@ -161,13 +145,10 @@ def test_statics_under_the_loads_is_exact(mixed, model, method):
     assert static_error(mixed, rom.WithLoads(method, pinch(model)), F) < 1e-9
 
 
-def test_gravity_is_a_load(mixed):
+def test_gravity_is_a_load_and_restrict_the_adjoint_of_expand(mixed, model):
     F = mixed.ops.apply_M(mixed.ops.rigid[:, :3])
     assert static_error(mixed, rom.Guyan(), F) > 1e-3
     assert static_error(mixed, rom.WithLoads(rom.Guyan()), F) < 1e-9
-
-
-def test_restrict_is_the_adjoint_of_expand(mixed, model):
     rng, ops = np.random.default_rng(2), mixed.ops
     a, F = rng.normal(size=(ops.n, 3)), rng.normal(size=(model.n_dofs, 2))
     assert_allclose(ops.expand(a).T @ F, a.T @ ops.restrict(F), rtol=1e-10)
@@ -181,65 +162,55 @@ def test_what_the_basis_knows_is_not_added_again(mixed, model):
     assert basis.labels[-4:] == tuple(f"fixed-interface {k}" for k in (1, 2, 3, 4))
 
 
-@pytest.mark.parametrize(
-    ("method", "loads", "words"),
-    [
+def test_loads_that_are_none_and_methods_without_constraint_modes_are_refused(mixed):
+    for method, loads, words in (
         (rom.Guyan(), "wind", "'wind' is none of 'gravity'"),
         (rom.Guyan(), np.zeros((5, 1)), r"shape \(5, 1\)"),
         (rom.Guyan(), np.full((297, 1), np.nan), "is not finite"),
         (rom.FreeFree(3), "gravity", "has no constraint modes"),
-    ],
-)
-def test_messages(mixed, method, loads, words):
-    basis = rom.WithLoads(method, loads).basis
-    refuses(ConfigError, words, basis, mixed.ops, mixed.boundary, mixed.labels)
+    ):
+        basis = rom.WithLoads(method, loads).basis
+        refuses(ConfigError, words, basis, mixed.ops, mixed.boundary, mixed.labels)
 
 
-def chain(n=12):
-    K = 1e6 * (2 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1))
-    M = np.diag(np.random.default_rng(0).uniform(0.5, 2.0, n))
-    B = np.zeros((n, 1))
-    B[3] = 1.0
-    return K, M, 1e-4 * K + 0.1 * M, B, B.T
+def modal(omega, zeta, b, c):
+    """Truncation of no coordinate of oscillators side by side."""
+    D = np.diag(2 * zeta * omega)
+    return second_order_balanced_truncation(
+        np.diag(omega**2), np.eye(omega.size), D, b[:, None], c[None], omega.size
+    )
+
+
+def test_oscillators_have_the_singular_values_of_their_impulse_responses():
+    """The integral of its square is b^2 / (4 zeta omega^3); light damping separates modes."""
+    found = modal(np.array([100.0]), 0.05, np.array([3.0]), np.array([2.0]))
+    assert_allclose(found.singular_values, 3.0 * 2.0 / (4 * 0.05 * 100.0**3), rtol=1e-10)
+    assert_allclose(found.K, 100.0**2)
+    assert_allclose(found.C @ found.B, 6.0)
+    omega = np.array([100.0, 250.0, 700.0, 2000.0])
+    b, c = np.array([1.0, 2.0, 0.5, 3.0]), np.array([1.0, 0.3, 2.0, 1.0])
+    exact = np.sort(b * c / (4 * 0.001 * omega**3))[::-1]
+    assert_allclose(modal(omega, 0.001, b, c).singular_values, exact, rtol=1e-4)
 
 
 def response(K, M, D, B, C, s):
     return (C @ np.linalg.solve(K + 1j * s * D - s**2 * M, B))[0, 0]
 
 
-def test_one_oscillator_has_the_singular_value_of_its_impulse_response():
-    """The integral of its square is b^2 / (4 zeta omega^3)."""
-    omega, zeta = 100.0, 0.05
-    found = rom.second_order_balanced_truncation(
-        [[omega**2]], [[1.0]], [[2 * zeta * omega]], [[3.0]], [[2.0]], 1
-    )
-    assert_allclose(found.singular_values, 3.0 * 2.0 / (4 * zeta * omega**3), rtol=1e-10)
-    assert_allclose(found.K, omega**2)
-    assert_allclose(found.C @ found.B, 6.0)
-
-
-def test_light_damping_separates_the_modes():
-    omega, zeta = np.array([100.0, 250.0, 700.0, 2000.0]), 0.001
-    b, c = np.array([[1.0], [2.0], [0.5], [3.0]]), np.array([[1.0, 0.3, 2.0, 1.0]])
-    found = rom.second_order_balanced_truncation(
-        np.diag(omega**2), np.eye(4), np.diag(2 * zeta * omega), b, c, 4
-    )
-    exact = np.sort(b[:, 0] * c[0] / (4 * zeta * omega**3))[::-1]
-    assert_allclose(found.singular_values, exact, rtol=1e-4)
-
-
 def test_the_response_converges_and_is_exact_with_all_coordinates():
-    system, grid = chain(), np.linspace(10.0, 2500.0, 100)
+    n, grid = 12, np.linspace(10.0, 2500.0, 100)
+    K = 1e6 * (2 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1))
+    M, B = np.diag(np.random.default_rng(0).uniform(0.5, 2.0, n)), np.eye(n)[:, 3:4]
+    system = K, M, 1e-4 * K + 0.1 * M, B, B.T
     full = np.array([response(*system, s) for s in grid])
     worst = []
     for r in (2, 6, 8, 10, 12):
-        f = rom.second_order_balanced_truncation(*system, r)
+        f = second_order_balanced_truncation(*system, r)
         ours = np.array([response(f.K, f.M, f.D, f.B, f.C, s) for s in grid])
         worst.append(np.abs(ours - full).max() / np.abs(full).max())
         assert np.linalg.eigvals(f.K).real.min() > 0.0
     assert (np.diff(worst) < 0).all()
-    assert worst[3] < 1e-5
-    assert worst[4] < 1e-11
+    assert worst[3] < 1e-5 and worst[4] < 1e-11
 
 
 @pytest.mark.parametrize("make", KINDS)
@@ -260,16 +231,15 @@ def test_frequencies_of_a_body_are_upper_bounds_and_statics_is_exact(make):
 def test_modes_that_interfaces_neither_move_nor_feel_leave_first():
     """The pool in its own order, judged by what interfaces see: the sum of participations grows."""
     model = block(cells=(10, 2, 2))
-    body, modal = (
-        rom.reduce(model, method=method, interfaces=INTERFACES, certify=False)
-        for method in (rom.BalancedTruncation(6, pool=40), rom.CraigBampton(6))
-    )
-    seen = [b.effective_mass(fixed=tuple(INTERFACES)).sum() for b in (body, modal)]
+    seen = []
+    for method in (rom.BalancedTruncation(6, pool=40), rom.CraigBampton(6)):
+        body = rom.reduce(model, method=method, interfaces=INTERFACES, certify=False)
+        seen.append(body.effective_mass(fixed=tuple(INTERFACES)).sum())
     assert seen[0] > seen[1]
 
 
 def truncated(K, M, D, r=1):
-    rom.second_order_balanced_truncation(K, M, D, np.ones((len(K), 1)), np.ones((1, len(K))), r)
+    second_order_balanced_truncation(K, M, D, np.ones((len(K), 1)), np.ones((1, len(K))), r)
 
 
 test_wrong_systems_are_refused = refused(

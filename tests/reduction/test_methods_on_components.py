@@ -8,15 +8,12 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
+from benchmarks.models import STEEL, TITANIUM
 from cases.long import few
 from cases.paths import ROOT
 
-pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = [pytest.mark.fenicsx, pytest.mark.filterwarnings("ignore:linear tetrahedra")]
-
 MESHES = ROOT / "meshes"
-STEEL = rom.Material(E=210e9, nu=0.3, rho=7850.0)
-TITANIUM = rom.Material(E=114e9, nu=0.33, rho=4430.0)
 HEX = {"hex": 1, "nx": 12, "ny": 1, "nz": 1}
 COMPONENTS = {  # material, parameters, degree, interfaces
     "beam": (STEEL, HEX, 2, ("root", "tip")),
@@ -59,7 +56,6 @@ def component(name):
 
 
 def given(name, implementation):
-    """The matrices with PETSc's operators, or alone as a user of SciPy would bring them."""
     model = component(name)
     return model if implementation == "petsc" else replace(model, operators=None)
 

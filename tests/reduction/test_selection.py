@@ -5,23 +5,16 @@ import pytest
 
 import rom
 from cases.refusals import refused, refuses
-from cases.solid import block, reduced
+from cases.solid import KINDS, STEEL, block, reduced
 from rom.errors import ConfigError
 from rom.reduction.bases.method import judged_in
 
-KINDS = {"root": "rbe2", "tip": "rbe2"}
 BODIES = [  # size [m], cells
-    ((1.0, 0.1, 0.08), (10, 2, 2)),
-    ((1.0, 0.3, 0.05), (10, 4, 2)),
-    ((0.3, 0.3, 0.3), (4, 4, 4)),
-    ((1.0, 0.05, 0.05), (16, 1, 1)),
-    ((0.6, 0.4, 0.02), (8, 6, 1)),
-    ((0.2, 0.5, 0.1), (3, 6, 2)),
-    ((0.5, 0.02, 0.01), (14, 2, 1)),
-    ((2.0, 0.5, 0.5), (9, 3, 3)),
-    ((0.4, 0.2, 0.2), (6, 3, 3)),
+    ((1.0, 0.1, 0.08), (10, 2, 2)), ((1.0, 0.3, 0.05), (10, 4, 2)), ((0.3, 0.3, 0.3), (4, 4, 4)),
+    ((1.0, 0.05, 0.05), (16, 1, 1)), ((0.6, 0.4, 0.02), (8, 6, 1)), ((0.2, 0.5, 0.1), (3, 6, 2)),
+    ((0.5, 0.02, 0.01), (14, 2, 1)), ((2.0, 0.5, 0.5), (9, 3, 3)), ((0.4, 0.2, 0.2), (6, 3, 3)),
     ((0.1, 0.1, 0.4), (3, 3, 7)),
-]
+]  # fmt: skip
 
 
 def worst_error(model, exact, n_modes):
@@ -34,7 +27,7 @@ def worst_error(model, exact, n_modes):
 @pytest.mark.parametrize(("size", "cells"), BODIES)
 @pytest.mark.parametrize(("count", "tol"), [(6, 1e-3), (10, 1e-2), (12, 1e-4)])
 def test_band_and_tolerance_are_met_with_few_modes(size, cells, count, tol):
-    """Accurate against the full model, and two thirds of the modes would not be."""
+    """And two thirds of the modes would not do."""
     model = block(size=size, cells=cells)
     exact = rom.modes(model, 6 + count, interfaces=KINDS).frequencies[6:]
     method = rom.CraigBampton(f_max=1.001 * exact[-1], tol=tol)
@@ -74,7 +67,6 @@ def test_without_a_number_the_frequencies_of_every_support_are_accurate(size, ce
 
 
 def test_the_default_passes_its_certificate():
-    """Also with gravity shapes around it, and with another tolerance."""
     model = block(size=(1.0, 0.3, 0.05), cells=(10, 4, 2))
     body = rom.reduce(model, interfaces=KINDS)
     assert body.certificate.ok, body.certificate
@@ -92,12 +84,11 @@ def meshed(size, cells):
     from rom.fe.elasticity import assemble
 
     mesh, tags = box(size, cells)
-    return assemble(mesh, None, tags, material=rom.Material(E=210e9, nu=0.3, rho=7850.0))
+    return assemble(mesh, None, tags, material=STEEL)
 
 
 @pytest.mark.fenicsx
 def test_the_selection_works_on_meshes_too():
-    """PETSc operators, rbe3 and orthogonal functions as interfaces."""
     model = meshed((1.0, 0.1, 0.08), (10, 2, 2))
     kinds = {"x0": "rbe3", "x1": "polynomial:1"}
     exact = rom.modes(model, 12, interfaces=kinds).frequencies[6:]
@@ -110,7 +101,6 @@ def test_the_selection_works_on_meshes_too():
 @pytest.mark.fenicsx
 @pytest.mark.long
 def test_the_order_is_chosen_on_meshes_too():
-    """Beside an averaging interface, which PETSc has to project."""
     model = meshed((0.3, 0.2, 0.1), (4, 3, 2))
     kinds = {"x0": "rbe3", "x1": rom.Polynomial()}
     exact = rom.modes(model, 12, interfaces={"x0": "rbe3"}).frequencies[6:]
@@ -127,7 +117,6 @@ def asked(**options):
 test_wishes_that_exclude_each_other_are_refused = refused(
     (asked(n_modes=3, f_max=1e3), "n_modes or f_max, not both"),
     (asked(n_modes=3, tol=1e-3), "n_modes or tol, not both"),
-    (asked(tol=1.0), "tol = 1 must"),
     (asked(f_max=1e3, search="arnoldi"), "search"),
     (asked(n_modes=3, search="substructures"), "needs f_max"),
     (asked(f_max=1e3, tol=1e-3, search="substructures"), "takes no tol"),
@@ -161,6 +150,6 @@ def test_an_open_order_needs_an_accuracy():
     model = block(cells=(4, 2, 2))
     kinds = {"root": "rbe2", "tip": rom.Polynomial()}
     for method in (rom.CraigBampton(5), rom.CraigBampton(f_max=1e3), rom.Rubin(5)):
-        with pytest.raises(ConfigError, match="states no accuracy"):
-            rom.reduce(model, method=method, interfaces=kinds)
+        how = {"method": method, "interfaces": kinds}
+        refuses(ConfigError, "states no accuracy", rom.reduce, model, **how)
     refuses(ConfigError, "is open", rom.modes, model, 8, interfaces=kinds)

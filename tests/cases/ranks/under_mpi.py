@@ -83,6 +83,6 @@ def die():
 if sys.argv[1] == "die":
     die()
 elif sys.argv[1] == "model":
-    model(sys.argv[2], tuple(map(int, sys.argv[3].split(","))), int(sys.argv[4]))
+    model(sys.argv[4], tuple(map(int, sys.argv[2].split(","))), int(sys.argv[3]))
 else:
     fail(sys.argv[2])

@@ -42,12 +42,7 @@ def test_solutions_are_those_of_the_whole_matrix(found, n):
     assert max(found[n]["errors"]) < 1e-12
     assert found[n]["joined"] == [0] * 5
     assert found[n]["border of stars"] == n - 1
-
-
-@pytest.mark.parametrize("n", SHARED_BY)
-@pytest.mark.parametrize("case", LEFT_TO_MUMPS + NOT_DEFINITE)
-def test_it_leaves_what_it_is_not_made_for_and_notices_what_is_not_definite(found, n, case):
-    assert found[n][case]
+    assert all(found[n][case] for case in LEFT_TO_MUMPS + NOT_DEFINITE), found[n]
 
 
 def fill(pattern, places):
@@ -80,14 +75,6 @@ def test_given_unknowns_come_last_at_no_further_fill(library, seed):
     own.release()
 
 
-def test_an_order_with_less_fill_is_not_found_by_chance(library):
-    """The count of fill tells a good order from one at random."""
-    pattern, rng = generated(0), np.random.default_rng(0)
-    places = mumps.elimination_order(library, pattern, N_LAST)
-    at_random = [fill(pattern, rng.permutation(N_VERTICES)) for _ in range(20)]
-    assert fill(pattern, places) < 0.6 * min(at_random)
-
-
 @pytest.mark.parametrize("m", [1, 5, 30])
 def test_a_solution_in_two_halves_around_a_border(library, m):
     rng, n = np.random.default_rng(m), 40
@@ -109,7 +96,6 @@ def test_a_solution_in_two_halves_around_a_border(library, m):
 
 
 def test_without_the_library_mumps_shares_the_factor_as_petsc_calls_it(monkeypatch):
-    monkeypatch.setattr(mumps, "mapped_files", list)
-    assert mumps.library(MPI.COMM_SELF) is None
-    monkeypatch.setattr(mumps, "mapped_files", lambda: ["/nowhere/libdmumps.so"])
-    assert mumps.library(MPI.COMM_SELF) is None
+    for files in ([], ["/nowhere/libdmumps.so"]):
+        monkeypatch.setattr(mumps, "mapped_files", lambda files=files: files)
+        assert mumps.library(MPI.COMM_SELF) is None

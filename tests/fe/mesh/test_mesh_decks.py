@@ -8,10 +8,11 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import rom
 from cases.files.cells import solid
-from cases.files.damage import damaged, outcome
+from cases.files.damage import changed, damaged, outcome
 from cases.files.random_decks import CARDS, KEYWORDS, SIZE, random_deck
 from cases.long import few
 from cases.refusals import refuses
+from cases.solid import STEEL
 from rom.decks.bulk import cards
 from rom.errors import FileFormatError, MeshError, ResourceError, RomError, RomWarning, TagError
 from rom.fe.mesh import child
@@ -30,15 +31,10 @@ VTK = {
 
 
 def meshio_box(kind):
-    """A box as meshio sees it, and the record it must become."""
     meshio = pytest.importorskip("meshio", reason="meshio is not installed")
     mesh = solid("hex27" if kind == "hex20" else kind, (2, 2, 2), (2.0, 1.0, 1.0))
-    if kind == "hex20":
-        used = np.unique(mesh.cells[:, :20])
-        cells = np.searchsorted(used, mesh.cells[:, :20])
-        points = mesh.points[used]
-    else:
-        cells, points = mesh.cells, mesh.points
+    used = np.unique(mesh.cells[:, :20])
+    cells, points = np.searchsorted(used, mesh.cells[:, :20]), mesh.points[used]
     root = np.flatnonzero(points[:, 0] == 0.0)
     ordered = cells[:, VTK.get(kind, range(cells.shape[1]))]
     return meshio, meshio.Mesh(points, [(MESHIO[kind], ordered)], point_sets={"root": root}), mesh
@@ -74,8 +70,7 @@ def test_nastran_written_by_meshio_comes_back(tmp_path, kind):
     path.write_text(path.read_text().replace("ENDDATA", "\n".join([*cards, "ENDDATA"])))
     found = read_mesh(path)
     assert found.region_names == {4: "property_4", 9: "property_9"}
-    assert (found.regions == 4).sum() == 3
-    assert list(found.facets) == ["spc_7"]
+    assert (found.regions == 4).sum() == 3 and list(found.facets) == ["spc_7"]
     check_box(found, mesh)
 
 
@@ -153,12 +148,10 @@ def test_abaqus_side_numbers_follow_the_manual(kind):
 
 
 def test_nastran_skin_elements_and_fixed_fields(tmp_path):
-    """Small fields, THRU, and a skin of quadrilaterals with their own property."""
     mesh = solid("hex8", (1, 1, 1), (1.0, 1.0, 1.0))
     cards = ["SOL 101", "BEGIN BULK"]
-    cards += [
-        f"GRID    {i + 1:<8}{'':8}{x:<8}{y:<8}{z:<8}" for i, (x, y, z) in enumerate(mesh.points)
-    ]
+    for i, (x, y, z) in enumerate(mesh.points):
+        cards.append(f"GRID    {i + 1:<8}{'':8}{x:<8}{y:<8}{z:<8}")
     nodes = [str(i + 1) for i in mesh.cells[0]]
     cards += [f"CHEXA,5,2,{','.join(nodes[:6])}", f"+,{','.join(nodes[6:])}"]
     ring = mesh.facets["root"][0] + 1
@@ -183,41 +176,31 @@ def test_a_missing_library_is_named(tmp_path, monkeypatch):
 
 
 RIGHT = "type=c3d8, elset=right\n 8, 20, 52, 53, 30, 21, 62, 63, 31"
-ABAQUS_FAULTS = {
-    "cut element": (("40,\n 11, 21, 31, 41", "40"), FileFormatError, "cut"),
-    "undefined node": (("8, 20, 52, 53", "8, 20, 52, 99"), FileFormatError, "node 99"),
-    "node twice": ((" 53, 2., 1., 0.", " 52, 2., 1., 0."), FileFormatError, "node 52"),
-    "element twice": ((" 8, 20, 52", " 7, 20, 52"), FileFormatError, "element 7"),
-    "unknown set": (("every, S2", "evry, S2"), FileFormatError, "'evry'"),
-    "unknown side": (("8, S4", "8, S7"), FileFormatError, "'S7'"),
-    "set of itself": (("left, right", "every"), FileFormatError, "'every'"),
-    "no section": (("*SOLID SECTION, ELSET=left, MATERIAL=brass", ""), TagError, "element 7"),
-    "two sections": (("ELSET=left, MATERIAL", "ELSET=every, MATERIAL"), TagError, "element 8"),
-    "wedge": (("type=c3d8,", "type=c3d6,"), FileFormatError, "*ELEMENT, TYPE=C3D6 (1, deck.inp"),
-    "mixed": ((RIGHT, "type=c3d4\n 8, 20, 52, 53, 30"), MeshError, "['hex8', 'tet4']"),
-    "include": (("** a comment", "*INCLUDE, INPUT=deck.inp"), FileFormatError, "too deep"),
-    "letters": ((" 62, 2., 0., 1.", " 62, 2., zero, 1."), FileFormatError, "zero"),
-}
+test_broken_abaqus_deck_is_refused = pytest.mark.once(changed(
+    DECK, "deck.inp", read_mesh,
+    ("40,\n 11, 21, 31, 41", "40", "cut"),
+    ("8, 20, 52, 53", "8, 20, 52, 99", "node 99"),
+    (" 53, 2., 1., 0.", " 52, 2., 1., 0.", "node 52"),
+    (" 8, 20, 52", " 7, 20, 52", "element 7"),
+    ("every, S2", "evry, S2", "'evry'"),
+    ("8, S4", "8, S7", "'S7'"),
+    ("left, right", "every", "'every'"),
+    ("*SOLID SECTION, ELSET=left, MATERIAL=brass", "", TagError, "element 7"),
+    ("ELSET=left, MATERIAL", "ELSET=every, MATERIAL", TagError, "element 8"),
+    ("type=c3d8,", "type=c3d6,", r"\*ELEMENT, TYPE=C3D6 \(1, deck\.inp"),
+    (RIGHT, "type=c3d4\n 8, 20, 52, 53, 30", MeshError, r"\['hex8', 'tet4'\]"),
+    ("** a comment", "*INCLUDE, INPUT=deck.inp", "too deep"),
+    (" 62, 2., 0., 1.", " 62, 2., zero, 1.", "zero"),
+))  # fmt: skip
 
 
-@pytest.mark.once
-@pytest.mark.parametrize("fault", ABAQUS_FAULTS)
-def test_broken_abaqus_deck_is_refused(tmp_path, fault):
-    (old, new), error, culprit = ABAQUS_FAULTS[fault]
-    assert old in DECK
-    (tmp_path / "deck.inp").write_text(DECK.replace(old, new))
-    with pytest.raises(error) as caught:
-        read_mesh(tmp_path / "deck.inp")
-    assert culprit in str(caught.value) and "deck.inp" in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    "text",
-    ["", "GRID,1,,0.,0.,0.\n", "BEGIN BULK\nCTETRA,1,1,1,2,3,4\nENDDATA\n", "BEGIN BULK\nGRID"],
-)
-def test_broken_nastran_deck_is_refused(tmp_path, text):
-    (tmp_path / "deck.bdf").write_text(text)
-    refuses((FileFormatError, MeshError), r"deck\.bdf", read_mesh, tmp_path / "deck.bdf")
+def test_broken_nastran_deck_is_refused(tmp_path):
+    path, bulk = tmp_path / "deck.bdf", "BEGIN BULK\n"
+    for text in ("", "GRID,1,,0.,0.,0.\n", f"{bulk}CTETRA,1,1,1,2,3,4\nENDDATA\n", f"{bulk}GRID"):
+        path.write_text(text)
+        refuses((FileFormatError, MeshError), r"deck\.bdf", read_mesh, path)
+    path.write_text("INCLUDE 'gone.blk'\n")
+    refuses(RomError, "gone.blk: there is no such file", nastran.read, str(path))
 
 
 @pytest.mark.parametrize("ending", [".inp", ".bdf"])
@@ -325,18 +308,16 @@ def test_systems_lead_where_the_manuals_say(tmp_path):
 
 
 EIGHT = ["1", "2", "3", "4", "5", "6", "7", "8"]
+NARROW = "CHEXA   1       2       3       4       5       6       7       8"
 FORMS = {  # what is written, the fields it means
-    "narrow": ("CHEXA   1       2       3       4       5       6       7       8", EIGHT),
+    "narrow": (NARROW, EIGHT),
     "right": (f"CHEXA   {1:8}{2:8}{3:8}{4:8}{5:8}{6:8}{7:8}{8:8}", EIGHT),
     "free": ("chexa, 1,2 , 3,4,5,6,7,8", EIGHT),
     "tabs": ("CHEXA\t1\t2\t3\t4\t5\t6\t7\t8", EIGHT),
     "wide": (f"CHEXA*  {1:<16}{2:<16}{3:<16}{4:<16}*A\n*A      {5:16}{6:16}{7:16}{8:16}", EIGHT),
     "wide and free": ("CHEXA*,1,2,3,4,*\n*,5,6,7,8", EIGHT),
     "half a wide one": ("CHEXA*,1,2,3,4\n+,9", [*EIGHT[:4], "", "", "", "", "9"]),
-    "named": (
-        "CHEXA   1       2       3       4       5       6       7       8       +X1\n+X1,9",
-        [*EIGHT, "9"],
-    ),
+    "named": (f"{NARROW}       +X1\n+X1,9", [*EIGHT, "9"]),
     "a comment": ("CHEXA,1,2,3,4,5,6,7,8 $ 9\n$ 10\n\n,9", [*EIGHT, "9"]),
 }
 
@@ -361,54 +342,40 @@ def test_every_card_that_would_be_lost_is_refused_by_name(name, tmp_path):
 
 def test_a_piece_of_a_ring_weighs_what_it_does(tmp_path):
     (tmp_path / "ring.inp").write_text(RING)
-    steel = rom.Material(E=210e9, nu=0.3, rho=7850.0)
     pytest.importorskip("dolfinx", reason="dolfinx is not installed")
     with pytest.warns(rom.errors.RomWarning, match="1 nodes belong to no solid .* 99; check"):
-        model = rom.fe.model(tmp_path / "ring.inp", material=steel, degree=1)
+        model = rom.fe.model(tmp_path / "ring.inp", material=STEEL, degree=1)
     area = 0.5 * (0.1**2 - 0.08**2) * np.sin(np.radians(ARC))
     assert model.mass() == pytest.approx(7850 * area * 0.03, rel=1e-12)
 
 
-CUBE = "".join(
-    f"GRID,{k + 1},,{x}.,{y}.,{z}.\n"
-    for k, (x, y, z) in enumerate(
-        [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
-    )
-)
+CORNERS = ("0.,0.,0.", "1.,0.,0.", "1.,1.,0.", "0.,1.,0.",
+           "0.,0.,1.", "1.,0.,1.", "1.,1.,1.", "0.,1.,1.")  # fmt: skip
+CUBE = "".join(f"GRID,{k},,{x}\n" for k, x in enumerate(CORNERS, 1))
 CUBE += "CHEXA,1,1,1,2,3,4,5,6\n,7,8\n"
-IN_SYSTEM, UNCHANGED = ("GRID,1,,", "GRID,1,3,"), ("", "")
-FAULTS = {  # what is put in front, what is put in the place of what, what is said
-    "a flat system": ("CORD2R,3,,0.,0.,0.,0.,0.,1.\n,0.,0.,2.\n", *IN_SYSTEM, "on a line"),
-    "no system": ("", *IN_SYSTEM, r"deck.bdf, line 1: .* system 3 is not defined"),
-    "a system of itself": ("CORD1R,3,1,2,3\n", *IN_SYSTEM, "3 is defined by itself"),
-    "a node twice": ("", "GRID,2,", "GRID,1,", "node 1 is defined twice"),
-    "a node for a system": ("CORD1R,3,77,2,3\n", *IN_SYSTEM, "node 77 is not defined"),
-    "a long line": ("", "5,6\n,7,8", "5,6,7,8", "11 fields; 9 are read"),
-    "a foreign continuation": ("", "5,6\n,7", "5,6,+A\n+B,7", r"'\+B', does not continue"),
-    "no card": ("", "GRID,1,,", ",1,,", "does not continue"),
-    "seven nodes": ("", ",7,8", ",7", "CHEXA is not read: it has 7 nodes, not 8 or 20"),
-    "no property": ("", "CHEXA,1,1", "CHEXA,1,", "no property number"),
-    "words": ("", "GRID,1,,0.", "GRID,1,,O.", r"deck.bdf, line 1: .*'O.' is no finite number"),
-    "all at once": (
-        "RBE3,1\nCONM2,2\nRBE3,4\n",
-        *UNCHANGED,
-        r"RBE3 \(2, .*CONM2 \(1, .*rbe3.*Attachment",
-    ),
-    "a lost file": ("INCLUDE 'gone.blk'\n", *UNCHANGED, "gone.blk: there is no such file"),
-    "itself": ("INCLUDE 'deck.bdf'\n", *UNCHANGED, "include each other too deep"),
-}
-
-
-@pytest.mark.parametrize("case", FAULTS)
-def test_what_is_wrong_with_a_card_is_named(case, tmp_path):
-    front, old, new, message = FAULTS[case]
-    assert old in CUBE
-    (tmp_path / "deck.bdf").write_text(front + CUBE.replace(old, new))
-    refuses(RomError, message, nastran.read, str(tmp_path / "deck.bdf"))
-
-
+SYSTEM = ("GRID,1,,", "GRID,1,3,")
+test_what_is_wrong_with_a_card_is_named = changed(
+    f"$\n{CUBE}", "deck.bdf", lambda path: nastran.read(str(path)),
+    ("$\nGRID,1,,", "CORD2R,3,,0.,0.,0.,0.,0.,1.\n,0.,0.,2.\nGRID,1,3,", "on a line"),
+    (*SYSTEM, "line 2: .* system 3 is not defined"),
+    ("$\nGRID,1,,", "CORD1R,3,1,2,3\nGRID,1,3,", "3 is defined by itself"),
+    ("GRID,2,", "GRID,1,", "node 1 is defined twice"),
+    ("$\nGRID,1,,", "CORD1R,3,77,2,3\nGRID,1,3,", "node 77 is not defined"),
+    ("5,6\n,7,8", "5,6,7,8", "11 fields; 9 are read"),
+    ("5,6\n,7", "5,6,+A\n+B,7", r"'\+B', does not continue"),
+    ("GRID,1,,", ",1,,", "does not continue"),
+    (",7,8", ",7", "CHEXA is not read: it has 7 nodes, not 8 or 20"),
+    ("CHEXA,1,1", "CHEXA,1,", "no property number"),
+    ("GRID,1,,0.", "GRID,1,,O.", "line 2: .*'O.' is no finite number"),
+    ("$", "RBE3,1\nCONM2,2\nRBE3,4", r"RBE3 \(2, .*CONM2 \(1, .*rbe3.*Attachment"),
+    ("$", "INCLUDE 'deck.bdf'", "include each other too deep"),
+    error=RomError,
+)  # fmt: skip
 PART = "*PART, NAME=a\n" + RING.partition("*NODE\n")[0] + "*END PART\n"
 ONE, TWO = ("*INSTANCE, NAME=a-1, PART=a\n*END INSTANCE\n", "*INSTANCE, NAME=a-2, PART=a\n")
+TRUSS = "*ELEMENT, TYPE=T3D2, ELSET=e\n9, 1, 2\n"
+SKIN = "*ELEMENT, TYPE=S4, ELSET=e\n9, 1, 2, 12, 11\n"
+SECTION = "*SOLID SECTION, ELSET=e\n"
 PARTS = {
     "two instances": (PART + ONE + TWO, "2 instances, 'a-1', 'a-2'"),
     "two parts": (PART + PART.replace("=a\n", "=b\n"), "2 parts, 'a', 'b'"),
@@ -416,14 +383,8 @@ PARTS = {
     "a reference point": (PART + ONE + "*NODE\n1, 0., 0., 0.\n", r"\*NODE outside of the part"),
     "half a system": ("*SYSTEM\n1., 2., 3., 4., 5., 6.\n" + RING, "6 numbers instead of 0, 3 or 9"),
     "a flat system": ("*SYSTEM\n0., 0., 0., 1., 0., 0.\n2., 0., 0.\n" + RING, "on a line"),
-    "a section of trusses": (
-        RING + "*ELEMENT, TYPE=T3D2, ELSET=bar\n9, 1, 2\n*SOLID SECTION, ELSET=bar\n",
-        "elements that are no solids: 9",
-    ),
-    "a section of a skin": (
-        RING + "*ELEMENT, TYPE=S4, ELSET=skin\n9, 1, 2, 12, 11\n*SOLID SECTION, ELSET=skin\n",
-        "elements that are no solids: 9",
-    ),
+    "a section of trusses": (RING + TRUSS + SECTION, "elements that are no solids: 9"),
+    "a section of a skin": (RING + SKIN + SECTION, "elements that are no solids: 9"),
     "copies of nothing": (RING + "*ELGEN\n8, 3\n", "ring.inp, line .*element 8 is not defined"),
     "copies without end": (RING + "*ELGEN\n7, 99999999\n", r"\[99999999, 1, 1\] elements"),
     "an option": (RING + "*NODE, NSET=a, SHIFT=3\n", r"\*NODE, SHIFT \(1"),
@@ -439,14 +400,14 @@ def test_what_is_wrong_with_a_keyword_is_named(case, tmp_path):
 
 TURNED = CUBE.replace("GRID,2,,1.,0.,0.", "GRID,2,,1.,0.,0.,6")
 TRANSFORM = "*TRANSFORM, NSET=root, TYPE=C\n0., 0., 0., 0., 0., 1.\n"
-ROWS = [("a.bdf", TURNED, "nodes 2 move along axes"), ("a.inp", RING + TRANSFORM, "TRANSFORM"),
-        ("a.inp", RING + "*NFILL\n", "NFILL")]  # fmt: skip
 
 
-@pytest.mark.parametrize(("name", "text", "message"), ROWS)
-def test_nodes_of_matrices_whose_rows_are_turned_are_refused(name, text, message, tmp_path):
-    (tmp_path / name).write_text(text)
-    refuses(FileFormatError, message, read_nodes, tmp_path / name)
+def test_nodes_of_matrices_whose_rows_are_turned_are_refused(tmp_path):
+    for name, text, message in (("a.bdf", TURNED, "nodes 2 move along axes"),
+        ("a.inp", RING + TRANSFORM, "TRANSFORM"), ("a.inp", RING + "*NFILL\n", "NFILL"),
+    ):  # fmt: skip
+        (tmp_path / name).write_text(text)
+        refuses(FileFormatError, message, read_nodes, tmp_path / name)
 
 
 def test_loads_and_supports_are_left_aside_and_told(tmp_path):

@@ -1,5 +1,7 @@
 """The geometries in meshes/: volumes in closed form, bores in place, names, parameter ranges."""
 
+import re
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -8,10 +10,10 @@ import rom
 from cases.long import ROM_LONG
 from cases.measures import areas, volume
 from cases.paths import ROOT
+from cases.refusals import refuses
 from rom.errors import ConfigError
 from rom.fe.mesh.read import read_mesh
 
-pytest.importorskip("gmsh", reason="gmsh is not installed")
 pytestmark = pytest.mark.fenicsx
 MESHES = ROOT / "meshes"
 ROD = {
@@ -63,42 +65,28 @@ def in_pocket(x, y, p, slope, n):
     a, b = x1 + radius, x2 - radius
     along = np.maximum(np.maximum(a - x, x - b), 0.0)
     across = np.maximum(y - (top(np.clip(x, a, b)) - radius * n), 0.0)
-    return (
-        (x > x1)
-        & (x < x2)
-        & (y < top(x))
-        & ((along == 0.0) | (across == 0.0) | (np.hypot(along, across) < radius))
-    )
-
-
-def rod_volume(p, cells=3000):
-    x = np.linspace(-p["D_a"] / 2, p["L"] + p["D_b"] / 2, 2 * cells + 1)[1::2]
-    y = np.linspace(0.0, p["D_a"] / 2, cells // 3 * 2 + 1)[1::2]
-    t = rod_thickness(*np.meshgrid(x, y, indexing="ij"), p)
-    return 2 * t.sum() * (x[1] - x[0]) * (y[1] - y[0])
+    inside = (along == 0.0) | (across == 0.0) | (np.hypot(along, across) < radius)
+    return (x > x1) & (x < x2) & (y < top(x)) & inside
 
 
 @pytest.mark.parametrize("change", [{}, {"L": 0.15, "h_b": 0.020, "R": 0.004, "t_web": 0.006}])
 def test_volume_of_the_rod_agrees_with_its_description(change):
     p = ROD | change
     mesh = read_mesh(MESHES / "connecting_rod.geo", parameters=p | {"lc": 0.004}, order=2)
-    assert volume(mesh) == pytest.approx(rod_volume(p), rel=1e-3)
+    x = np.linspace(-p["D_a"] / 2, p["L"] + p["D_b"] / 2, 6001)[1::2]
+    y = np.linspace(0.0, p["D_a"] / 2, 2001)[1::2]
+    t = rod_thickness(*np.meshgrid(x, y, indexing="ij"), p)
+    assert volume(mesh) == pytest.approx(2 * t.sum() * (x[1] - x[0]) * (y[1] - y[0]), rel=1e-3)
 
 
-def test_bores_of_the_rod_are_cylinders_about_its_pins():
-    mesh = read_mesh(MESHES / "connecting_rod.geo")
+def test_the_rod_has_cylindrical_bores_fillets_and_pockets():
+    p, mesh = ROD, read_mesh(MESHES / "connecting_rod.geo")
     for name, x, d, t in (("pin_a", 0.0, 0.030, 0.020), ("pin_b", 0.2, 0.016, 0.016)):
         points = mesh.points[np.unique(mesh.facets[name])]
         assert_allclose(np.hypot(points[:, 0] - x, points[:, 1]), d / 2, rtol=1e-8)
         assert_allclose((points[:, 2].min(), points[:, 2].max()), (-t / 2, t / 2), rtol=1e-8)
         assert areas(mesh)[name] == pytest.approx(np.pi * d * t, rel=0.04)
     assert mesh.region_names == {1: "body"}
-
-
-def test_the_rod_has_fillets_and_pockets():
-    """Outer nodes on the fillet cylinders, and on both faces of the web."""
-    p = ROD
-    mesh = read_mesh(MESHES / "connecting_rod.geo")
     slope = (p["h_b"] - p["h_a"]) / 2 / p["L"]
     for D, sign, x0 in ((p["D_a"], 1, 0.0), (p["D_b"], -1, p["L"])):
         cx, cy = rolling_centre(p, D, sign, x0, slope, np.hypot(1.0, slope))
@@ -109,11 +97,6 @@ def test_the_rod_has_fillets_and_pockets():
     middle = (mesh.points[:, 0] > 0.05) & (mesh.points[:, 0] < 0.15)
     web = middle & (np.abs(mesh.points[:, 1]) < 0.004)
     assert_allclose(np.unique(np.abs(mesh.points[web, 2]).round(9)).max(), p["t_web"] / 2)
-
-
-def test_default_rod_is_small_enough_for_a_demo():
-    mesh = read_mesh(MESHES / "connecting_rod.geo", order=2)
-    assert 10_000 < 3 * len(mesh.points) < 27_000
 
 
 def test_volume_of_the_crank_is_that_of_hull_and_cylinders():
@@ -132,11 +115,9 @@ def test_volume_of_the_crank_is_that_of_hull_and_cylinders():
 
 @pytest.mark.long
 def test_parts_of_the_frame_meet_in_their_nodes_and_fill_the_whole():
-    whole, left, beam, right = (
-        read_mesh(MESHES / "frame.geo", parameters={"part": part}) for part in range(4)
-    )
-    parts = (left, beam, right)
-    assert sum(map(volume, parts)) == pytest.approx(volume(whole), rel=1e-9)
+    file = MESHES / "frame.geo"
+    whole, left, beam, right = (read_mesh(file, parameters={"part": part}) for part in range(4))
+    assert sum(map(volume, (left, beam, right))) == pytest.approx(volume(whole), rel=1e-9)
     exact = 2 * np.pi * 0.02**2 * 0.25 + 0.47 * 0.07 * 0.05
     assert volume(whole) == pytest.approx(exact, rel=3e-4)
     for column, bore, x in ((left, "bore_left", 0.0), (right, "bore_right", 0.4)):
@@ -147,7 +128,7 @@ def test_parts_of_the_frame_meet_in_their_nodes_and_fill_the_whole():
         assert_allclose((seat[:, 2].min(), seat[:, 2].max()), (0.25, 0.3))
         assert (column.points[np.unique(column.facets["foot"]), 2] == 0.0).all()
         assert areas(column)["seat"] == pytest.approx(areas(beam)[bore], rel=1e-12)
-    other = read_mesh(MESHES / "frame.geo", parameters={"part": 3, "n_right": 6, "n_along": 5})
+    other = read_mesh(file, parameters={"part": 3, "n_right": 6, "n_along": 5})
     assert np.unique(other.facets["seat"][:, :3]).size == 12 * 6
 
 
@@ -174,9 +155,8 @@ def feasible(rng):
 
 @pytest.mark.parametrize("seed", range(8 if ROM_LONG else 3))
 def test_the_rod_meshes_over_its_range(seed):
-    mesh = read_mesh(
-        MESHES / "connecting_rod.geo", parameters=feasible(np.random.default_rng(seed))
-    )
+    p = feasible(np.random.default_rng(seed))
+    mesh = read_mesh(MESHES / "connecting_rod.geo", parameters=p)
     assert set(mesh.facets) == {"pin_a", "pin_b"}
 
 
@@ -188,21 +168,10 @@ BLADE = {
 }  # fmt: skip
 
 
-def blade_volume(p):
-    """Parabolic profiles with blunt edges, platform, dovetail; fillets add nothing."""
-    z = np.linspace(0.0, 1.0, 2001)[1::2]
-    chord, t = (
-        p[a] + (p[b] - p[a]) * z for a, b in (("chord_root", "chord_tip"), ("t_root", "t_tip"))
-    )
-    airfoil = p["span"] * (chord * (p["t_edge"] + 2 / 3 * (t - p["t_edge"]))).mean()
-    depth = (p["w_dovetail"] - p["w_neck"]) / 2 / np.tan(np.radians(p["beta"]))
-    root = p["w_neck"] * (p["h_neck"] + depth / 2) + p["w_dovetail"] * (p["h_foot"] + depth / 2)
-    return airfoil + p["l_platform"] * p["w_platform"] * p["t_platform"] + p["l_root"] * root
-
-
 @pytest.mark.long
 @pytest.mark.parametrize("seed", range(5 if ROM_LONG else 2))
 def test_the_blade_meshes_over_its_range(seed):
+    """Parabolic profiles with blunt edges, platform, dovetail; fillets add nothing."""
     rng = np.random.default_rng(seed)
     p = {name: value * rng.uniform(0.85, 1.2) for name, value in BLADE.items()}
     p["l_platform"] = max(p["l_platform"], 1.2 * p["chord_root"], p["l_root"])
@@ -211,9 +180,14 @@ def test_the_blade_meshes_over_its_range(seed):
     mesh = read_mesh(MESHES / "compressor_blade.geo", parameters=p | sizes)
     assert set(mesh.facets) == {"flank_left", "flank_right"}
     assert not mesh.warnings
-    assert volume(mesh) == pytest.approx(blade_volume(p), rel=4e-3)
-    top, bottom = mesh.points[:, 2].max(), mesh.points[:, 2].min()
+    z = np.linspace(0.0, 1.0, 2001)[1::2]
+    chord, t = (p[f"{a}_root"] + (p[f"{a}_tip"] - p[f"{a}_root"]) * z for a in ("chord", "t"))
+    airfoil = p["span"] * (chord * (p["t_edge"] + 2 / 3 * (t - p["t_edge"]))).mean()
     depth = (p["w_dovetail"] - p["w_neck"]) / 2 / np.tan(np.radians(p["beta"]))
+    root = p["w_neck"] * (p["h_neck"] + depth / 2) + p["w_dovetail"] * (p["h_foot"] + depth / 2)
+    exact = airfoil + p["l_platform"] * p["w_platform"] * p["t_platform"] + p["l_root"] * root
+    assert volume(mesh) == pytest.approx(exact, rel=4e-3)
+    top, bottom = mesh.points[:, 2].max(), mesh.points[:, 2].min()
     foot = p["t_platform"] + p["h_neck"] + depth + p["h_foot"]
     assert_allclose((top, -bottom), (p["span"], foot), rtol=1e-9)
 
@@ -222,13 +196,9 @@ def test_the_hub_of_a_turbine_is_a_hollow_sphere_without_four_caps():
     """Volume of shells and caps in closed form; rings as wide as the wall leaves them."""
     mesh = read_mesh(MESHES / "turbine_hub.geo", parameters={"lc": 0.6}, order=2)
     R, t = np.hypot(1.5, 3.542 / 2), 0.16
-
-    def cap(radius, at):
-        return np.pi / 3 * (radius - at) ** 2 * (2 * radius + at)
-
-    shell = 4 / 3 * np.pi * (R**3 - (R - t) ** 3)
-    for at in (1.5, 1.5, 1.5, 1.95):
-        shell -= cap(R, at) - cap(R - t, at)
+    at = np.array([1.5, 1.5, 1.5, 1.95])
+    caps = [np.pi / 3 * (r - at) ** 2 * (2 * r + at) for r in (R, R - t)]
+    shell = 4 / 3 * np.pi * (R**3 - (R - t) ** 3) - np.sum(caps[0] - caps[1])
     assert_allclose(volume(mesh), shell, rtol=2e-3)
 
 
@@ -298,45 +268,44 @@ def test_a_carrier_has_its_mass_its_pins_and_its_journals():
     }
 
 
-@pytest.mark.parametrize(
-    ("name", "parameters", "culprit"),
-    [
-        ("connecting_rod", {"d_a": 0.05}, "d_a = 0.05 < D_a = 0.046"),
-        ("connecting_rod", {"h_b": 0.03}, "h_b = 0.03 < D_b = 0.026"),
-        ("connecting_rod", {"t_web": 0.02}, "t_web = 0.02 < w = 0.012"),
-        ("connecting_rod", {"t_flange": 0.01}, "flanges of 0.01"),
-        ("connecting_rod", {"L": 0.04}, "L = 0.04"),
-        ("compressor_blade", {"sections": 1}, "sections = 1"),
-        ("compressor_blade", {"t_edge": 0.003}, "t_edge = 0.003 < t_tip = 0.0024"),
-        ("compressor_blade", {"camber": 90}, "camber = 90"),
-        ("compressor_blade", {"beta": 80}, "beta = 80"),
-        ("compressor_blade", {"chord_root": 0.06}, "over the platform of l_platform = 0.052"),
-        ("compressor_blade", {"w_neck": 0.03}, "w_neck = 0.03 < w_dovetail = 0.024"),
-        ("compressor_blade", {"R": 0.006}, "R = 0.006"),
-        ("compressor_blade", {"crown": 0.005}, "crown = 0.005"),
-        ("crank", {"d_pin": 0.05}, "d_pin = 0.05"),
-        ("crank", {"r": 0.005}, "r = 0.005"),
-        ("turbine_hub", {"t": 0.9}, "a wall of 0.9 leaves no rings"),
-        ("phalanx", {"D": 0.012}, "radius D / 2 - R = 0.00475"),
-        ("phalanx", {"w_pad": 0.02}, "w_pad = 0.02"),
-        ("phalanx", {"L": 0.008}, "L = 0.008"),
-        ("gear_shaft", SHAFT | {"z_2": 0.16}, "the wheels at z_w = 0.12 and z_2 = 0.16 overlap"),
-        ("gear_shaft", SHAFT | {"D_2": 0.03}, "thinner than the shaft"),
-        ("gear_shaft", SHAFT | {"z_2": 0.33}, "must lie apart"),
-        ("housing", STAGES | {"a": 0.07}, "the seats overlap: shafts 0.07 apart"),
-        ("housing", STAGES | {"L": 0.36}, "seats do not fit"),
-        ("carrier", {"n": 2.5}, "n = 2.5: a carrier needs a whole number"),
-        ("carrier", {"a": 0.06}, "3 pins of d_p = 0.02 at a = 0.06 do not fit"),
-        ("carrier", {"z_f": 0.03}, "z_f = 0.03 and z_b = 0.1 do not fit on the shaft"),
-        ("bladed_disk", {"N": 7.5}, "whole number of sectors"),
-        ("bladed_disk", {"r_rim": 0.3}, "r_rim = 0.3"),
-        ("bladed_disk", {"chord": 0.05}, "foot of the blade"),
-        ("rotor", {"N": 7.5}, "whole number of sectors"),
-        ("rotor", {"d": 0.3}, "d = 0.3 < d_1 = 0.28"),
-        ("rotor", {"w": 0.5}, "discs of width w = 0.5"),
-    ],
-)
+IMPOSSIBLE = [
+    ("connecting_rod", {"d_a": 0.05}, "d_a = 0.05 < D_a = 0.046"),
+    ("connecting_rod", {"h_b": 0.03}, "h_b = 0.03 < D_b = 0.026"),
+    ("connecting_rod", {"t_web": 0.02}, "t_web = 0.02 < w = 0.012"),
+    ("connecting_rod", {"t_flange": 0.01}, "flanges of 0.01"),
+    ("connecting_rod", {"L": 0.04}, "L = 0.04"),
+    ("compressor_blade", {"sections": 1}, "sections = 1"),
+    ("compressor_blade", {"t_edge": 0.003}, "t_edge = 0.003 < t_tip = 0.0024"),
+    ("compressor_blade", {"camber": 90}, "camber = 90"),
+    ("compressor_blade", {"beta": 80}, "beta = 80"),
+    ("compressor_blade", {"chord_root": 0.06}, "over the platform of l_platform = 0.052"),
+    ("compressor_blade", {"w_neck": 0.03}, "w_neck = 0.03 < w_dovetail = 0.024"),
+    ("compressor_blade", {"R": 0.006}, "R = 0.006"),
+    ("compressor_blade", {"crown": 0.005}, "crown = 0.005"),
+    ("crank", {"d_pin": 0.05}, "d_pin = 0.05"),
+    ("crank", {"r": 0.005}, "r = 0.005"),
+    ("turbine_hub", {"t": 0.9}, "a wall of 0.9 leaves no rings"),
+    ("phalanx", {"D": 0.012}, "radius D / 2 - R = 0.00475"),
+    ("phalanx", {"w_pad": 0.02}, "w_pad = 0.02"),
+    ("phalanx", {"L": 0.008}, "L = 0.008"),
+    ("gear_shaft", SHAFT | {"z_2": 0.16}, "the wheels at z_w = 0.12 and z_2 = 0.16 overlap"),
+    ("gear_shaft", SHAFT | {"D_2": 0.03}, "thinner than the shaft"),
+    ("gear_shaft", SHAFT | {"z_2": 0.33}, "must lie apart"),
+    ("housing", STAGES | {"a": 0.07}, "the seats overlap: shafts 0.07 apart"),
+    ("housing", STAGES | {"L": 0.36}, "seats do not fit"),
+    ("carrier", {"n": 2.5}, "n = 2.5: a carrier needs a whole number"),
+    ("carrier", {"a": 0.06}, "3 pins of d_p = 0.02 at a = 0.06 do not fit"),
+    ("carrier", {"z_f": 0.03}, "z_f = 0.03 and z_b = 0.1 do not fit on the shaft"),
+    ("bladed_disk", {"N": 7.5}, "whole number of sectors"),
+    ("bladed_disk", {"r_rim": 0.3}, "r_rim = 0.3"),
+    ("bladed_disk", {"chord": 0.05}, "foot of the blade"),
+    ("rotor", {"N": 7.5}, "whole number of sectors"),
+    ("rotor", {"d": 0.3}, "d = 0.3 < d_1 = 0.28"),
+    ("rotor", {"w": 0.5}, "discs of width w = 0.5"),
+]
+
+
+@pytest.mark.parametrize(("name", "parameters", "culprit"), IMPOSSIBLE)
 def test_impossible_dimensions_are_named(name, parameters, culprit):
-    with pytest.raises(ConfigError) as caught:
-        read_mesh(MESHES / f"{name}.geo", parameters=parameters)
-    assert culprit in str(caught.value)
+    file = MESHES / f"{name}.geo"
+    refuses(ConfigError, re.escape(culprit), read_mesh, file, parameters=parameters)

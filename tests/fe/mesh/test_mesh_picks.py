@@ -22,8 +22,10 @@ PICKS = {
 
 
 @pytest.mark.parametrize(("text", "expected"), PICKS.items())
-def test_words_pick_faces(text, expected):
+def test_words_pick_faces_and_names_do_not(text, expected):
     assert list(picks(text)) == expected and is_pick(text)
+    for name in ("pin_a", "bolt 3", "a", "e", "Grund:oben"):
+        assert not is_pick(name)
 
 
 def test_python_picks_by_numbers_points_and_boxes():
@@ -44,18 +46,11 @@ def test_what_picks_nothing_is_refused(wrong):
     refuses(ConfigError, "is no face", picks, wrong)
 
 
-@pytest.mark.parametrize("name", ["pin_a", "bolt 3", "a", "e", "Grund:oben"])
-def test_a_name_is_no_pick(name):
-    assert not is_pick(name)
-
-
-def test_lengths_areas_and_places_scale_and_directions_do_not():
-    """Records survive JSON, in which the reader hands them over."""
+def test_records_survive_json_and_scale_but_for_directions():
     face = Face(7, "cylinder", 3.0, (1.0, 2.0, 3.0), 0.5, (0.0, 0.0, 1.0), (1.0, 2.0, 0.0))
     there = from_plain(Face, json.loads(json.dumps(asdict(face))))
     assert there == face and scaled(face, 1.0) == face
-    assert scaled(face, 2.0) == Face(
-        7, "cylinder", 12.0, (2.0, 4.0, 6.0), 1.0, (0.0, 0.0, 1.0), (2.0, 4.0, 0.0)
-    )
+    doubled = Face(7, "cylinder", 12.0, (2.0, 4.0, 6.0), 1.0, (0.0, 0.0, 1.0), (2.0, 4.0, 0.0))
+    assert scaled(face, 2.0) == doubled
     axis = Axis((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), None)
     assert scaled(axis, 3.0) == Axis((3.0, 0.0, 0.0), (0.0, 1.0, 0.0), None)

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from cases.files.cells import blocks_of, solid, write_msh
 from cases.measures import areas, volume
 from cases.paths import ROOT
-from cases.refusals import refused
+from cases.refusals import refused, refuses
 from rom.errors import ConfigError, RomWarning
 from rom.fe.mesh.quality import scaled_jacobian
 from rom.fe.mesh.read import read_mesh
@@ -18,7 +18,6 @@ from rom.fe.mesh.sources.gmsh_session import session
 
 gmsh = pytest.importorskip("gmsh", reason="gmsh is not installed")
 pytestmark = pytest.mark.fenicsx
-
 MESHES = ROOT / "meshes"
 TWO_BODIES = """
 SetFactory("OpenCASCADE");
@@ -37,7 +36,6 @@ Mesh.MeshSizeMin = 0.5; Mesh.MeshSizeMax = 0.5;
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """The same two-body mesh in all versions of .msh, and a box in STEP."""
     folder = tmp_path_factory.mktemp("meshes")
     (folder / "two.geo").write_text(TWO_BODIES)
     with session(gmsh):
@@ -58,7 +56,6 @@ def folder(tmp_path_factory):
 
 
 def volumes(mesh):
-    """Volume of each region of straight tetrahedra."""
     a, b, c, d = np.moveaxis(mesh.points[mesh.corners], 1, 0)
     volume = np.einsum("ij,ij->i", b - a, np.cross(c - a, d - a)) / 6
     return {name: volume[mesh.regions == tag].sum() for tag, name in mesh.region_names.items()}
@@ -74,8 +71,13 @@ def test_every_version_gives_the_same_regions_and_overlapping_surfaces(folder, n
     assert mesh.warnings == ()
 
 
-def test_a_geometry_gives_the_same_mesh_every_time(folder):
-    first, second = read_mesh(folder / "two.geo"), read_mesh(folder / "two.geo")
+def test_a_geometry_gives_the_same_mesh_whatever_the_user_has_set(folder, tmp_path, monkeypatch):
+    """gmsh reads .gmshrc of the home folder unless told not to."""
+    for name in (".gmshrc", ".gmsh-options"):
+        (tmp_path / name).write_text("Mesh.MeshSizeFactor = 0.3;\n")
+    first = read_mesh(folder / "two.geo")
+    monkeypatch.setenv("HOME", str(tmp_path))
+    second = read_mesh(folder / "two.geo")
     assert_array_equal(first.points, second.points)
     assert_array_equal(first.cells, second.cells)
 
@@ -85,8 +87,8 @@ def test_provenance_tells_file_parameters_and_version():
     mesh = read_mesh(path, parameters={"L": 0.5})
     assert mesh.provenance["sha256"] == hashlib.sha256(path.read_bytes()).hexdigest()
     assert mesh.provenance["path"] == str(path)
-    assert mesh.provenance["parameters"]["L"] == 0.5
-    assert mesh.provenance["parameters"]["h"] == 0.03  # a default
+    used = mesh.provenance["parameters"]
+    assert (used["L"], used["h"]) == (0.5, 0.03)  # the second by default
     assert mesh.provenance["gmsh"].startswith("4.")
     assert np.ptp(mesh.points[:, 0]) == pytest.approx(0.5)
 
@@ -130,28 +132,16 @@ def test_cells_keep_their_numbers_in_the_file(tmp_path):
     assert found.cell_ids.min() == 17 and found.cell_ids.max() == 16 + len(mesh.cells)
 
 
-def test_no_physical_groups_is_one_region_and_a_warning(tmp_path):
+def test_bodies_without_a_name_and_curves_with_one_are_warned_of(tmp_path):
     mesh = solid()
     path = write_msh(tmp_path / "plain.msh", mesh.points, [("tet4", 0, 1, mesh.cells)])
     with pytest.warns(RomWarning, match="no physical volume is named"):
         found = read_mesh(path)
     assert found.region_names == {1: "body"} and set(found.regions) == {1}
     assert "plain.msh" not in found.warnings[0] and len(found.warnings) == 1
-
-
-def test_physical_curves_are_ignored_with_a_warning(tmp_path):
     (tmp_path / "c.geo").write_text(TWO_BODIES + 'Physical Curve("edge", 5) = {1};\n')
     with pytest.warns(RomWarning, match="physical curve 'edge' is ignored"):
         read_mesh(tmp_path / "c.geo")
-
-
-def test_user_settings_do_not_change_the_mesh(folder, tmp_path, monkeypatch):
-    """gmsh reads .gmshrc of the home folder unless told not to."""
-    (tmp_path / ".gmshrc").write_text("Mesh.MeshSizeFactor = 0.3;\n")
-    (tmp_path / ".gmsh-options").write_text("Mesh.MeshSizeFactor = 0.3;\n")
-    before = read_mesh(folder / "two.geo")
-    monkeypatch.setenv("HOME", str(tmp_path))
-    assert len(read_mesh(folder / "two.geo").cells) == len(before.cells)
 
 
 def test_a_short_parameter_name_finds_the_long_one(tmp_path):
@@ -181,10 +171,7 @@ def test_a_builder_gets_its_parameters(tmp_path):
 
 
 def test_step_is_read_in_metres_and_faces_are_picked(folder):
-    faces = {
-        "left": (0.0, 0.01, 0.005),  # a point on the face
-        "bore": (0.046, 0.0101, 0.0049),  # a point near the cylinder
-    }
+    faces = {"left": (0.0, 0.01, 0.005), "bore": (0.046, 0.0101, 0.0049)}  # on it, near it
     mesh = read_mesh(folder / "plate.step", parameters={"lc": 0.004}, faces=faces)
     assert_allclose(np.ptp(mesh.points, axis=0), (0.1, 0.02, 0.01), rtol=1e-6)
     found = areas(mesh)
@@ -199,9 +186,7 @@ def test_step_is_read_in_metres_and_faces_are_picked(folder):
 @pytest.mark.parametrize(("lc", "culprit"), [(1e-6, "lc = 1e-06 m"), (0, "lc = 0"), ("a", "'a'")])
 def test_impossible_element_size_is_refused(folder, lc, culprit):
     """Metres and millimetres mixed up would mesh for hours."""
-    with pytest.raises(ConfigError) as caught:
-        read_mesh(folder / "plate.step", parameters={"lc": lc})
-    assert culprit in str(caught.value)
+    refuses(ConfigError, culprit, read_mesh, folder / "plate.step", parameters={"lc": lc})
 
 
 def test_faces_named_in_the_step_file_are_found(folder, tmp_path):
@@ -241,15 +226,11 @@ BEAM_NAMES = r"\['L', 'b', 'h', 'hex', 'lc', 'nx', 'ny', 'nz'\]"
 test_wrong_options_are_refused = refused(
     (beam(parameters={"lcc": 1.0}), f"no parameter 'lcc'.*{BEAM_NAMES}"),
     (beam(parameters={"L": np.nan}), "'L'"),
-    (beam(parameters={"L": [1.0]}), "'L'"),
     (beam(parameters={"L": object()}), "numbers or text"),
     (beam(order=3), "order=3"),
-    (beam(scale=-1.0), r"scale = -1"),
     (beam(faces={"pin": (0, 0, 0)}), "'pin'"),
     error=ConfigError,
 )
-
-
 PIN = """
 SetFactory("OpenCASCADE");
 Cylinder(1) = {0, 0, 0, 0, 0, %g, %g};

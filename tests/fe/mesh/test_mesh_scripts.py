@@ -59,11 +59,8 @@ def test_options_that_name_programs_and_files_are_refused(text, tmp_path):
     assert (word[1] or word[2]) in refused(text, tmp_path)
 
 
-def test_no_command_that_acts_is_in_the_vocabulary():
+def test_all_geometries_of_the_source_are_written_in_the_vocabulary_and_no_command_that_acts():
     assert not {*COMMANDS} & {*KNOWN_WORDS, *FIELDS}
-
-
-def test_all_geometries_of_the_source_are_written_in_it():
     files = [*ROOT.glob("meshes/*.geo"), *ROOT.glob("demos/*.geo")]
     assert len(files) > 20
     for file in files:
