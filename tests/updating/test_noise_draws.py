@@ -9,29 +9,18 @@ from numpy.testing import assert_allclose
 from scipy.stats import binom, chi2, kstest, norm, truncnorm
 
 import rom
-from cases.components.updating import (
-    averaged,
-    exact_responses,
-    family_of,
-    gauss,
-    model_of,
-    refuse,
-)
+from cases.components.updating import averaged, exact_responses, family_of, gauss, model_of, refuse
 from cases.long import few
 from rom.components.updating.estimate import DAMPING_LOG_DEVIATION
 from rom.components.updating.frf_data import estimators, pooled, positive_mean
 from rom.components.updating.normal_equations import Data, sums, unsure, white
 from rom.updating import Channels, Responses
 
-PARAMETERS = {
-    "E_inner": rom.YoungsModulus("inner", 0.4, 2.5),
-    "E_outer": rom.YoungsModulus("outer", 0.4, 2.5),
-    "rho": rom.Density(None, 0.5, 2.0),
-}
+PARAMETERS = {f"E_{name}": rom.YoungsModulus(name, 0.4, 2.5) for name in ("inner", "outer")}
+PARAMETERS |= {"rho": rom.Density(None, 0.5, 2.0)}
 TRUE = {"E_inner": 1.05, "E_outer": 0.9, "rho": 1.1}
-SENSORS = Channels(
-    [[x, 0.1, 0.08] for x in (0.5, 0.75, 1.0)] * 2, [[0, 1, 0]] * 3 + [[0, 0, 1]] * 3
-)
+POINTS = [[x, 0.1, 0.08] for x in (0.5, 0.75, 1.0)]
+SENSORS = Channels(POINTS * 2, [[0, 1, 0]] * 3 + [[0, 0, 1]] * 3)
 INPUTS = Channels([[1.0, 0.0, 0.0], [0.5, 0.1, 0.08]], [[0, 1, 1], [0, 1, -0.5]])
 LINES = np.linspace(40, 160, 20)
 HELD = ("root",)
@@ -72,19 +61,14 @@ def drawn(family, exact):
 KNOWN = {"coherence": 1 / (1 + 0.1**2)}
 PLAIN = {"force_noise": 0.0, "estimator": None}  # as if no estimator had a bias
 ESTIMATORS = ("H1", "H2", "Hv")
+NOISES = [("H1", 0.1, 0.03, {}), ("H2", 0.03, 0.1, {}), ("Hv", 0.1, 0.1, {})]
+NOISES += [("H1", 0.0, 0.1, KNOWN), ("Hv", 0.01, 0.01, {}), ("Hv", 0.1, 0.03, {})]
+# H1 is too small by 1.01, H2 too large by it; Hv by the root of their quotient
+BIASED = [("Hv", 0.2, 0.05, np.sqrt(1.04 / 1.0025)), ("H1", 0.1, 0.1, 1.01)]
+BIASED += [("H2", 0.1, 0.1, 1 / 1.01)]
 
 
-@pytest.mark.parametrize(
-    ("name", "on_force", "on_response", "known"),
-    few(3, [
-        ("H1", 0.1, 0.03, {}),
-        ("H2", 0.03, 0.1, {}),
-        ("Hv", 0.1, 0.1, {}),
-        ("H1", 0.0, 0.1, KNOWN),
-        ("Hv", 0.01, 0.01, {}),
-        ("Hv", 0.1, 0.03, {}),
-    ]),
-)  # fmt: skip
+@pytest.mark.parametrize(("name", "on_force", "on_response", "known"), few(3, NOISES))
 def test_parameters_lie_inside_two_deviations_as_often_as_they_must(
     drawn, name, on_force, on_response, known
 ):
@@ -92,9 +76,9 @@ def test_parameters_lie_inside_two_deviations_as_often_as_they_must(
     scaled, _, found = drawn(name, on_force, on_response, **known)
     inside = np.count_nonzero(np.abs(scaled) < 2, axis=0)
     assert (inside >= 90).all() and (inside <= 99).all(), inside
-    ratios = [[np.log(u.zeta[k] / 0.02) / u.deviations[f"zeta {k + 1}"] for k in (0, 1)]
-              for u in found]  # fmt: skip
-    assert (np.count_nonzero(np.abs(ratios) < 2.0, axis=0) >= 88).all()
+    for k in (0, 1):
+        ratios = [np.log(u.zeta[k] / 0.02) / u.deviations[f"zeta {k + 1}"] for u in found]
+        assert np.count_nonzero(np.abs(ratios) < 2.0) >= 88
     assert np.mean([u.verdict.ok for u in found]) >= 0.95
     if on_force == on_response:  # what is left of half a variance varies as the whole one
         assert_allclose(np.mean([u.verdict.rows[0].value for u in found]), 1.0, atol=0.02)
@@ -115,19 +99,11 @@ def test_a_thousand_draws_lie_inside_two_deviations_as_often_as_they_must(
     assert (inside >= low).all() and (inside <= high).all(), inside
 
 
-@pytest.mark.parametrize(
-    ("name", "on_force", "on_response", "bias"),
-    few(1, [("Hv", 0.2, 0.05, np.sqrt(1.04 / 1.0025)), ("H1", 0.1, 0.1, 1.01),
-            ("H2", 0.1, 0.1, 1 / 1.01)]),
-)  # fmt: skip
+@pytest.mark.parametrize(("name", "on_force", "on_response", "bias"), few(1, BIASED))
 def test_an_estimator_taken_for_unbiased_is_wrong_by_its_bias(
     drawn, name, on_force, on_response, bias
 ):
-    """Stiffness and mass are too large by what H is too small; named, by nothing.
-
-    Noise of 10 % on both makes H1 too small by 1.01, H2 too large by it; of 20 and 5 % Hv by the
-    root of their quotient.
-    """
+    """Stiffness and mass are too large by what H is too small; named, by nothing."""
     scaled, errors, _ = drawn(name, on_force, on_response, 15, **PLAIN)
     assert_allclose(errors.mean(axis=0)[[0, 2]], np.log(bias), rtol=0.15)
     assert np.count_nonzero(np.abs(scaled[:, [0, 2]]) < 2, axis=0).max() <= 3

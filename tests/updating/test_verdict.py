@@ -44,9 +44,8 @@ def test_each_row_is_over_its_own_expectation():
     weight[5] = 0.0
     squares = 2.0 * weight
     squares[3, 1] += 5.0
-    report = verdict(
-        Sums(np.eye(3), np.zeros(3), squares, 0 * np.eye(3)), data_of(weight), 3, {}, []
-    )
+    sums = Sums(np.eye(3), np.zeros(3), squares, 0 * np.eye(3))
+    report = verdict(sums, data_of(weight), 3, {}, [])
     values = [row.value for row in report.rows]
     assert_allclose(values, [25 / 17, 15 / 10, 9 / 4])
     assert [row.quantity.split(",")[0] for row in report.rows[1:]] == ["worst sensor", "worst band"]

@@ -48,35 +48,24 @@ def assert_alike(one, other, names, atol):
 
 
 def family_of(parameters, cells, n_modes, regions=("inner", "outer"), *, size=BEAM, **options):
-    """Family of a block whose length its regions share, uncertified.
+    """Family of a block whose length its regions share along x, uncertified.
 
-    Args:
-        parameters: {name: parameter}.
-        cells: (3,) numbers of bricks.
-        n_modes: of the fixed interfaces.
-        regions: names, along x.
-        size: of the block [m].
-        options: ``origin`` of the block [m], and more as of `rom.reduce_parametric`.
+    Options are its ``origin`` [m], and those of `rom.reduce_parametric`.
     """
     origin = options.pop("origin", (0.0, 0.0, 0.0))
-    parts = dict.fromkeys(regions, STEEL)
-    model = composite(
-        parts, lambda c: regions[len(regions) * c[0] // cells[0]], size, cells, origin
-    )
-    options = {"interfaces": KINDS, "certify": False} | options
-    method = rom.CraigBampton(n_modes)
-    return rom.reduce_parametric(model, parameters=parameters, method=method, **options)
+    parts, n = dict.fromkeys(regions, STEEL), len(regions)
+    model = composite(parts, lambda c: regions[n * c[0] // cells[0]], size, cells, origin)
+    options = {"interfaces": KINDS, "certify": False, "method": rom.CraigBampton(n_modes)} | options
+    return rom.reduce_parametric(model, parameters=parameters, **options)
 
 
 def halves(n_modes=12):
     """Families of the two halves of a beam, "frame" before "arm", each with its modulus."""
-    return {
-        name: family_of(
-            {"E": rom.YoungsModulus(name, 0.3, 3.0)}, (4, 1, 1), n_modes, (name,),
-            size=(0.5, 0.1, 0.08), origin=(x, 0, 0),
-        )
-        for name, x in (("frame", 0.0), ("arm", 0.5))
-    }  # fmt: skip
+    made = {}
+    for name, x in (("frame", 0.0), ("arm", 0.5)):
+        modulus, place = {"E": rom.YoungsModulus(name, 0.3, 3.0)}, {"origin": (x, 0, 0)}
+        made[name] = family_of(modulus, (4, 1, 1), n_modes, (name,), size=(0.5, 0.1, 0.08), **place)
+    return made
 
 
 def model_of(family, channels, fixed, attached=None, candidates=None):
@@ -99,6 +88,17 @@ def noisy_test(family, true, channels, lines, *, level, averages, seed=0, **mode
     H = noisy(H, level, np.random.default_rng(seed)) if level else H
     c = 1 / (1 + averages * level**2) if level else 0.999  # level^2 / 2 for each part
     return Responses(lines, H, *channels, c, averages)
+
+
+def fed(one, sensors, samples, wanted, dt, first=0):
+    """What the FMU of a filter answers after each sample of its sensors."""
+    rows = []
+    for k, sample in enumerate(samples, first):
+        for name, value in zip(sensors, sample, strict=True):
+            one.set(f"sensor.{name}", value)
+        one.fmu.doStep(k * dt, dt)
+        rows.append(one.get(*wanted))
+    return np.array(rows)
 
 
 def gauss(rng, shape):

@@ -38,9 +38,6 @@ def projector(m, x, **keep):
     return R @ best_matching.rigid_part(m, R, np.eye(len(R)))
 
 
-# --- the projection ---
-
-
 @pytest.mark.parametrize("scale", [False, True])
 def test_matched_energy_is_kinetic_energy_without_momenta(scale):
     m, x, v = cloud()
@@ -84,13 +81,8 @@ def test_moving_frames_change_nothing(scale):
 def test_points_on_a_line_do_not_turn_about_it():
     x = np.outer([-1.0, 0.5, 2.0], [1.0, 2.0, 2.0]) + np.array([10.0, 0.0, -3.0])
     v = np.cross([0.2, -0.4, 0.1], x)
-    found = match(MASS, x, v)
-    assert found.energy < 1e-20
-    Q = projector(MASS, x)
-    assert np.linalg.matrix_rank(Q, tol=1e-9) == 5
-
-
-# --- the finite version ---
+    assert match(MASS, x, v).energy < 1e-20
+    assert np.linalg.matrix_rank(projector(MASS, x), tol=1e-9) == 5
 
 
 def test_a_frame_is_found_back():
@@ -131,7 +123,6 @@ def test_a_frame_in_the_plane_does_not_flip_a_triangle():
 
 
 def test_tisserand_and_eckart_turn_alike_to_second_order():
-    """The rate of the Eckart frame against the matched angular velocity, at amplitude eps."""
     m, X, u = cloud(seed=8)
     w = cloud(seed=9)[2]
     u, w = (match(m, X, field).rest for field in (u, w))  # both vanish at eps = 0
@@ -157,9 +148,6 @@ def test_a_loop_of_shapes_turns_the_whole_by_half_its_solid_angle(colatitude):
     A = frame(MASS, film[0], stacked(MASS, film, plane=True)[-1], plane=True)[1]
     solid_angle = 2 * np.pi * (1 - np.cos(colatitude))
     assert_allclose(A, turned([0, 0, -solid_angle / 2]), atol=2e-5)
-
-
-# --- the mean-axis frame of a flexible body ---
 
 
 @pytest.fixture(scope="module")
@@ -189,13 +177,12 @@ def test_matched_shapes_are_those_of_the_mean_axis_body(model, bodies):
     assert_allclose(X, reference_motion(at_root, "mean-axis"), atol=1e-9 * np.abs(X).max())
     assert np.abs(X).max() > 0.1
     rest = Phi - R @ X
-    K, M = at_root.K, rest.T @ (model.M @ rest)
-    lam, V = eigh(K, M)
+    lam, V = eigh(at_root.K, rest.T @ (model.M @ rest))
     assert_allclose(np.sqrt(lam), mean_axis.omega, rtol=1e-9)
     shapes = rest @ V
     signs = np.sign((shapes * mean_axis.surface.shape).sum(axis=0))
-    limit = 1e-8 * np.abs(shapes).max()
-    assert_allclose(shapes * signs, mean_axis.surface.shape, atol=limit)
+    atol = 1e-8 * np.abs(shapes).max()
+    assert_allclose(shapes * signs, mean_axis.surface.shape, atol=atol)
 
 
 def test_the_projected_mass_is_what_the_integrals_of_the_body_leave(model, bodies):
@@ -204,8 +191,7 @@ def test_the_projected_mass_is_what_the_integrals_of_the_body_leave(model, bodie
     qd = np.random.default_rng(4).normal(size=at_root.n_modes)
     C = rigid_elastic(at_root)
     left = at_root.M - C.T @ np.linalg.solve(rigid_mass(at_root), C)
-    v = (at_root.surface.shape @ qd).reshape(-1, 3)
-    found = match(model.M, model.points, v)
+    found = match(model.M, model.points, (at_root.surface.shape @ qd).reshape(-1, 3))
     assert found.energy == pytest.approx(0.5 * qd @ left @ qd, rel=1e-9)
 
 
@@ -263,9 +249,6 @@ def test_a_beam_that_whirls_turns_back_like_a_falling_cat(model, bodies):
         assert np.abs(A - A.T)[[0, 0], [1, 2]].max() < 0.02 * abs(expected)
 
 
-# --- complexity ---
-
-
 def line(*places):
     return np.array([(p, 0.0, 0.0) for p in places])
 
@@ -290,32 +273,25 @@ def test_complexity_of_regular_shapes(x, expected):
     assert bodies.complexity(moved) == pytest.approx(expected, rel=2e-7)
 
 
-def simplest(n, rng, trials=12):
-    """Lowest complexity of n equal masses and its shape, by descent from random starts."""
-    bodies = Bodies(np.ones(n))
-
-    def value(y):
-        x = y.reshape(-1, 3)
-        slope = bodies.centred(x) / bodies.size(x) - bodies.acceleration(x) / bodies.potential(x)
-        C = bodies.complexity(x)
-        return C, C * slope.ravel()
-
-    found = [minimize(value, rng.normal(size=3 * n), jac=True, options={"gtol": 1e-9})
-             for _ in range(trials)]  # fmt: skip
-    best = min(found, key=lambda f: f.fun)
-    return bodies, best.fun, best.x.reshape(-1, 3)
-
-
 @pytest.mark.parametrize(
     ("n", "expected"),
     [(4, 0.2296397), (5, 0.2589745), (6, 0.2773689), (8, 0.3074264), (10, 0.3271667),
      (12, 0.3414254)],
 )  # fmt: skip
 def test_simplest_shapes_are_the_known_ones_and_collapse_in_themselves(n, expected):
-    """Least complexity: a central configuration, whose accelerations point to the centre."""
-    bodies, C, x = simplest(n, np.random.default_rng(n))
-    assert pytest.approx(expected, abs=1e-7) == C
-    x = bodies.centred(x)
+    """By descent from random starts: a central configuration, accelerated to its centre."""
+    bodies, rng = Bodies(np.ones(n)), np.random.default_rng(n)
+
+    def complexity(y):
+        x = y.reshape(-1, 3)
+        slope = bodies.centred(x) / bodies.size(x) - bodies.acceleration(x) / bodies.potential(x)
+        C = bodies.complexity(x)
+        return C, C * slope.ravel()
+
+    starts, how = rng.normal(size=(12, 3 * n)), {"jac": True, "options": {"gtol": 1e-9}}
+    best = min((minimize(complexity, y, **how) for y in starts), key=lambda found: found.fun)
+    assert best.fun == pytest.approx(expected, abs=1e-7)
+    x = bodies.centred(best.x.reshape(-1, 3))
     pull = bodies.potential(x) / bodies.size(x)
     assert_allclose(bodies.acceleration(x), pull * x, atol=1e-5 * np.abs(pull * x).max())
 
@@ -330,9 +306,6 @@ def test_many_bodies_spread_evenly_over_a_ball_tend_to_its_complexity():
         errors.append(Bodies(np.ones(len(ball))).complexity(ball) / 0.6**1.5 - 1)
     assert abs(errors[1]) < 0.007
     assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.2)  # self-energy of a cell
-
-
-# --- Newton's bodies ---
 
 
 @pytest.fixture(scope="module")
@@ -384,7 +357,6 @@ def test_complexity_grows_from_the_middle_to_both_ends_but_not_steadily(janus):
 
 
 def test_shapes_alone_move_as_newton_says(janus):
-    """No size, no time, no frame: the Hamiltonian of shapes against positions in space."""
     bodies, t, x, v = janus
     sphere = ShapeSphere(bodies)
     states = list(zip(x, v, strict=True))
@@ -439,7 +411,6 @@ def test_the_figure_eight_closes():
 
 
 def test_time_is_read_off_pictures_taken_by_anyone(janus):
-    """Frames that shift and turn and a clock that runs unevenly: the same time comes out."""
     bodies, _, _, _ = janus
     x, v = bodies.at_rest_as_a_whole(*START)
     lam = np.linspace(0.0, 1.0, 11)
@@ -456,7 +427,6 @@ def test_time_is_read_off_pictures_taken_by_anyone(janus):
 
 
 def test_time_is_read_off_a_stack_of_pictures(janus):
-    """Differences of laid pictures, whoever took them; the error falls with their square."""
     bodies, t, x, _ = janus
     rng = np.random.default_rng(7)
     turns = np.array([expm(rotation.skew([0, 0, a])) for a in rng.uniform(0, 6, len(x))])

@@ -5,13 +5,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 from cases.refusals import refuses
+from rom.components import cosserat
 from rom.components.cosserat import clamped, equilibrium, linearised, loads, reference
-from rom.components.cosserat.helical_spring import (
-    HelicalSpring,
-    plate_compliance,
-    spring_rod,
-    wire_rod,
-)
+from rom.components.cosserat.helical_spring import HelicalSpring, plate_compliance, spring_rod
 from rom.errors import ModelError
 
 MM = 1e-3
@@ -23,8 +19,8 @@ def spring(wire, diameter, coils, length):
 
 def test_rigidities_of_the_bench_spring():
     one = spring(1, 10, 6, 15)
-    assert_allclose([one.axial, one.bending, one.shear, one.torsion],
-                    [24.0385, 6.79348e-4, 62.5, 7.8125e-4], rtol=2e-6)  # fmt: skip
+    rigidities = [one.axial, one.bending, one.shear, one.torsion]
+    assert_allclose(rigidities, [24.0385, 6.79348e-4, 62.5, 7.8125e-4], rtol=2e-6)
     assert_allclose([one.stiffness, one.bending / one.length], [1602.56, 0.0452899], rtol=4e-6)
 
 
@@ -43,7 +39,7 @@ def test_closed_forms_are_those_of_the_wire(size):
     The first ratio is one of stiffnesses, the others are of compliances.
     """
     one = spring(*size)
-    wire = plate_compliance(wire_rod(one), (0, 0, one.length)).diagonal()
+    wire = plate_compliance(cosserat.wire_rod(one), (0, 0, one.length)).diagonal()
     ratio = one.compliance().diagonal() / wire
     axial, bending, sideways, twist = WIRE[size]
     expected = [sideways, sideways, 1 / axial, bending, bending, twist]

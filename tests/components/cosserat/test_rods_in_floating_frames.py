@@ -35,10 +35,8 @@ def absolute(rod):
 
 @pytest.fixture(scope="module", params=list(floating.REFERENCES))
 def motion(rod, request):
-    load = cosserat.loads(rod, **LOAD)
-    return request.param, floating.simulate(
-        rod, T, reference_condition=request.param, load=load, velocity=VELOCITY, omega=OMEGA
-    )
+    given = {"load": cosserat.loads(rod, **LOAD), "velocity": VELOCITY, "omega": OMEGA}
+    return request.param, floating.simulate(rod, T, reference_condition=request.param, **given)
 
 
 def test_the_motion_in_space_is_that_of_the_absolute_form(rod, absolute, motion):

@@ -8,17 +8,7 @@ from numpy.testing import assert_allclose
 
 from cases.refusals import refused
 from rom.components import rockfall
-from rom.components.rockfall import (
-    Cushion,
-    Gallery,
-    History,
-    Shear,
-    Slab,
-    calibrate,
-    design_check,
-    strike,
-    with_boulder,
-)
+from rom.components.rockfall import Cushion, Gallery, History, Shear, Slab, calibrate, strike
 from rom.components.rockfall.calibration import CHANNELS, FIVE_PARAMETERS
 from rom.errors import ConfigError, ModelError
 
@@ -37,9 +27,6 @@ def histories(noise, seed=0, sensors=SENSORS):
         c: History(t, x + noise * np.abs(x).max() * rng.standard_normal(t.size))
         for c, x in values.items()
     }
-
-
-# --- calibration ---
 
 
 def test_five_parameters_come_back_from_what_they_moved():
@@ -126,14 +113,12 @@ test_bad_histories_are_named = refused(
 )  # fmt: skip
 
 
-# --- design ---
-
 BOUNDED = replace(FIRST, shear=replace(FIRST.shear, capacity=1.5e6),
                   slab=replace(FIRST.slab, capacity=2e6))  # fmt: skip
 
 
 def test_shares_are_those_of_the_impact():
-    verdict = design_check(BOUNDED)
+    verdict = rockfall.design_check(BOUNDED)
     got = strike(replace(BOUNDED, shear=FIRST.shear))  # what would have to be carried
     assert verdict.shear == pytest.approx(got.peaks[1] / 1.5e6)
     assert verdict.bending == pytest.approx(got.deflection / (2e6 / 1.2e8))
@@ -142,9 +127,9 @@ def test_shares_are_those_of_the_impact():
     assert verdict.decides == "bending"
     assert verdict.state == "cracked"
     brittle = replace(BOUNDED, shear=replace(BOUNDED.shear, capacity=2e5, ultimate=0.01))
-    assert design_check(brittle).share == pytest.approx(7.5 * verdict.shear)
-    assert design_check(brittle).state == "punched"
-    twice = design_check(BOUNDED, ductility=2.0)
+    assert rockfall.design_check(brittle).share == pytest.approx(7.5 * verdict.shear)
+    assert rockfall.design_check(brittle).state == "punched"
+    twice = rockfall.design_check(BOUNDED, ductility=2.0)
     assert twice.bending == pytest.approx(verdict.bending / 2)
 
 
@@ -156,7 +141,9 @@ def test_a_gallery_bears_heights_as_hertz_says():
     light, heavy = rockfall.capacity_heights(g, [1000.0, 4000.0])
     assert heavy / light == pytest.approx(4 ** (-10 / 9), rel=0.01)
     assert light == pytest.approx((8e5 / 609.524e3) ** (5 / 3) * 10.0, rel=0.01)
-    below, above = (design_check(with_boulder(g, 4000.0, f * heavy)) for f in (0.99, 1.01))
+    below, above = (
+        rockfall.design_check(rockfall.with_boulder(g, 4000.0, f * heavy)) for f in (0.99, 1.01)
+    )
     assert below.share < 1 < above.share
 
 
@@ -166,12 +153,14 @@ def test_the_map_has_a_row_per_boulder_and_grows_both_ways():
     assert share.shape == (3, 2)
     assert (np.diff(share, axis=0) > 0).all() and (np.diff(share, axis=1) > 0).all()
     layered = replace(BOUNDED, cushion=rockfall.Layer.of_sand(4000.0, 1e6, 0.9))
-    assert with_boulder(layered, 500.0).cushion.radius == pytest.approx(layered.cushion.radius / 2)
-    through = design_check(with_boulder(layered, 4000.0, 200.0))
+    assert rockfall.with_boulder(layered, 500.0).cushion.radius == pytest.approx(
+        layered.cushion.radius / 2
+    )
+    through = rockfall.design_check(rockfall.with_boulder(layered, 4000.0, 200.0))
     assert through.state == "through" and through.share == np.inf
-    light = with_boulder(layered, 500.0, 8.0)
+    light = rockfall.with_boulder(layered, 500.0, 8.0)
     deepest = strike(light).deepest
-    assert design_check(light, depth=0.5).cushion == pytest.approx(2 * deepest / 0.9)
+    assert rockfall.design_check(light, depth=0.5).cushion == pytest.approx(2 * deepest / 0.9)
 
 
 test_a_gallery_without_a_limit_is_named = refused(

@@ -23,24 +23,23 @@ def baseline(**change):
     return replace(g, **change)
 
 
-# --- sand does not bounce ---
-
-
 @pytest.mark.parametrize("height", [2.0, 15.0, 40.0])
-@pytest.mark.parametrize(
-    "cushion", [Cushion.of_sand(4000.0, 1e6), Layer.of_sand(4000.0, 1e6, 3.0)],
-)  # fmt: skip
+@pytest.mark.parametrize("cushion", [Cushion.of_sand(4e3, 1e6), Layer.of_sand(4e3, 1e6, 3.0)])
 def test_sand_gives_back_less_than_a_twentieth_of_the_energy(cushion, height):
     """A fall of 15 m on an elastic cushion returns by more than 12 m."""
     got = strike(baseline(cushion=cushion, height=height))
     assert 0.0 < got.rebound < 0.05
-    taken = got.energy[-1, 1] / got.energy[0, 0]
-    assert taken > 0.8
+    assert got.energy[-1, 1] / got.energy[0, 0] > 0.8
     elastic = strike(baseline(cushion=replace(cushion, recovery=1.0), height=height))
     assert elastic.rebound > 0.6
 
 
-# --- when an impact is over ---
+def seen_to_its_end(g):
+    """An impact in which nothing larger follows."""
+    got, long = strike(g), strike(g, t_end=30.0)
+    assert_allclose(got.peaks, long.peaks, rtol=2e-3)
+    assert got.deflection == pytest.approx(long.deflection, rel=2e-3)
+    return got
 
 
 @pytest.mark.parametrize("slab", [(6e4, 5e6), (2e5, 2e6), (6e3, 1.2e8)])
@@ -48,9 +47,7 @@ def test_sand_gives_back_less_than_a_twentieth_of_the_energy(cushion, height):
 def test_an_impact_ends_after_its_peaks(slab, damping):
     """A slab as soft as the first two is at its peak long after 0.15 s."""
     g = baseline(slab=Slab.of_mass(*slab, damping=damping), weight=False)
-    got, long = strike(g), strike(g, t_end=30.0)
-    assert_allclose(got.peaks, long.peaks, rtol=2e-3)
-    assert got.deflection == pytest.approx(long.deflection, rel=2e-3)
+    got = seen_to_its_end(g)
     assert got.t[-1] < 6 * g.longest_period
     assert 1000 <= got.t.size <= 2000
     assert_allclose(np.diff(got.t), got.t[1], rtol=1e-9)
@@ -69,9 +66,7 @@ def test_the_longest_period_is_that_of_all_masses_on_the_slab():
 def test_a_slab_that_flows_is_followed_until_it_rests():
     """Its force stays at the capacity for longer than two periods, while it sinks."""
     slab = Slab.of_mass(1e5, 1e9, damping=0.0, capacity=2e4)
-    g = baseline(slab=slab, weight=False)
-    got, long = strike(g), strike(g, t_end=20.0)
-    assert got.deflection == pytest.approx(long.deflection, rel=2e-3)
+    got = seen_to_its_end(baseline(slab=slab, weight=False))
     assert got.deflection > 1000 * 2e4 / 1e9
 
 
@@ -107,8 +102,6 @@ def test_a_boulder_that_never_stops_is_named(monkeypatch):
     assert error.value.solution.t[-1] == pytest.approx(0.2, rel=0.01)
 
 
-# --- geometry ---
-
 GOOD = Layer(3e6, 0.6, 0.9)
 
 
@@ -139,9 +132,8 @@ def test_the_force_is_the_integral_of_the_stiffness_of_the_cone(thickness, depth
 def test_a_shallow_contact_on_a_thick_layer_loses_no_digits():
     """At d / e = 9e-4, by the series of the logarithm."""
     layer = Layer(3e6, 60.0, 100.0, angle=0.01)
-    way = quad(lambda x: layer.contact(x) * layer.spread(x) / (100 - x), 0, 0.09,
-               epsrel=1e-12)[0]  # fmt: skip
-    assert layer.force(0.09) == pytest.approx(3e6 * np.pi * way, rel=1e-6)
+    way = quad(lambda x: layer.contact(x) * layer.spread(x) / (100 - x), 0, 0.09, epsrel=1e-12)
+    assert layer.force(0.09) == pytest.approx(3e6 * np.pi * way[0], rel=1e-6)
 
 
 def test_contact_grows_with_depth_and_the_load_spreads():
@@ -154,14 +146,13 @@ def test_contact_grows_with_depth_and_the_load_spreads():
 
 
 def test_a_thinner_layer_is_stiffer_and_strikes_harder():
-    peaks = [strike(baseline(cushion=Layer.of_sand(4000.0, 1e6, e))).peaks[0]
-             for e in (5.0, 2.0, 1.2)]  # fmt: skip
+    layers = (Layer.of_sand(4000.0, 1e6, e) for e in (5.0, 2.0, 1.2))
+    peaks = [strike(baseline(cushion=layer)).peaks[0] for layer in layers]
     assert peaks[0] < peaks[1] < peaks[2]
     assert peaks[0] == pytest.approx(strike(baseline()).peaks[0], rel=0.1)
 
 
 def test_the_plug_has_the_mass_of_its_cones():
-    """By slices, and of a cylinder where nothing spreads."""
     layer = Layer(3e6, 0.6, 0.9, angle=0.4)
     r = layer.spread(0.3)
     sand = quad(lambda z: np.pi * (layer.contact(0.3) + np.tan(0.4) * z) ** 2, 0, 0.6)[0]
@@ -192,8 +183,6 @@ def test_the_modulus_of_a_layer_is_varied_as_its_stiffness():
     change = rockfall.sensitivity(weak, lambda g: g.cushion.force(0.5), (1.25,))
     assert change["strength of the cushion"] == pytest.approx([0.25])
 
-
-# --- slabs of several modes that yield ---
 
 PLATE = Slab(np.array([0.012, 0.009, -0.006]), np.array([150.0, 400.0, 900.0]), damping=0.0)
 
@@ -228,22 +217,18 @@ def test_several_modes_yield_as_a_slip_under_the_plug():
 def test_one_mode_yields_as_it_did():
     """The shape of the static deflection of one mode is that mode."""
     one = Slab.of_mass(6000.0, 1.2e8, damping=0.0, capacity=1.2e6)
-    twin = Slab(np.full(2, 6000.0**-0.5 / np.sqrt(2)), np.full(2, np.sqrt(1.2e8 / 6000)),
-                damping=0.0, capacity=1.2e6)  # fmt: skip
+    modes = np.full(2, 6000.0**-0.5 / np.sqrt(2)), np.full(2, np.sqrt(1.2e8 / 6000))
+    twin = Slab(*modes, damping=0.0, capacity=1.2e6)
     a, b = (strike(baseline(slab=s), t_end=0.2) for s in (one, twin))
     assert a.plastic == pytest.approx(b.plastic, rel=1e-9) and a.plastic > 0.005
 
 
 def test_what_stays_is_the_shape_of_the_static_deflection():
-    """Long after a blow a damped slab lies where its plastic shape is, a share per mode."""
     slab = replace(PLATE, damping=0.3, capacity=6e5)
     got = strike(baseline(slab=slab, weight=False), t_end=2.0)
     shape = slab.stiffness * slab.phi / slab.omega**2
     late = got.modal[-1]
     assert_allclose(late, got.plastic * shape, atol=2e-3 * np.abs(late).max())
-
-
-# --- messages ---
 
 
 test_messages_name_what_is_wrong = refused(
@@ -277,8 +262,8 @@ def test_recovery_is_the_share_of_the_energy(cushion, deepest, recovery):
     """Of compacted sand too: it gave back more than it took, or a ninth instead of 3 %."""
     c = replace(cushion, recovery=recovery)
     taken = quad(c.force, 0, deepest, limit=400)[0]
-    returned = quad(c.force, 0, deepest, args=(deepest,), limit=400, points=[
-        deepest - 3 * recovery * taken / c.force(deepest)])[0]  # fmt: skip
+    kink = deepest - 3 * recovery * taken / c.force(deepest)
+    returned = quad(c.force, 0, deepest, args=(deepest,), limit=400, points=[kink])[0]
     if c.exponent * recovery * taken < 0.7 * deepest * c.force(deepest):  # there is way enough
         assert returned / taken == pytest.approx(recovery, rel=0.04)
     assert returned < 1.02 * recovery * taken
@@ -288,10 +273,7 @@ def test_recovery_is_the_share_of_the_energy(cushion, deepest, recovery):
 def test_a_second_blow_is_seen_where_it_is_the_larger_one(recovery, grows):
     """The cushion is stiff by then: 2589 kN after 2095, which an end at the first blow left out."""
     g = baseline(cushion=Cushion.of_sand(4000.0, 1e6, recovery=recovery), weight=True)
-    got, long = strike(g), strike(g, t_end=20.0)
-    assert_allclose(got.peaks, long.peaks, rtol=2e-3)
-    assert got.deflection == pytest.approx(long.deflection, rel=2e-3)
-    assert (got.t[-1] > 2.0) == grows
+    assert (seen_to_its_end(g).t[-1] > 2.0) == grows
 
 
 DELAY = 0.01  # s

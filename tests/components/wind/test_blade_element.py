@@ -43,18 +43,17 @@ def forces(packed, W, v):
     return W.residual.copy()
 
 
-@pytest.fixture
-def resting():
-    """A blade in its shape without stress: what is left are forces of the wind."""
+def prepared(body, **pose):
+    """A blade without weight as its equations have it: packed, and work space."""
     mech = rom.Mechanism(gravity=(0, 0, 0))
-    mech.add_nonlinear("blade", a_blade())
+    mech.add_nonlinear("blade", body, **pose)
     packed = pack(mech, whole=True)
     return packed, workspace(packed.system, 0)
 
 
-def test_a_strip_has_lift_across_and_drag_along_the_air_that_reaches_it(resting):
+def test_a_strip_has_lift_across_and_drag_along_the_air_that_reaches_it():
     """Its force, taken back from the momentum that its ring of air loses; direction and power."""
-    packed, W = resting
+    packed, W = prepared(a_blade())  # without stress: what is left are forces of the wind
     v = np.zeros(packed.v.size)
     b = 5
     t = packed.system.bodies.v_at[b]
@@ -71,8 +70,8 @@ def test_a_strip_has_lift_across_and_drag_along_the_air_that_reaches_it(resting)
     def of(phi):
         lift, drag = (np.interp(phi - theta, one.angle, x) for x in (one.lift, one.drag))
         s, k = np.sin(phi), np.cos(phi)
-        F = (2 / np.pi) ** 2 * np.arccos(np.exp(-1.5 * (63 - r) / (r * s))) * np.arccos(
-            np.exp(-1.5 * (r - 1.5) / (1.5 * s)))  # fmt: skip
+        tip, root = np.exp(-1.5 * (63 - r) / (r * s)), np.exp(-1.5 * (r - 1.5) / (1.5 * s))
+        F = (2 / np.pi) ** 2 * np.arccos(tip) * np.arccos(root)
         solid = 3 * chord / (2 * np.pi * r * c)
         normal, driving = lift * k + drag * s, lift * s - drag * k
         return solid * normal / (4 * F * s**2), solid * driving / (4 * F * s * k), normal, driving
@@ -103,22 +102,13 @@ def test_strips_of_a_rod_have_the_loads_of_the_rotor_whose_wake_leans(tilt, yaw,
     for azimuth, row in zip(load.azimuth, load.strip, strict=True):
         A = rotation.matrix(rotation.exp([azimuth, 0.0, 0.0]))
         A = A @ rotation.matrix(rotation.exp([0.0, -cone, 0.0]))
-        mech = rom.Mechanism(gravity=(0, 0, 0))
-        mech.add_nonlinear("blade", one, orientation=A)
-        packed = pack(mech, whole=True)
+        packed, W = prepared(one, orientation=A)
         v = np.zeros(packed.v.size)
         places = rotor.radius[:, None] * A[:, 2]
         v.reshape(-1, 6)[used, :3] = np.cross([speed, 0.0, 0.0], places)
-        W = workspace(packed.system, 0)
         found = -forces(packed, W, v).reshape(-1, 6)[used, :3] @ A[:, :2]
         expected = rotor.length[:, None] * row[:, :2] * [1, -1]
         assert_allclose(found, expected, rtol=1e-6)
-
-
-def without_stiffness(n=6):
-    """A blade that does not bend back, so that forces are those of the wind."""
-    one = blade(n)
-    return one._replace(stretch=1e-14 * one.stretch, bend=1e-14 * one.bend)
 
 
 @pytest.mark.parametrize(
@@ -130,12 +120,10 @@ def test_tangents_of_the_wind_are_derivatives(tower, wind):
 
     In the last wind, from 84 degrees aside, the wake lies in the plane of the rotor.
     """
-    mech = rom.Mechanism(gravity=(0, 0, 0))
-    down = rotation.exp([np.pi, 0, 0])
-    one = in_wind(cosserat.body(without_stiffness()), wind, tower=tower)
-    mech.add_nonlinear("blade", one, at=(-5, 1, 90), orientation=down)
-    packed = pack(mech, whole=True)
-    W = workspace(packed.system, 0)
+    one = blade(6)  # does not bend back, so that forces are those of the wind
+    one = one._replace(stretch=1e-14 * one.stretch, bend=1e-14 * one.bend)
+    one, down = in_wind(cosserat.body(one), wind, tower=tower), rotation.exp([np.pi, 0, 0])
+    packed, W = prepared(one, at=(-5, 1, 90), orientation=down)
     rng = np.random.default_rng(9)
     n = packed.v.size
     q = packed.q.copy()
@@ -167,8 +155,8 @@ def test_tangents_of_the_wind_are_derivatives(tower, wind):
 def stiff_blade(n, wind, pitch=0.0):
     """A stiff blade on a driven hub, in a wind (3,)."""
     A, mech = rotation.matrix(rotation.exp([0.0, 0.0, -pitch])), rom.Mechanism(gravity=(0, 0, 0))
-    part = mech.add_nonlinear("blade", in_wind(stiff_body(n), wind, cone=0.0),
-                              orientation=A, omega=A.T @ [RATED_SPEED, 0.0, 0.0])  # fmt: skip
+    body, omega = in_wind(stiff_body(n), wind, cone=0.0), A.T @ [RATED_SPEED, 0.0, 0.0]
+    part = mech.add_nonlinear("blade", body, orientation=A, omega=omega)
     on_driven_hub(mech, part, RATED_SPEED)
     return mech
 
@@ -186,7 +174,6 @@ def test_a_stiff_rotor_in_a_mechanism_has_the_loads_of_its_strips(wind, pitch):
 
 
 def test_a_stiff_rotor_in_wind_from_aside_has_the_loads_of_each_azimuth():
-    """Torque and the moment that bends the root, over the last turn, beside `rotor_load`."""
     n, yaw, V = 8, 0.6, 9.0
     mech = stiff_blade(n, (V * np.cos(yaw), V * np.sin(yaw), 0.0))
     sol = rom.simulate(mech, t_end=8.0, dt=0.02, rho_inf=0.3)
@@ -195,8 +182,8 @@ def test_a_stiff_rotor_in_wind_from_aside_has_the_loads_of_each_azimuth():
     arm = load.strip[:, :, 0] @ (rotor.radius * rotor.length)
     late = sol.t > 8.0 - 2 * np.pi / RATED_SPEED
     azimuth = RATED_SPEED * sol.t[late] % (2 * np.pi)
-    turned, bent = (np.interp(azimuth, load.azimuth, x, period=2 * np.pi)
-                    for x in (load.blade_torque, arm))  # fmt: skip
+    turned = np.interp(azimuth, load.azimuth, load.blade_torque, period=2 * np.pi)
+    bent = np.interp(azimuth, load.azimuth, arm, period=2 * np.pi)
     assert_allclose(-sol.drive_load("speed")[late], turned, atol=0.01 * np.ptp(turned))
     _, across, up = sol.reaction("shaft")[late][:, 3:].T
     found = -across * np.cos(azimuth) - up * np.sin(azimuth)
@@ -207,8 +194,8 @@ def test_a_stiff_rotor_in_wind_from_aside_has_the_loads_of_each_azimuth():
 def test_the_whole_turbine_takes_the_steady_power_on_average(wind):
     """Tilt, cone, pitch and tower as for a stiff rotor; blades swing about it and bend a little."""
     point = steady(wind, tower=True)
-    whole = turbine(12, tower_segments=0, gravity=0.0, wind=wind, pitch=point.pitch,
-                    speed=point.speed)  # fmt: skip
+    state = {"wind": wind, "pitch": point.pitch, "speed": point.speed}
+    whole = turbine(12, tower_segments=0, gravity=0.0, **state)
     whole.turn_by(lambda t: point.speed * t, lambda t: point.speed)
     sol = rom.simulate(whole.mechanism, t_end=12.0, dt=0.02, rho_inf=0.5)
     late = sol.t > 12.0 - 2 * np.pi / point.speed

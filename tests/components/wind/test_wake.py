@@ -40,8 +40,8 @@ def gust():
 def test_a_stiff_blade_in_a_gust_has_the_loads_of_the_rotor_whose_wake_is_late(gust):
     """The same filters, run by a mechanism and by `operate`: 3 % of the change apart."""
     _, rotor, sol = gust
-    beside = operate(lambda t: 7.0 if t <= 3.0 else 9.0, 12.0, dt=0.02, blades=rotor,
-                     held=lambda t: (SPEED, 0.0))  # fmt: skip
+    how = {"dt": 0.02, "blades": rotor, "held": lambda t: (SPEED, 0.0)}
+    beside = operate(lambda t: 7.0 if t <= 3.0 else 9.0, 12.0, **how)
     torque, thrust = -N_BLADES * sol.drive_load("speed"), N_BLADES * -sol.reaction("shaft")[:, 0]
     for found, expected in ((torque, beside.torque), (thrust, beside.thrust)):
         size = np.abs(expected[-1] - expected[100])
@@ -87,8 +87,8 @@ def test_a_late_wake_leans_in_wind_from_aside():
         lift, drag = (np.interp(attack, one.angle, x) for x in (one.lift, one.drag))
         q = 0.6125 * rotor.chord[k] * rotor.length[k] * np.hypot(through, across)
         normal, driving = q * (lift * across + drag * through), q * (lift * through - drag * across)
-        assert_allclose(np.linalg.norm(said.force[last][:, 0], axis=1), np.hypot(normal, driving),
-                        atol=0.01 * np.ptp(normal))  # fmt: skip
+        found, expected = np.linalg.norm(said.force[last][:, 0], axis=1), np.hypot(normal, driving)
+        assert_allclose(found, expected, atol=0.01 * np.ptp(normal))
 
 
 def test_the_first_instant_and_equilibria_have_the_steady_wake():
@@ -102,20 +102,13 @@ def test_the_first_instant_and_equilibria_have_the_steady_wake():
     assert rom.check_law(mech, "blade strip 5").ok
 
 
-@pytest.fixture(scope="module")
-def storm():
-    """A rigid tower, 15 m/s and then 17, under control."""
-    point = steady(15.0, tower=True)
-    winds = [[0.0, 15.0], [10.0, 15.0], [12.0, 17.0]]
-    plant = turbine(6, tower_segments=0, wind=winds, late_wake=True, controlled=True,
-                    pitch=point.pitch, speed=point.speed)  # fmt: skip
-    return plant, rom.simulate(plant.mechanism, t_end=36.0, dt=0.02, rho_inf=0.5)
-
-
 @pytest.mark.long
-def test_a_controlled_turbine_rides_through_a_gust_as_the_rigid_rotor_does(storm):
-    """Largest speed, and pitch behind the gust, beside `operate`, which knows no bending."""
-    plant, sol = storm
+def test_a_controlled_turbine_rides_through_a_gust_as_the_rigid_rotor_does():
+    """A rigid tower, 15 m/s and then 17; beside `operate`, which knows no bending."""
+    point = steady(15.0, tower=True)
+    how = {"wind": [[0.0, 15.0], [10.0, 15.0], [12.0, 17.0]], "late_wake": True, "controlled": True}
+    plant = turbine(6, tower_segments=0, pitch=point.pitch, speed=point.speed, **how)
+    sol = rom.simulate(plant.mechanism, t_end=36.0, dt=0.02, rho_inf=0.5)
     beside = operate(lambda t: float(np.interp(t, [10.0, 12.0], [15.0, 17.0])), 36.0, dt=0.02)
     speed, said = sol.omega("wheel") @ plant.axis, sol.law("control").outputs
     late = sol.t > 11.0
@@ -166,7 +159,6 @@ def test_the_control_in_a_mechanism_is_the_controller_at_its_speed():
 
 
 def test_the_generator_is_braked_against_the_nacelle():
-    """Moments of the law add to nothing, and it brakes the generator by its own torque."""
     plant = parked(speed=1.0)
     sol = rom.simulate(plant.mechanism, t_end=0.2, dt=0.02, rho_inf=0.5)
     said = sol.law("control")
@@ -180,9 +172,8 @@ def test_the_generator_is_braked_against_the_nacelle():
 def test_the_actuator_is_that_of_the_report():
     """30 Hz and two percent of critical damping belong to one inertia, about that of a blade."""
     inertia = PITCH_STIFFNESS / (2 * np.pi * 30.0) ** 2
-    assert_allclose(
-        whole_turbine.PITCH_DAMPING, 2 * 0.02 * np.sqrt(PITCH_STIFFNESS * inertia), rtol=2e-3
-    )
+    damping = 2 * 0.02 * np.sqrt(PITCH_STIFFNESS * inertia)
+    assert_allclose(whole_turbine.PITCH_DAMPING, damping, rtol=2e-3)
 
 
 @pytest.mark.parametrize(
