@@ -86,7 +86,6 @@ def test_two_bodies_on_a_spring_swing_as_two_masses(bolted):
 
 
 def test_a_spring_reaches_a_body_that_is_apart_by_a_rigid_arm(bolted):
-    """No rigid motion of the whole stretches it, wherever its ends are."""
     parts = Parts.of(bolted)
     long = JointSpring(("frame", "root"), ("arm", "tip"), (3.0, 4.0, 5.0), 0.1, 10.0)
     K, _ = long.term(parts)
@@ -253,10 +252,8 @@ def test_the_fmu_of_an_assembly_follows_as_python_does(bolted, tmp_path):
 
 def test_a_joint_that_loosens_is_followed(bolted):
     up = [[0.0, 0.0, 1.0]]
-    sensors = tuple(
-        Sensors(Channels([[0.5, 0.1, 0.08]], up, name), "displacement", 1e-8)
-        for name in bolted.families
-    )
+    ends = (Channels([[0.5, 0.1, 0.08]], up, name) for name in bolted.families)
+    sensors = tuple(Sensors(end, "displacement", 1e-8) for end in ends)
     force = Channels([[1.0, 0.1, 0.08]], up)
     wanted = (Sensors(force, "displacement"),)
     options = dict(TRACKED, dt=2e-4, walk=1e4, first=10.0, attached={"bolts": BOLTS}, fixed=HELD)

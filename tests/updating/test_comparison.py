@@ -17,9 +17,8 @@ REGIONS = ("inner", "middle", "outer")
 PARAMETERS = {f"E_{name}": rom.YoungsModulus(name, 0.4, 2.5) for name in REGIONS}
 MODULI, ONE = tuple(PARAMETERS), {"one modulus": {"free": ("E_inner",)}}
 PARAMETERS |= {f"rho_{name}": rom.Density(name, 0.4, 2.5) for name in REGIONS}
-SENSORS = Channels(
-    [[x, 0.1, 0.08] for x in (0.33, 0.67, 1.0)] * 2, [[0, 1, 0]] * 3 + [[0, 0, 1]] * 3
-)
+EDGE = [[x, 0.1, 0.08] for x in (0.33, 0.67, 1.0)]
+SENSORS = Channels(EDGE * 2, [[0, 1, 0]] * 3 + [[0, 0, 1]] * 3)
 INPUTS = Channels([[1.0, 0.0, 0.0]], [[0, 1, 1]])
 LINES, LEVEL, AVERAGES = np.linspace(30, 900, 83), 0.05, 60
 HELD = {"root": "x y z rx ry rz"}
@@ -60,7 +59,6 @@ def test_lines_are_foretold_by_the_update_of_all_others(family):
 
 
 def test_noise_of_forces_and_coherence_of_each_line_go_with_it(family):
-    """Every third line has no coherence: not counted, wherever it is kept."""
     test = measured(family, 0, {"E_inner": 1.2})
     one = replace(test, force_noise=0.01, estimator="H1")
     each = replace(one, force_noise=np.full((LINES.size, test.H.shape[2]), 0.01))
@@ -141,10 +139,8 @@ def found(family, true, seed, on_force=0.0, **there):
         H = updating.exact_responses(updating.model_of(family, channels, **more), true, BAND)
         rng = np.random.default_rng(seed)
         test = updating.averaged(H, channels, BAND, rng, noise=(on_force, 0.1), n=50)
-    return rom.update(
-        family, test, free=MODULI, fixed=HINGE, attached={"clamp": CLAMP}, candidates=OFFERED,
-        prior={"clamp": 1e-4}, damping=0.02,
-    )  # fmt: skip
+    options = {"fixed": HINGE, "attached": {"clamp": CLAMP}, "prior": {"clamp": 1e-4}}
+    return rom.update(family, test, free=MODULI, candidates=OFFERED, damping=0.02, **options)
 
 
 WRONG = [

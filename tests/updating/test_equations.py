@@ -16,11 +16,8 @@ from rom.components.updating.models import AtSensors, Measurement, ParametricMod
 from rom.components.updating.normal_equations import in_sensors, responses_at
 from rom.updating import Channels, Responses
 
-PARAMETERS = {
-    "E_inner": rom.YoungsModulus("inner", 0.3, 3.0),
-    "E_outer": rom.YoungsModulus("outer", 0.3, 3.0),
-    "rho_outer": rom.Density("outer", 0.5, 2.0),
-}
+PARAMETERS = {f"E_{name}": rom.YoungsModulus(name, 0.3, 3.0) for name in ("inner", "outer")}
+PARAMETERS |= {"rho_outer": rom.Density("outer", 0.5, 2.0)}
 TRUE = np.array([1.15, 0.85, 1.1])
 NODES, DRIVEN = (8, 9, 10, 13, 14, 16, 19), 5
 LINES = np.linspace(20, 1400, 120)
@@ -37,10 +34,9 @@ def model():
 
 @pytest.fixture(scope="module")
 def family(model):
-    return rom.reduce_parametric(
-        model, parameters=PARAMETERS, method=rom.CraigBampton(36),
-        interfaces={"root": "full", "tip": "full"}, certify=False,
-    )  # fmt: skip
+    options = {"interfaces": {"root": "full", "tip": "full"}, "certify": False}
+    method = rom.CraigBampton(36)
+    return rom.reduce_parametric(model, parameters=PARAMETERS, method=method, **options)
 
 
 def channels(model, sign=1.0):
@@ -216,7 +212,6 @@ def test_the_response_function_method_has_no_bias_at_strong_noise(family, model)
 
 
 def test_the_bias_of_the_condensation_is_seen_by_the_verdict(family, model):
-    """Responses find the truth; equations do not, and noise does not explain what is left."""
     test = measured(family, model, level=0.01)
     updates = rom.update(family, test, fixed=("root",)), rom.update(family, test, **BY_EQUATIONS)
     off = [np.abs(np.array(list(u.factors.values())) / TRUE - 1).max() for u in updates]

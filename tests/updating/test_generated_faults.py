@@ -192,7 +192,6 @@ def leaky(test, poles, depth=0.4, reach=4.0):
 
 
 def test_lines_beside_poles_that_are_wrong_can_count_less(family):
-    """What is lost at resonances is refused; beside them the model is right, and is found."""
     rng = np.random.default_rng(5)
     test = measured(family, rng, factor=1.15)
     poles = rom.update(family, test, fixed=HELD).body.frequencies(6, fixed=HELD)

@@ -112,7 +112,6 @@ def test_derivatives_are_those_of_differences(filter_):
     ("factors", "damping"), [({}, 0.02), ({"E_inner": 1.5, "rho_outer": 0.7}, 0.0)]
 )
 def test_held_factors_are_those_of_the_body_there(family, factors, damping):
-    """The family's equations, in modes at factors of one, and the body's own in its modes."""
     drifts = {name: Drift(0.1) for name in PARAMETERS}
     askew = replace(FEW[1].channels, directions=[[1, 2, 3]] * 2)
     few = FEW[0], replace(FEW[1], channels=askew)  # all motions are seen
@@ -178,7 +177,6 @@ def totals(t, assumed, n_draws, n_t, seed):
 
 
 def test_errors_are_as_large_as_the_filter_says(filter_):
-    """20 records with parameters that walk: inside chi-square bands, on both sides."""
     n, n_t = 20, 300
     surprise, factors, wanted = totals(filter_, filter_, n, n_t, 11)
     for total, freedom in ((surprise, 3 * n * n_t), (factors, 2 * n), *((x, n) for x in wanted)):
@@ -198,7 +196,6 @@ def test_noise_wrong_by_a_tenth_leaves_the_band(filter_, noise, side):
 
 
 def test_a_joint_that_loosens_is_followed(family):
-    """The spring at the tip loses half in a second; nobody told the filter when."""
     t = made(family, parameters={"clamp": Drift(0.02, 0.5)})
     rng, n_t = np.random.default_rng(3), 3000
     true = np.log(0.5) * np.clip((np.arange(n_t) // 50 * 50 - 500) / 1000, 0, 1)
@@ -220,7 +217,6 @@ def test_a_joint_that_loosens_is_followed(family):
 
 
 def test_the_fmu_follows_as_python_does(family, tmp_path):
-    """400 steps in which the point of linearisation moves; a state is kept and taken up again."""
     t = made(family, parameters=DRIFTS | {"rho_outer": Drift(0.05, 0.02)})
     _, _, y = walked(t, np.random.default_rng(1), 400)
     path = rom.io.write_observer_fmu(t, tmp_path / "joint.fmu")

@@ -52,7 +52,6 @@ def test_a_test_of_another_program_is_read_in_si_units(name):
 @pytest.mark.once
 @pytest.mark.parametrize("binary", [0, 1])
 def test_pyuff_reads_the_points_that_are_written_and_writes_what_is_read(tmp_path, binary):
-    """The points of a plan go out, and come back with responses to a force at the last of them."""
     pyuff = pytest.importorskip("pyuff", reason="pyuff is not installed")
     sensors = Channels([NODES[5], NODES[9]], [[0, 1, 0], [0, 0, -1]])
     force = Channels([NODES[11]], [[0, 0, -1]])
@@ -282,7 +281,6 @@ def test_a_coordinate_system_of_dataset_2420(turned, same, tmp_path):
 
 
 def test_pairs_that_were_not_measured_do_not_count(tmp_path):
-    """Sensor 7 by force 11, and 8 by 7: two of four responses."""
     test = read(tmp_path / "x.unv", two(reference=(7, 2)))
     assert test.H.shape == (X.size, 2, 2)
     assert_array_equal(test.coherence[0] > 0, [[False, True], [True, False]])

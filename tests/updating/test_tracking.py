@@ -116,7 +116,6 @@ def test_errors_and_innovations_are_as_large_as_the_filter_says(filter_):
 
 
 def test_force_and_stress_of_the_full_model_are_found(model, body):
-    """A force on the tip that rises and stays; its sensors are noisy dofs of the full model."""
     modes = rom.modes(model, model.n_dofs - model.interfaces["root"].dofs.size, fixed=("root",))
     omega, shapes = modes.omega, modes.shapes
     where = {tuple(np.round(x, 9)): 3 * k for k, x in enumerate(model.points)}
@@ -191,9 +190,8 @@ def test_stress_turns_with_its_direction(body):
 def test_modes_left_out_follow_the_accelerations(body):
     rng, r = np.random.default_rng(6), body.n_modes
     own = StressRecovery(np.array(GAUGE[:1]), rng.normal(size=(6, r)), rng.normal(size=(6, 12 + r)))
-    static, inertial = stress_rows(
-        replace(body, stress=own), Channels(GAUGE[:1], [[0, 1, 0]]), "sensor"
-    )
+    at = Channels(GAUGE[:1], [[0, 1, 0]])
+    static, inertial = stress_rows(replace(body, stress=own), at, "sensor")
     q, a = rng.normal(size=r), rng.normal(size=6 + r)
     expected = own.field(q, own.accelerations(a[:3], a[3:6], np.zeros(3), a[6:]))[0, 1]
     assert_allclose(static[0] @ q + inertial[0] @ a, expected)

@@ -303,7 +303,6 @@ def test_the_gradient_is_that_of_the_cost_with_its_prior(family):
 
 
 def test_two_tests_with_two_supports_say_more_than_one(family):
-    """Held, then free: information adds up, and a change between them is refused."""
     held = rom.update(family, synthetic(family, lines=LINES[:60]), fixed=HELD, damping=0.02)
     loose = synthetic(family, fixed=(), seed=1, lines=LINES[::2])
     alone = rom.update(family, loose, damping=0.02)
@@ -359,7 +358,6 @@ def test_wrong_data_and_families_are_named(family):
 
 
 def test_a_free_body_has_its_rigid_motions_too(family):
-    """Mass by its rigid motion, at lines below the first elastic mode as well."""
     found = rom.update(family, synthetic(family, fixed=()), damping=0.02)
     assert found.model.n_rigid == 6 and found.verdict.ok
     for name, value in TRUE.items():

@@ -15,11 +15,8 @@ from rom.updating import Channels, JointSpring, Responses
 BEAM = (1.0, 0.1, 0.08)
 KINDS = {"root": "rbe2", "tip": "rbe2"}
 BOLTS = JointSpring(("frame", "tip"), ("arm", "root"), (4e8, 4e8, 4e8, 2e5, 1e5, 1e5), 0.1, 10.0)
-PARAMETERS = {
-    "E_inner": rom.YoungsModulus("inner", 0.4, 2.5),
-    "E_outer": rom.YoungsModulus("outer", 0.4, 2.5),
-    "rho_outer": rom.Density("outer", 0.5, 2.0),
-}
+PARAMETERS = {f"E_{name}": rom.YoungsModulus(name, 0.4, 2.5) for name in ("inner", "outer")}
+PARAMETERS |= {"rho_outer": rom.Density("outer", 0.5, 2.0)}
 
 
 def refuse(*rows, error=ConfigError):

@@ -196,7 +196,6 @@ def test_only_rigid_motions_cost_nothing_and_turns_make_no_force(element, n):
 @pytest.mark.parametrize("element", ["F1", "F3"])
 @pytest.mark.parametrize("state", ["plane stress", "plane strain", "axisymmetric"])
 def test_the_tangent_is_the_derivative_of_the_forces(element, state):
-    """Hencky's law, far from the start, with its geometric part and beyond yield."""
     X, T = distorted((2, 2))
     X += (0.5, 0.0)
     rng = np.random.default_rng(3)

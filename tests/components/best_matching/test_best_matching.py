@@ -16,10 +16,8 @@ from rom.components.best_matching import Bodies, ShapeSphere, frame, match, stac
 from rom.errors import ConfigError, ModelError, SolverError
 
 MASS = np.array([1.0, 1.5, 2.0])
-START = (
-    np.array([(1, 0.2, 0), (-0.7, 0.5, 0), (0.1, -0.9, 0)]),
-    np.array([(0.3, -0.5, 0), (0.2, 0.6, 0), (-0.4, 0.1, 0)]),
-)
+X0 = np.array([(1, 0.2, 0), (-0.7, 0.5, 0), (0.1, -0.9, 0)])
+START = X0, np.array([(0.3, -0.5, 0), (0.2, 0.6, 0), (-0.4, 0.1, 0)])
 CORNERS = np.array([(np.cos(a), np.sin(a), 0) for a in 2 * np.pi * np.arange(3) / 3]) / np.sqrt(3)
 
 
@@ -211,7 +209,6 @@ def floating(body, model, t_end, amplitude):
 
 
 def test_a_floating_beam_has_the_same_best_frame_in_all_floating_frames(model, bodies):
-    """Laid over the nodes, the undeformed beam is the mean-axis frame at any amplitude."""
     M_s = model.M[::3][:, ::3]
     gaps, wobble = [], []
     for amplitude in (20.0, 10.0):
@@ -253,19 +250,17 @@ def line(*places):
     return np.array([(p, 0.0, 0.0) for p in places])
 
 
+# n: lowest complexity of n equal masses
+SIMPLEST = {4: 0.2296397, 5: 0.2589745, 6: 0.2773689, 8: 0.3074264, 10: 0.3271667, 12: 0.3414254}
 TETRAHEDRON = np.array([(1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)])
 
 
-@pytest.mark.parametrize(
-    ("x", "expected"),
-    [
-        (line(0, 3), 0.125),
-        (CORNERS, 1 / (3 * np.sqrt(3))),
-        (line(-1, 0, 1), np.sqrt(6) * 2.5 / 27),
-        (np.array([(1, 1, 0), (-1, 1, 0), (-1, -1, 0), (1, -1, 0)]), 0.2392767),
-        (TETRAHEDRON, 0.2296397),
-    ],
-)
+SQUARE = np.array([(1, 1, 0), (-1, 1, 0), (-1, -1, 0), (1, -1, 0)])
+REGULAR = [(line(0, 3), 0.125), (line(-1, 0, 1), np.sqrt(6) * 2.5 / 27), (SQUARE, 0.2392767)]
+REGULAR += [(CORNERS, 1 / (3 * np.sqrt(3))), (TETRAHEDRON, 0.2296397)]
+
+
+@pytest.mark.parametrize(("x", "expected"), REGULAR)
 def test_complexity_of_regular_shapes(x, expected):
     bodies = Bodies(np.full(len(x), 0.7))
     assert bodies.complexity(x) == pytest.approx(expected, rel=2e-7)
@@ -273,11 +268,7 @@ def test_complexity_of_regular_shapes(x, expected):
     assert bodies.complexity(moved) == pytest.approx(expected, rel=2e-7)
 
 
-@pytest.mark.parametrize(
-    ("n", "expected"),
-    [(4, 0.2296397), (5, 0.2589745), (6, 0.2773689), (8, 0.3074264), (10, 0.3271667),
-     (12, 0.3414254)],
-)  # fmt: skip
+@pytest.mark.parametrize(("n", "expected"), SIMPLEST.items())
 def test_simplest_shapes_are_the_known_ones_and_collapse_in_themselves(n, expected):
     """By descent from random starts: a central configuration, accelerated to its centre."""
     bodies, rng = Bodies(np.ones(n)), np.random.default_rng(n)

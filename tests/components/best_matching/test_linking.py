@@ -13,10 +13,8 @@ from rom.errors import ConfigError, ModelError, SolverError
 
 MASS = np.array([1.0, 1.5, 2.0, 0.7, 1.2])
 THREE = np.array([1.0, 1.5, 2.0])
-START = (
-    np.array([(1, 0.2, 0), (-0.7, 0.5, 0), (0.1, -0.9, 0)]),
-    np.array([(0.3, -0.5, 0), (0.2, 0.6, 0), (-0.4, 0.1, 0)]),
-)
+X0 = np.array([(1, 0.2, 0), (-0.7, 0.5, 0), (0.1, -0.9, 0)])
+START = X0, np.array([(0.3, -0.5, 0), (0.2, 0.6, 0), (-0.4, 0.1, 0)])
 
 
 def started(mass, degree, seed=4):
@@ -71,7 +69,6 @@ def test_constraints_are_first_class_also_off_their_surface(degree):
 
 
 def test_rates_are_brackets_with_the_constraints(five):
-    """x' = {x, N H + l Q} and so on, by finite differences, for any multipliers."""
     linking, state, _, _ = five
     state = state.scaled(0.4)
     N, growth = 0.7, -0.3
@@ -108,7 +105,6 @@ def test_phi_zero_is_newton(five):
 
 
 def test_pi_as_clock_is_newton_without_size(five):
-    """Integrated without time: Newton's positions, momenta and time come out of it to 1e-9."""
     linking, state, t, (x, v) = five
     clock = np.array([linking.bodies.growth(*s) for s in zip(x, v, strict=True)])
     small = state.scaled(np.log(np.sqrt(linking.bodies.size(state.x))))

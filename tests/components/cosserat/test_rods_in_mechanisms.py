@@ -113,7 +113,6 @@ def test_tangents_of_a_bent_and_moving_rod():
 
 
 def test_balance_of_energy_and_loss():
-    """What the weight gives up is motion, strain and heat; the error falls with the step."""
     rod = a_rod(viscosity=0.05)
     mech, part = clamped(rod, gravity=(0, 0, -9.81))
     mech.add_rigid("bob", mass=3.0, inertia=(0.1, 0.1, 0.1), at=(10, 0, 0))
@@ -157,7 +156,6 @@ def steel(b, h, E=210e9, rho=7850.0):
 
 
 def test_a_rod_goes_on_where_a_reduced_solid_ends():
-    """A steel bar of one metre: half of it bricks in Craig-Bampton form, half a rod."""
     size, ends = (0.5, 0.03, 0.02), {"root": "rbe2", "tip": "rbe3"}
     solid = reduced(6, bar(size, (20, 2, 2)), interfaces=ends, reference="root")
     section = steel(*size[1:])
@@ -175,7 +173,6 @@ def test_a_rod_goes_on_where_a_reduced_solid_ends():
 
 
 def test_a_rod_that_hardly_bends_has_the_frequencies_of_the_reduced_solid():
-    """Cantilever of one metre, 30 x 20 mm: bricks in Craig-Bampton form against 192 segments."""
     size = (1.0, 0.03, 0.02)
     solid = reduced(8, bar(size, (40, 2, 2)), interfaces={"root": "rbe3"})
     rod = cosserat.straight(1.0, 192, frame=ALONG_X, **steel(*size[1:]))
@@ -204,7 +201,6 @@ def test_plates_take_their_inertia_from_the_segments_beside_them():
 
 
 def test_a_released_rod_starts_from_the_shape_in_which_it_was_held():
-    """A tip that is pulled and let go: its first acceleration is the pull over what it moves."""
     rod = a_rod()
     held, part = clamped(rod)
     held.spherical("hand", held.ground.marker((9.5, 0.0, 2.0)), part.marker("end"))

@@ -104,7 +104,6 @@ def test_a_hand_that_floats_keeps_its_momenta_while_it_grips():
 
 
 def test_a_table_goes_down_smoothly_and_things_stand_on_it():
-    """Its way is the integral of its speed; a bar stands on three feet, a ball on one point."""
     mech = moving_hand({"index": Finger(n=2)}, seats={"index": Seat()}, gravity=(0, 0, -g))
     held = replace(BALL, centre=(40 * MM, 0.0, 40 * MM))
     hold(mech, "thing", held)

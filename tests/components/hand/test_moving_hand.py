@@ -128,7 +128,6 @@ def test_the_axis_of_a_bend_turns_with_its_plates_as_differences_say():
 
 
 def test_the_work_of_a_winch_goes_into_springs_losses_and_friction():
-    """The balance of the energies, and the friction of the cable alone as what springs keep not."""
     mu, lost = 0.3, []
     for friction in (0.0, mu):
         drive = Drive(pull=lambda t: 9 * MM * np.sin(np.pi / 2 * min(t / 0.3, 1.0)) ** 2, EA=2e3)
@@ -212,7 +211,6 @@ def test_five_fingers_close_in_time():
 
 
 def test_one_shaft_draws_five_cables():
-    """The moment of its motor is that of five fingers by themselves, and its work their energy."""
     fingers = hand(n=2)
     radii = {"thumb": 3 * MM, "index": 4 * MM, "middle": 5 * MM, "ring": 4.5 * MM, "little": 2 * MM}
     turn = lambda t: 1.5 * np.sin(np.pi / 2 * min(t / 0.5, 1.0)) ** 2  # noqa: E731

@@ -175,7 +175,6 @@ def test_both_laws_agree_when_oil_comes_in_at_the_largest_gap():
 
 
 def test_power_is_lost_in_shear_and_in_flow():
-    """Friction times speed less work on the journal, cell by cell."""
     b = bearing(0.8, [Groove(-2.0)], (90, 12), False, cavitation="jfo")
     f = film(b, STATE, RATE, **RUN)
     h, p, mu = f.thickness, f.pressure, f.viscosity
@@ -248,7 +247,6 @@ def short_critical_mass(e):
 
 
 def test_short_bearings_whirl_least_willingly_up_to_a_speed():
-    """The lowest threshold, and the eccentricity beyond which nothing whirls."""
     e = np.linspace(0.40, 0.52, 121)
     speed = np.sqrt([short_critical_mass(x) for x in e])
     assert min(speed) == pytest.approx(2.53171, abs=1e-5)

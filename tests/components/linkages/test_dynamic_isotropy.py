@@ -83,7 +83,6 @@ def test_the_number_of_configurations_does_not_depend_on_the_grid(found, n):
 
 
 def test_other_lengths_have_other_numbers_of_configurations():
-    """Shorter couplers that still close everywhere: twelve, and the windings cancel again."""
     short = FiveBar(0.65, (rod(2.0, 0.3),) * 2, (rod(1.0, 0.7),) * 2, payload=0.5)
     assert 2 * 0.7 > 0.65 + 2 * 0.3 and 0.65 > 2 * 0.3
     for n in (150, 300):
@@ -111,7 +110,6 @@ def still_tips(five):
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_cranks_of_limited_range_have_maps_points_and_closed_loci(side):
-    """An ordinary five-bar, refused as a whole; points by closed form and by another search."""
     five = replace(ORDINARY, side=side)
     refuses(ModelError, "elbows are", lambda: five.inertia(*angle_grid(40)))
     found = isotropic_configurations(five.inertia, n=300, assembles=five.assembles)

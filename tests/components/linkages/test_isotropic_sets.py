@@ -66,9 +66,8 @@ def glide_points(five):
     return points
 
 
-TILTED = SlideFiveBar(
-    ((0, 0, 0.4), (0.8, 0.1, 2.0)), (1.3, 0.7), (rod(MU, REACH), rod(MU, 0.5)), PAYLOAD, -1
-)
+RODS = rod(MU, REACH), rod(MU, 0.5)
+TILTED = SlideFiveBar(((0, 0, 0.4), (0.8, 0.1, 2.0)), (1.3, 0.7), RODS, PAYLOAD, -1)
 CASES = {
     "PP": (
         CrossSlides((3.0, 2.0), 1.1, (0.0, 0.0)),
@@ -341,7 +340,6 @@ def test_two_slides_of_the_core_are_isotropic_at_one_spread():
 
 
 def test_a_five_bar_of_the_core_has_a_point_of_the_table():
-    """Of the eight, the one at 135.7231 and 44.2769 degrees: rank two, winding -1."""
     start = np.array([2.3, 0.8])
     mech = five_bar_of_the_core(start, [(2.0, 0.3)] * 2, [(1.0, 0.8)] * 2, FIVE.posture(*start))
     core = Driven(mech, ("left", "right"), tool="ball")

@@ -89,7 +89,6 @@ def test_cranks_that_turn_far_keep_the_tip_on_its_side(base, cranks, couplers, s
 
 
 def test_slides_of_a_small_mechanism_travel_many_of_its_sizes():
-    """Couplers of 4 mm on a rail of 200 mm: lengths count in sizes of the mechanism."""
     core = Driven(rail_of_the_core(1.3, (0.9, 4e-3), 0.4, 5e-3), ("left", "right"), tool="tool")
     travel = 0.2
     there = core.tip([0.0, travel], [1e-3, travel + 1e-3])
@@ -136,7 +135,6 @@ def apparent_inertia(L, mu, EI, w):
 
 
 def test_inertia_at_a_frequency_is_that_of_a_beam_and_converges_with_its_modes():
-    """Without bound on the frequency each mode takes more away; at a frequency they converge."""
     L, side, w = 0.5, 0.02, 2 * np.pi * 40.0
     mu, EI = STEEL.rho * side**2, STEEL.E * side**4 / 12
     found, free = [], []
@@ -173,7 +171,6 @@ def test_the_frame_of_a_flexible_coupler_is_a_matter_of_taste(bar):
 
 
 def test_inertia_and_christoffel_symbols_reproduce_the_free_motion_of_the_core():
-    """Two equations of motion against fifty-odd with constraints, integrated by other means."""
     q0, rate = np.array([1.0, 2.2]), np.array([3.0, -2.0])
     mech = five_of_the_core(q0)
     mech.drives.clear()

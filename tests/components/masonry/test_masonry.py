@@ -32,7 +32,6 @@ def uniform_strains(points):
 
 
 def test_mass_of_a_block_is_that_of_finite_elements():
-    """A box of bricks moved by the six motions of a plane block: rigid ones, uniform strains."""
     model = block(size=(0.6, 0.3, 0.2), cells=(3, 2, 1))
     x = model.points - model.points.mean(axis=0)
     U = np.hstack([rigid_motions(x)[:, [0, 1, 5]], uniform_strains(x)])
@@ -57,7 +56,6 @@ def test_mass_of_a_skew_block_from_random_points():
 
 
 def test_mean_axes_are_the_strains_orthogonal_to_rotation():
-    """The same vibration with rotation in the equations, and without it in a mean-axis frame."""
     one = stone(SKEW, **SOFT)
     K = np.zeros((6, 6))
     K[3:, 3:] = one.K
@@ -131,7 +129,6 @@ def test_friction_turns_round_with_the_motion():
 
 
 def test_two_blocks_collide_with_their_momenta():
-    """Off centre and turned: momentum and angular momentum stay, energy does not grow."""
     stones = [stone(box(), **SOFT), stone(box(at=(1.05, 0.4)) @ turned(0.02).T, **SOFT)]
     v = np.zeros((2, 6))
     v[:, 0] = 1.0, -2.0
@@ -286,7 +283,6 @@ def test_meshed_and_plain_stones_stand_on_each_other(meshed):
 
 
 def test_stones_meet_corner_on_corner():
-    """Two bricks on two bricks, joints in line: four corners in a point, one edge parts each."""
     bricks = [stone(box(at=(x, y)), **SOFT) for y in (0.0, 1.0) for x in (-1.0, 0.0)]
     model = Rock().masonry([stone(GROUND, **SOFT), *bricks], (0,))
     C = touching(model)

@@ -26,7 +26,6 @@ def vault(**parameters):
 
 
 def test_stones_of_a_vault_are_the_surfaces_with_their_corners():
-    """16 voussoirs, five courses a side, the ground; curved sides become chords, sectors grow."""
     plain, fine = vault(), vault(chords=8.0)
     assert len(plain.stones) == 27 and plain.held == (0,)
     assert [len(s.outline) for s in plain.stones] == 27 * [4]

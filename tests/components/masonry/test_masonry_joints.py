@@ -91,7 +91,6 @@ def test_of_two_corners_that_meet_the_glued_one_parts_the_stones():
 
 
 def test_a_joint_that_opened_does_not_glue_again():
-    """Lifted off and set down: what hung before falls when it is lifted the second time."""
     history = masonry.Table([0.0, 0.2, 0.5, 0.8, 3.0], [0.0, 1.0, 1.0, 0.0, 0.0])
     model = pair(Joint(0.6, 5e4, 3e4))
     pulls = ((0.0, factor * (2000 * G + 3e4)) for factor in (1.02, 0.9))
@@ -206,9 +205,8 @@ def test_supports_of_an_arch_spread_until_it_falls():
         model = arch(20, 1.0, thickness, rock=masonry.Rock(friction=2.0))
         for factor, stays in ((0.9, True), (1.15, False)):
             ends = (0, -factor * low / 2), (21, factor * low / 2)
-            spread = [
-                masonry.SupportMotion((k,), (x, 0.0), 0.0, masonry.ramp(3.0)) for k, x in ends
-            ]
+            grow = masonry.ramp(3.0)
+            spread = [masonry.SupportMotion((k,), (x, 0.0), 0.0, grow) for k, x in ends]
             run = {"t_end": 4.5, "dt": 2e-3, "damping": 25.0, "save_every": 750}
             motion = simulate(model, actions=spread, **run)
             speed = np.abs(motion.v[-1, 1:-1]).max()

@@ -23,10 +23,8 @@ def histories(noise, seed=0, sensors=SENSORS):
     true, rng = rockfall.scaled(FIRST, TRUE), np.random.default_rng(seed)
     got, t = strike(true, t_end=0.2, keep=20_000), np.arange(0, 0.2, 2e-4)
     values = {c: np.interp(t, got.t, CHANNELS[c](true, got)) for c in sensors}
-    return {
-        c: History(t, x + noise * np.abs(x).max() * rng.standard_normal(t.size))
-        for c, x in values.items()
-    }
+    sizes = {c: noise * np.abs(x).max() for c, x in values.items()}
+    return {c: History(t, x + sizes[c] * rng.standard_normal(t.size)) for c, x in values.items()}
 
 
 def test_five_parameters_come_back_from_what_they_moved():
@@ -141,9 +139,8 @@ def test_a_gallery_bears_heights_as_hertz_says():
     light, heavy = rockfall.capacity_heights(g, [1000.0, 4000.0])
     assert heavy / light == pytest.approx(4 ** (-10 / 9), rel=0.01)
     assert light == pytest.approx((8e5 / 609.524e3) ** (5 / 3) * 10.0, rel=0.01)
-    below, above = (
-        rockfall.design_check(rockfall.with_boulder(g, 4000.0, f * heavy)) for f in (0.99, 1.01)
-    )
+    near = (rockfall.with_boulder(g, 4000.0, share * heavy) for share in (0.99, 1.01))
+    below, above = map(rockfall.design_check, near)
     assert below.share < 1 < above.share
 
 
@@ -153,9 +150,8 @@ def test_the_map_has_a_row_per_boulder_and_grows_both_ways():
     assert share.shape == (3, 2)
     assert (np.diff(share, axis=0) > 0).all() and (np.diff(share, axis=1) > 0).all()
     layered = replace(BOUNDED, cushion=rockfall.Layer.of_sand(4000.0, 1e6, 0.9))
-    assert rockfall.with_boulder(layered, 500.0).cushion.radius == pytest.approx(
-        layered.cushion.radius / 2
-    )
+    radius = rockfall.with_boulder(layered, 500.0).cushion.radius
+    assert radius == pytest.approx(layered.cushion.radius / 2)
     through = rockfall.design_check(rockfall.with_boulder(layered, 4000.0, 200.0))
     assert through.state == "through" and through.share == np.inf
     light = rockfall.with_boulder(layered, 500.0, 8.0)

@@ -26,7 +26,6 @@ def baseline(**change):
 @pytest.mark.parametrize("height", [2.0, 15.0, 40.0])
 @pytest.mark.parametrize("cushion", [Cushion.of_sand(4e3, 1e6), Layer.of_sand(4e3, 1e6, 3.0)])
 def test_sand_gives_back_less_than_a_twentieth_of_the_energy(cushion, height):
-    """A fall of 15 m on an elastic cushion returns by more than 12 m."""
     got = strike(baseline(cushion=cushion, height=height))
     assert 0.0 < got.rebound < 0.05
     assert got.energy[-1, 1] / got.energy[0, 0] > 0.8
@@ -245,7 +244,6 @@ test_messages_name_what_is_wrong = refused(
 
 
 def test_a_contact_that_fails_bears_its_strength_only():
-    """Force over the disc of the chord, constant from the equator on, elastic before."""
     soft = replace(GOOD, strength=2e5)
     assert soft.force(0.01) == GOOD.force(0.01)
     assert soft.force(0.3) == pytest.approx(2e5 * np.pi * (0.6**2 - 0.3**2))

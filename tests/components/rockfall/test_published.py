@@ -20,10 +20,8 @@ from rom.components import rockfall
 from rom.components.rockfall import Cushion, calibrate, strike
 from rom.errors import ConfigError
 
-RIGID = {
-    "shear": rockfall.Shear(1e11, damping=0.0),
-    "slab": rockfall.Slab.of_mass(1e3, 1e11, damping=0.0),
-}
+STILL = rockfall.Slab.of_mass(1e3, 1e11, damping=0.0)
+RIGID = {"shear": rockfall.Shear(1e11, damping=0.0), "slab": STILL}
 WEIGHT, HEIGHT, RADIUS = 1e4, 20.0, 0.972  # inferred
 SAND, GRAVEL, DURATION = 4.5e6, 7.5e6, 0.05  # measured
 STRENGTH = ["strength of the cushion"]

@@ -13,7 +13,7 @@ from scipy.special import gamma
 import rom
 from cases.paths import ROOT
 from cases.refusals import refused
-from cases.solid import _interface, block
+from cases.solid import _interface, block, reduced
 from rom.components.rockfall import Cushion, CushionForce, Gallery, Shear, Slab, sensitivity, strike
 from rom.eigen.verbs import mean_motion
 from rom.errors import ConfigError, ModelError, SolverError
@@ -26,11 +26,8 @@ RIGID = {"shear": Shear(1e11, damping=0.0), "slab": Slab.of_mass(1e3, 1e11, damp
 
 def baseline(**change):
     """An illustration; no measured gallery."""
-    g = Gallery(
-        boulder=4000.0, height=15.0, plug=2500.0, cushion=Cushion.of_sand(4000.0, 1e6),
-        shear=Shear(2e9), slab=Slab.of_mass(6000.0, 1.2e8), weight=False,
-    )  # fmt: skip
-    return replace(g, **change)
+    parts = Cushion.of_sand(4000.0, 1e6), Shear(2e9), Slab.of_mass(6000.0, 1.2e8)
+    return replace(Gallery(4000.0, 15.0, 2500.0, *parts, weight=False), **change)
 
 
 def stiff(boulder, height, lame, recovery=1.0):
@@ -49,10 +46,10 @@ def test_cushion_loads_unloads_and_does_not_pull():
     assert elastic.force(0.3, 0.4) == pytest.approx(elastic.force(0.3))
 
 
-@pytest.mark.parametrize(
-    "c", [Cushion(2e6), Cushion(2e6, exponent=1.0), Cushion(2e6, limit=0.5, hardening=1.0),
-          Cushion(2e6, limit=0.5, hardening=0.5)],
-)  # fmt: skip
+COMPACTED = [Cushion(2e6, limit=0.5, hardening=x) for x in (1.0, 0.5)]
+
+
+@pytest.mark.parametrize("c", [Cushion(2e6), Cushion(2e6, exponent=1.0), *COMPACTED])
 def test_penetration_takes_up_the_energy(c):
     for energy in (1e3, 1e5):
         d = c.penetration(energy)
@@ -180,7 +177,6 @@ def test_impulses_are_changes_of_momentum():
 
 
 def test_modal_coordinates_of_the_slab_answer_its_force_and_add_up_to_its_deflection():
-    """Against Duhamel's integral of each undamped mode under the force of the plug."""
     slab = Slab(np.array([0.02, 0.015, 0.01]), np.array([150.0, 420.0, 900.0]), damping=0.0)
     got = strike(baseline(slab=slab), t_end=0.05)
     assert_allclose(got.modal @ slab.phi, got.z[:, 2], atol=1e-12)
@@ -240,7 +236,6 @@ def test_the_plug_rings_down_at_its_share_of_critical_damping():
 
 
 def test_a_slab_yields_upwards_as_well():
-    """Plug and slab exchange their energy; the first swing up is stronger than that down."""
     slab = Slab.of_mass(1e3, 1e8, damping=0.0, capacity=6e5)
     springs = Cushion(1e9, recovery=1.0), Shear(3e7, damping=0.0), slab
     g = Gallery(300.0, 1.0, 500.0, *springs, weight=False)
@@ -302,10 +297,8 @@ def slab_model():
 
 @pytest.fixture(scope="module")
 def slab_body(slab_model):
-    return rom.reduce(
-        slab_model, method=rom.CraigBampton(10), certify=False,
-        interfaces={"impact": "rbe3", "root": "rbe2", "tip": "rbe2"},
-    )  # fmt: skip
+    kinds = {"impact": "rbe3", "root": "rbe2", "tip": "rbe2"}
+    return reduced(10, slab_model, interfaces=kinds)
 
 
 def on_strip(slab):
@@ -322,10 +315,10 @@ def full_slab(model, supports, **more):
 
 
 def test_ten_modes_of_a_reduced_slab_bend_as_all_of_the_finite_elements(slab_model, slab_body):
-    reduced = Slab.of_body(slab_body, "impact", ENDS, damping=0.02)
+    own = Slab.of_body(slab_body, "impact", ENDS, damping=0.02)
     full = full_slab(slab_model, ENDS, damping=0.02)
-    assert reduced.stiffness == pytest.approx(full.stiffness, rel=1e-9)  # statics are exact
-    ours, exact = (strike(on_strip(slab), t_end=0.06) for slab in (reduced, full))
+    assert own.stiffness == pytest.approx(full.stiffness, rel=1e-9)  # statics are exact
+    ours, exact = (strike(on_strip(slab), t_end=0.06) for slab in (own, full))
     assert ours.deflection == pytest.approx(exact.deflection, rel=1e-3)
     assert_allclose(ours.peaks, exact.peaks, rtol=3e-3)
     few = Slab.of_body(slab_body, "impact", ENDS, n=10, damping=0.02)
@@ -348,9 +341,20 @@ def test_three_masses_are_the_first_mode_of_the_slab(slab_body):
     one = Slab.of_mass(m3, m3 * all_modes.omega[k] ** 2)
     assert 0.3 * slab_body.mass < m3 < 0.6 * slab_body.mass
     assert one.stiffness > all_modes.stiffness
-    three, reduced = (strike(on_strip(slab), t_end=0.06) for slab in (one, all_modes))
-    assert three.deflection == pytest.approx(reduced.deflection, rel=0.25)
-    assert three.deflection < reduced.deflection
+    three, all_ = (strike(on_strip(slab), t_end=0.06) for slab in (one, all_modes))
+    assert three.deflection == pytest.approx(all_.deflection, rel=0.25)
+    assert three.deflection < all_.deflection
+
+
+def thrown(mech, law, plug, boulder, speed):
+    """A boulder on its way to a plug: mass and place of both, a law between them; the plug."""
+    centre, fall = {"c": (0, 0, 0)}, (0, 0, -speed)
+    (m, x), (M, y) = plug, boulder
+    plug = mech.add_rigid("plug", mass=m, inertia=(50,) * 3, at=x, markers=centre)
+    how = {"at": y, "velocity": fall, "markers": centre}
+    boulder = mech.add_rigid("boulder", mass=M, inertia=(100,) * 3, **how)
+    mech.user_force("cushion", law, boulder.marker("c"), plug.marker("c"))
+    return plug
 
 
 @pytest.mark.parametrize("recovery", [1.0, 0.3])
@@ -364,15 +368,10 @@ def test_a_mechanism_of_bodies_says_the_same(slab_body, recovery):
         at = slab_body.marker(name).point
         mech.fixed(name, mech.ground.marker(at), strip.marker(name))
     at = slab_body.marker("impact").point
-    plug = mech.add_rigid("plug", mass=g.plug, inertia=(50.0,) * 3, at=at + np.array([0, 0, 0.5]),
-                          markers={"c": (0, 0, 0)})  # fmt: skip
-    boulder = mech.add_rigid(
-        "boulder", mass=g.boulder, inertia=(100.0,) * 3, at=at + np.array([0, 0, 1.5]),
-        velocity=(0, 0, -g.speed), markers={"c": (0, 0, 0)},
-    )  # fmt: skip
-    mech.spring_damper("shear", strip.marker("impact"), plug.marker("c"), stiffness=5e8)
     law = CushionForce(g.cushion, DOWN, gap=1.0)
-    mech.user_force("cushion", law, boulder.marker("c"), plug.marker("c"))
+    rise = np.array([0, 0, 0.5])
+    plug = thrown(mech, law, (g.plug, at + rise), (g.boulder, at + 3 * rise), g.speed)
+    mech.spring_damper("shear", strip.marker("impact"), plug.marker("c"), stiffness=5e8)
     sol = rom.simulate(mech, t_end=0.05, dt=2e-5)
     got = strike(g, t_end=0.05, dt=1e-6, keep=50_000)
     z = np.column_stack([np.interp(sol.t, got.t, column) for column in got.z.T])
@@ -387,7 +386,6 @@ def test_a_mechanism_of_bodies_says_the_same(slab_body, recovery):
 @pytest.mark.long
 @pytest.mark.fenicsx
 def test_the_slab_of_dolfinx_bends_as_its_unreduced_elements():
-    """Newmark's mean acceleration on 5000 dofs under the force of the reduced impact."""
     sizes = {"lc": 0.5, "patch": 1.0}
     model = rom.fe.model(MESHES / "gallery_slab.geo", material=CONCRETE, parameters=sizes)
     supports = ("support_left", "support_right")
@@ -452,18 +450,13 @@ test_messages_name_what_is_wrong = refused(
 
 def struck_aside(aside, **more):
     """A boulder that falls onto a plug at rest, so far aside of its middle [m]."""
-    mech = rom.Mechanism(gravity=(0, 0, 0))
-    center, place = {"c": (0, 0, 0)}, (0.6 * aside, 0.8 * aside, 1)
-    plug = mech.add_rigid("plug", mass=5e3, inertia=(50,) * 3, at=(0, 0, 0), markers=center)
-    boulder = mech.add_rigid("boulder", mass=1e3, inertia=(100,) * 3, at=place,
-                             velocity=(0, 0, -10), markers=center)  # fmt: skip
+    mech, place = rom.Mechanism(gravity=(0, 0, 0)), (0.6 * aside, 0.8 * aside, 1)
     law = CushionForce(Cushion.of_sand(1e3, 1e6), DOWN, gap=0.9, **more)
-    mech.user_force("cushion", law, boulder.marker("c"), plug.marker("c"))
+    thrown(mech, law, (5e3, (0, 0, 0)), (1e3, place), 10.0)
     return rom.simulate(mech, t_end=0.03, dt=5e-4).velocity("boulder")[-1, 2]
 
 
 def test_a_boulder_beside_the_slab_is_named():
-    """Where it touches, not on its way down."""
     inside = struck_aside(1.9, reach=2.0)
     assert inside > -9.9
     assert inside == struck_aside(1.9)

@@ -72,7 +72,6 @@ def test_a_ring_has_the_inertias_of_a_ring():
 
 
 def test_both_journals_rest_where_a_journal_alone_would(loaded):
-    """Half of the force of the teeth on each; friction turns some of the torque into heat."""
     u, F = loaded.unit, loaded.forces.mesh.force
     lone = equilibrium(journal(np.arctan2(F[1], F[0])), F[:2] / 2, speed=u.speed, viscosity=0.02)
     for f in loaded.forces.films[:2]:
@@ -159,7 +158,6 @@ def test_a_stiff_unit_whirls_as_its_bearings_say():
 
 
 def test_a_rotor_alone_whirls_at_the_threshold_of_its_bearings():
-    """The pinion without teeth: a short stiff rotor of the critical mass, in its films."""
     b, speed = journal(-np.pi / 2), 400.0
     f = equilibrium(b, (0.0, -200.0), speed=speed, viscosity=0.02)
     s = stability(f.stiffness[:2, :2], f.damping[:2, :2], speed)

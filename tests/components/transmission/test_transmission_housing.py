@@ -90,7 +90,6 @@ def test_a_bearing_without_bush_is_named():
 
 
 def test_a_reduced_body_is_held_and_bends_as_a_cantilever():
-    """A bar along x that is clamped at one end carries all four bushes at the other."""
     size, options = (0.4, 0.02, 0.03), {"interfaces": dict(KINDS), "certify": False}
     body = rom.reduce(bar(size, (8, 1, 1)), method=rom.CraigBampton(4), **options)
     names = dict.fromkeys(NODES, "tip")

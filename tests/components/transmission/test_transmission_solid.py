@@ -144,7 +144,6 @@ def test_a_solid_shaft_knows_its_rigid_motions(solid, still):
 
 
 def test_a_solid_spins_as_a_beam_in_axes_that_do_not_spin(still, beam):
-    """Forward and backward whirl on springs: gyroscopic forces split the pairs."""
     z, shaft = beam
     found = []
     for model, nodes in ((still, range(3)), (shaft, seats_of(z))):

@@ -210,7 +210,6 @@ def test_the_common_basis_works_from_as_many_columns_as_modes(rank):
 
 
 def test_equations_converge_as_newton_does():
-    """Data of the condensed model itself: each step squares the error."""
     model = AtSensors(BEAM)
     test = Measurement(OMEGA, responses(model, TRUE, ZETA, OMEGA, INPUTS), INPUTS)
     found = update_by_input(model, test, 0.9 * TRUE, ZETA, rank=8)
@@ -297,13 +296,11 @@ def test_the_random_error_is_that_of_repeated_tests():
 
 
 def test_weights_help_when_lines_differ_in_noise():
-    """Every other line is bad; coherence tells. Same noise, with and without weights."""
     level = np.where(np.arange(180) % 2, 0.4, 0.02)[:, None, None]
     H = data.noisy(EXACT, level, np.random.default_rng(6))
     w = data.weights(1 / (1 + level**2), 8)
-    plain, weighted = (
-        update_by_output(BEAM, Measurement(OMEGA, H, INPUTS, x), START, GUESS) for x in (1.0, w)
-    )
+    tests = (Measurement(OMEGA, H, INPUTS, x) for x in (1.0, w))
+    plain, weighted = (update_by_output(BEAM, test, START, GUESS) for test in tests)
     assert errors(weighted)[0] < 0.25 * errors(plain)[0]
 
 
@@ -313,10 +310,8 @@ def test_lines_beside_the_poles_forgive_wrong_damping():
     poles, relative = 2 * np.pi * frequencies(BEAM, TRUE), 1 / np.abs(EXACT)
     w = data.beside_poles(OMEGA, poles, ZETA, 30.0)
     assert w.min() < 0.1 and w.max() == 1.0
-    plain, careful = (
-        response_function_method(BEAM, measured(weights=x), START, C, steps=12)
-        for x in (relative, w * relative)
-    )
+    tests = (measured(weights=x) for x in (relative, w * relative))
+    plain, careful = (response_function_method(BEAM, test, START, C, steps=12) for test in tests)
     assert np.abs(careful.p - TRUE).max() < 0.7 * np.abs(plain.p - TRUE).max()
 
 
@@ -362,7 +357,6 @@ def test_joints_lower_the_seventh_frequency_and_hardly_any_other():
 
 
 def test_the_joint_and_the_torsion_of_a_wing_are_found_from_noisy_responses():
-    """What updating is for on this structure; a basis of free modes serves for both parameters."""
     bed = airframe(0.2, joints=6e5)
     K, M = sum(bed.K.values()), sum(bed.M.values())
     dK = np.array([bed.K["wing", "joint"], bed.K["wing", "torsion"]])

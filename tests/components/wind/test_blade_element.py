@@ -29,7 +29,6 @@ def a_blade(n=6, **options):
 
 
 def test_strips_cover_the_blade():
-    """Area and twist are those of the published elements, the blade that bends aside."""
     middles, length, chord, twist = strips(a_blade(96))
     assert_allclose(length.sum(), 61.5)
     assert_allclose(middles[[0, -1]], [1.5 + length[0] / 2, 63.0 - length[-1] / 2])
@@ -93,7 +92,6 @@ def test_a_strip_has_lift_across_and_drag_along_the_air_that_reaches_it():
 @pytest.mark.parametrize("cone", [0.0, 0.3])
 @pytest.mark.parametrize(("tilt", "yaw"), [(0.0, 0.0), (0.35, 0.0), (0.0, -0.4), (-0.5, 0.7)])
 def test_strips_of_a_rod_have_the_loads_of_the_rotor_whose_wake_leans(tilt, yaw, cone):
-    """The same strips as a rotor, tilted, yawed and coned, at four azimuths: two programs."""
     speed, n = 1.1, 24
     wind = WIND * np.array([np.cos(yaw) * np.cos(tilt), np.sin(yaw), np.cos(yaw) * np.sin(tilt)])
     one, used = in_wind(cosserat.body(blade(n)), wind, cone=cone), np.arange(4, n - 1)
@@ -163,7 +161,6 @@ def stiff_blade(n, wind, pitch=0.0):
 
 @pytest.mark.parametrize(("wind", "pitch"), [(8.0, 0.0), (WIND, 0.0), (20.0, 17.47)])
 def test_a_stiff_rotor_in_a_mechanism_has_the_loads_of_its_strips(wind, pitch):
-    """Rods at the vertices beside seventeen published elements: one per cent apart."""
     pitch = np.radians(pitch)
     sol = rom.simulate(stiff_blade(24, (wind, 0.0, 0.0), pitch), t_end=2.0, dt=0.02, rho_inf=0.3)
     late = sol.t > 1.5
@@ -192,7 +189,6 @@ def test_a_stiff_rotor_in_wind_from_aside_has_the_loads_of_each_azimuth():
 
 @pytest.mark.parametrize("wind", [8.0, 20.0])
 def test_the_whole_turbine_takes_the_steady_power_on_average(wind):
-    """Tilt, cone, pitch and tower as for a stiff rotor; blades swing about it and bend a little."""
     point = steady(wind, tower=True)
     state = {"wind": wind, "pitch": point.pitch, "speed": point.speed}
     whole = turbine(12, tower_segments=0, gravity=0.0, **state)

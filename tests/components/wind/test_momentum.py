@@ -131,7 +131,6 @@ def test_no_state_of_a_rotor_lets_the_search_fail():
 
 @pytest.mark.parametrize("pitch", [-1.0, -0.3, 0.0, 0.3, 1.0, 1.5])
 def test_loads_do_not_jump_where_a_rotor_starts(pitch):
-    """Nor where the air on its blades changes from ahead to behind, by a wind from aside."""
     for yaw in (0.0, 0.3):
         loads = (rotor_load(blading(), 8.0, speed, pitch, yaw=yaw) for speed in (0.0, 1e-9))
         standing, starting = (load.strip[:, :, :2] for load in loads)
@@ -156,7 +155,6 @@ def test_a_rotor_of_one_shape_has_coefficients_of_the_ratio_alone():
 
 
 def test_a_blade_that_is_pitched_once_round_is_the_same():
-    """Flow from behind and from all sides: tables go round."""
     for pitch in np.radians((-150.0, -90.0, 100.0, 170.0)):
         both = pitch, pitch - 2 * np.pi * np.sign(pitch)
         strips = (rotor_load(blading(), 8.0, 1.0, p).strip for p in both)
@@ -177,7 +175,6 @@ def test_tilt_and_cone_lower_the_power_by_the_wind_that_they_miss():
 
 
 def test_a_blade_passes_the_dam_of_the_tower():
-    """Nothing above the tower; ahead of it and beside it the wind of a cylinder."""
     speed = tip_ratio(DESIGN_RATIO)
     free, dammed = (rotor_load(blading(), 8.0, speed, tower=x) for x in (False, True))
     change = dammed.blade_torque / free.blade_torque - 1
@@ -220,7 +217,6 @@ def test_the_mean_with_a_tower_is_that_of_each_strip_in_the_wind_it_meets():
 
 
 def test_the_control_knows_of_the_tower():
-    """It keeps the rated power in the dammed wind by less pitch, and loses power below."""
     for wind, ratio in ((8.0, 0.9975), (15.0, 1.0)):
         free, dammed = (steady(wind, tower=x) for x in (False, True))
         assert_allclose(dammed.power / free.power, ratio, atol=1e-3 if wind < 11 else 1e-9)
@@ -297,7 +293,6 @@ def test_the_slope_of_the_induction_is_that_of_a_skewed_cylinder_of_vortices(chi
 
 @pytest.mark.parametrize("lean", [1.3, 1.5, np.pi / 2])
 def test_a_wake_leans_until_it_lies_in_the_disc(lean):
-    """Then nothing is induced before it, and twice as much where it goes, at any angle of wind."""
     edge, a = np.array([63.0, 1.0, 63.0, 1.5, 3.0]), 0.4
     before, behind = (SKEWED(edge, 8.0, 8.0 * (1 - a), lean, x) for x in (-1.0, 1.0))
     assert_allclose([before, behind], [8.0, 8.0 * (1 - 2 * a)], rtol=1e-12)

@@ -131,7 +131,6 @@ def test_a_tilted_rotor_with_cone_has_the_loads_of_one_that_its_axial_wind_meets
 
 @pytest.mark.parametrize("back", [False, True])
 def test_a_step_of_pitch_overshoots_if_the_wake_has_a_memory(back):
-    """Both ends are steady loads; between, the old wake meets the new pitch."""
     pitches = (PITCH, 0.0) if back else (0.0, PITCH)
     ends = [rotor_load(straight(), 8.7, SPEED, p) for p in pitches]
     how = {"blades": straight(), "held": lambda t: (SPEED, pitches[int(t >= 10.0)])}
@@ -293,7 +292,6 @@ def test_power_thrust_and_speed_are_those_of_openfast_and_of_a_specialist(curve)
 
 
 def test_balance_of_torque_and_power(curve):
-    """The rotor drives the generator of 97 times its speed; behind it 94.4 % are left."""
     below = curve["wind"] < 11.0
     asked = [GEAR_RATIO * generator_torque(GEAR_RATIO * w) for w in curve["speed"][below]]
     assert_allclose(curve["torque"][below], asked, rtol=1e-6)

@@ -34,7 +34,6 @@ def frequencies(**choices):
 
 
 def test_rings_are_where_the_blades_and_the_shaft_end():
-    """One and a half metres along axes 120 degrees apart, 2.5 degrees upwind."""
     markers, c, s = hub().markers, np.cos(np.radians(2.5)), np.sin(np.radians(2.5))
     for k in range(3):
         a = 2 * np.pi / 3 * k
@@ -44,7 +43,6 @@ def test_rings_are_where_the_blades_and_the_shaft_end():
 
 
 def test_a_stiff_solid_is_the_rigid_hub_and_a_real_one_gives_way():
-    """Same mass and inertia about the shaft; iron lowers frequencies by half a per cent."""
     bodies = {}, {"hub_body": hub(E=169e13)}, {"hub_body": hub()}
     rigid, stiff, iron = (frequencies(**choices) for choices in bodies)
     assert_allclose(stiff, rigid, rtol=2e-3)

@@ -38,7 +38,6 @@ def gust():
 
 
 def test_a_stiff_blade_in_a_gust_has_the_loads_of_the_rotor_whose_wake_is_late(gust):
-    """The same filters, run by a mechanism and by `operate`: 3 % of the change apart."""
     _, rotor, sol = gust
     how = {"dt": 0.02, "blades": rotor, "held": lambda t: (SPEED, 0.0)}
     beside = operate(lambda t: 7.0 if t <= 3.0 else 9.0, 12.0, **how)
@@ -92,7 +91,6 @@ def test_a_late_wake_leans_in_wind_from_aside():
 
 
 def test_the_first_instant_and_equilibria_have_the_steady_wake():
-    """A long calm wind changes nothing; no step of the wake from zero at the start."""
     mech, rotor = turning_blade(8.0)
     sol = rom.simulate(mech, t_end=3.0, dt=0.02, rho_inf=0.3)
     steady_wake = 8.0 - rotor_load(rotor, 8.0, SPEED, n_azimuths=1).strip[0, :, 2]
@@ -125,7 +123,6 @@ def parked(**choices):
 
 
 def test_the_control_in_a_mechanism_is_the_controller_at_its_speed():
-    """The same filter, torque and pitch, step by step, for a rotor that is run up without wind."""
     plant, dt = parked(speed=0.0), 0.02
     speed, angle = ramp(1.4, 10.0)
     plant.turn_by(angle, speed)

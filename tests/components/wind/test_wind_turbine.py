@@ -86,7 +86,6 @@ def test_the_ramp_is_smooth():
 
 
 def test_run_up_converges_to_the_lag_of_a_fine_blade():
-    """Extrapolated from 24 and 48 segments; the blade lags by a quarter of a metre at half time."""
     coarse, fine = (run_up(blade(n), t_end=t) for n, t in ((24, 11.0), (48, 22.0)))
     lag = coarse.tip[:, 1].max(), fine.tip[:, 1].max()
     assert_allclose(lag, [0.25587, 0.25182], rtol=4e-3)
