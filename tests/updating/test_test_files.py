@@ -221,6 +221,12 @@ def test_what_a_universal_file_lacks_is_named(tmp_path):
     read(path, axes + whole)  # local axes that no node uses
     refuses(FileFormatError, "no mode", rom.io.read_modes, path)
     refuses(ConfigError, "a test is written as", rom.io.read_responses, "x.mat", averages=3)
+    test = rom.io.read_responses(HERE / "pyuff_test.uff", averages=20)
+    refuses(ConfigError, "H is real at all lines", replace, test, H=np.abs(test.H))
+    data = (HERE / "pyuff_test.uff").read_bytes()
+    assert b"58b     1     2" in data
+    (tmp_path / "x.uff").write_bytes(data.replace(b"58b     1     2", b"58b     2     2"))
+    refuses(FileFormatError, "the order of bytes is not", read, tmp_path / "x.uff", coherence=None)
 
 
 GLOBAL = (0, 0, 0, 1, 0, 0, 0, 0, 1)  # origin, a point on the x axis, one in the xz plane
@@ -323,15 +329,6 @@ def test_lines_in_other_units_and_texts_in_other_alphabets_are_read(tmp_path):
     path = tmp_path / "x.unv"
     assert_allclose(read(path, labelled("rad/s", 18)).frequencies, X / (2 * np.pi))
     refuses(FileFormatError, "the unit 'rpm' is no frequency", read, path, labelled("rpm", 18))
-
-
-def test_values_that_are_no_responses_are_refused(tmp_path):
-    test = rom.io.read_responses(HERE / "pyuff_test.uff", averages=20)
-    refuses(ConfigError, "H is real at all lines", replace, test, H=np.abs(test.H))
-    data = (HERE / "pyuff_test.uff").read_bytes()
-    assert b"58b     1     2" in data
-    (tmp_path / "x.uff").write_bytes(data.replace(b"58b     1     2", b"58b     2     2"))
-    refuses(FileFormatError, "the order of bytes is not", read, tmp_path / "x.uff", coherence=None)
 
 
 def test_bodies_of_an_assembly_are_named_by_entities_or_by_a_table_of_points(tmp_path):

@@ -174,7 +174,7 @@ def test_a_missing_sample_is_left_out(filter_):
     assert (t.run(gone).deviations[-1] > t.run(y).deviations[-1]).all()
 
 
-def test_stress_turns_with_its_direction(body):
+def test_stress_turns_with_its_direction_and_modes_left_out_follow_the_accelerations(body):
     """Normal stress along d is d sigma d; shear counts twice."""
     rng = np.random.default_rng(3)
     s = rng.normal(size=(6, body.n_modes))
@@ -185,9 +185,6 @@ def test_stress_turns_with_its_direction(body):
     tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     row, _ = stress_rows(odd, Channels(GAUGE[:1], [5 * d]), "sensor")
     assert_allclose(row[0] @ q, d @ tensor @ d)
-
-
-def test_modes_left_out_follow_the_accelerations(body):
     rng, r = np.random.default_rng(6), body.n_modes
     own = StressRecovery(np.array(GAUGE[:1]), rng.normal(size=(6, r)), rng.normal(size=(6, 12 + r)))
     at = Channels(GAUGE[:1], [[0, 1, 0]])
@@ -197,7 +194,7 @@ def test_modes_left_out_follow_the_accelerations(body):
     assert_allclose(static[0] @ q + inertial[0] @ a, expected)
 
 
-def test_strain_gauges_read_hooke_and_poisson(body):
+def test_strain_gauges_read_hooke_and_poisson_and_the_gradient_of_their_triangle(body):
     """F / EA along a bar in tension, -nu of it across, and (1 - nu) / 2 under 45 degrees."""
     F, area = 1e4, 0.1 * 0.08
     omega, V = body.modes(fixed=("root",))
@@ -210,9 +207,6 @@ def test_strain_gauges_read_hooke_and_poisson(body):
     assert_allclose(found, expected, rtol=2e-3)
     side = strain_rows(body, [[0.52, 0.1, 0.03]], [[0, 0, 1]], "sensor") @ q
     assert_allclose(side, [-nu * F / STEEL.E / area], rtol=5e-3)
-
-
-def test_a_gauge_reads_the_gradient_of_its_triangle(body):
     G = np.random.default_rng(5).normal(size=(3, 3))
     points = body.surface.points
     linear = replace(body, surface=replace(body.surface, shape=(points @ G.T).reshape(-1, 1)))

@@ -62,16 +62,12 @@ def test_the_worst_sensor_is_so_by_its_deviations():
     assert "worst sensor, 0" in report.rows[1].quantity
 
 
-def test_the_limit_is_that_of_all_trials_together():
+def test_limits_are_those_of_all_trials_and_allow_for_what_is_not_known_of_variances():
     """0.001 of a right model; 0.0005 for each of two sensors. Chi-square of two: -2 ln P / 2."""
     weight = np.zeros(SHAPE)
     weight[0] = 1.0
     report = verdict(Sums(np.eye(1), np.zeros(1), 2 * weight), data_of(weight), 0, {}, [])
     assert report.rows[1].limit == f"<= {-np.log(0.0005):g}"
-
-
-def test_limits_allow_for_what_is_not_known_of_variances():
-    """Half the freedom: chi-square of two. A scale that varies by a half: F of two and four."""
     half = chi_row("x", 1.0, 4.0, 1, known=0.5)
     assert half.limit == f"<= {-np.log(0.001):g}"
     scaled = chi_row("x", 1.0, 2.0, 1, scale=0.5)

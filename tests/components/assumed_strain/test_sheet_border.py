@@ -133,13 +133,10 @@ test_the_culprit_and_its_cure = refused(
 )  # fmt: skip
 
 
-def test_a_sheet_whose_nodes_are_all_driven_rests():
+def test_all_nodes_driven_an_infinite_friction_and_a_metal_that_never_yields_are_allowed():
     moved = Actions(drives=[Drive(range(18), ((0, 1), (0, 0.1)))])
     course = sheets.quasi_static(BODY, METAL, moved, [0, 1])
     assert np.allclose(course.x[-1], X + 0.1)
     assert np.abs(course.reactions).max() < 1e-9
-
-
-def test_an_infinite_friction_and_a_metal_that_never_yields_are_allowed():
     prepared(BODY, replace(WITH_TOOL, tools=[Tool("pad", PAD, np.inf)]))
     assert Metal(1.0, 0.3, 1.0, np.inf).yield_stress == np.inf

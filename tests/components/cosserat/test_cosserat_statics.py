@@ -42,13 +42,10 @@ def test_forces_and_tangent_are_derivatives_of_the_energy():
     assert_allclose(linearised(one, shape, load)[1], by_shape, atol=1e-8)
 
 
-def test_reference_has_no_stress_whatever_its_corners():
+def test_reference_has_no_stress_and_a_rigid_motion_changes_nothing():
     one = crooked(np.random.default_rng(1))
     assert_allclose(linearised(one, reference(one))[0], 0, atol=1e-14)
     assert cosserat.elastic_energy(one, reference(one)) < 1e-28
-
-
-def test_a_rigid_motion_changes_nothing():
     rng = np.random.default_rng(2)
     one = crooked(rng)
     shape = moved(reference(one), 0.3 * rng.normal(size=6 * one.h.size + 9))
@@ -287,7 +284,7 @@ def test_buckling_load_of_a_column():
     assert lowest(0.999 * P) > 0 > lowest(1.001 * P)
 
 
-def test_what_is_no_rod_is_named():
+def test_what_is_no_rod_or_cannot_be_cut_or_found_is_named():
     section = {"stretch": 1.0, "bend": 1.0}
     turned = np.tile([1.0, 0, 0, 0], (4, 1))
     refuses(ModelError, "segment 1", rod, [[0, 0, 0], [0, 0, 1], [0, 0, 1]], turned, **section)
@@ -300,6 +297,11 @@ def test_what_is_no_rod_is_named():
     refuses(ModelError, "N segments have", rod, [[0, 0, 0], [0, 0, 1]], turned, **section)
     one = straight(1.0, 4, **section)
     refuses(ConfigError, "needed are", equilibrium, one, (np.zeros((4, 3)), np.zeros((6, 3))))
+    one = straight(1.0, 4, stretch=1e4, bend=1.0)
+    assert [piece.h.size for piece in cut(one, 3)] == [1, 2, 1]
+    refuses(ConfigError, "5 pieces of a rod of 4 segments", cut, one, 5)
+    load = np.outer([0, 0, 0, 0, 1.0], [30.0, 0, -60.0])
+    refuses(SolverError, "2 linear pieces found no equilibrium", bend_in_pieces, one, 2, load)
 
 
 def test_without_equilibrium_the_last_shape_is_kept():
@@ -336,11 +338,3 @@ def test_more_linear_bodies_come_closer_to_the_rod():
     assert abs(tip[0, 2] - one.x[-1, 2]) < 0.02  # no shortening at all
     assert error[3] < 0.02 * np.linalg.norm(exact - one.x[-1])
     assert_allclose(np.log2(error[2:-1] / error[3:]), 2.0, atol=0.3)
-
-
-def test_what_cannot_be_cut_or_found_is_named():
-    one = straight(1.0, 4, stretch=1e4, bend=1.0)
-    assert [piece.h.size for piece in cut(one, 3)] == [1, 2, 1]
-    refuses(ConfigError, "5 pieces of a rod of 4 segments", cut, one, 5)
-    load = np.outer([0, 0, 0, 0, 1.0], [30.0, 0, -60.0])
-    refuses(SolverError, "2 linear pieces found no equilibrium", bend_in_pieces, one, 2, load)

@@ -153,10 +153,19 @@ def test_wire_is_judged_by_shares_of_its_strength():
         assert_allclose(float(limit.removeprefix("<= ")), share * strength, rtol=1e-3)
 
 
-def test_inertia_of_what_is_held_is_that_of_balls_and_cylinders():
+def test_what_is_held_palm_and_phalanges_have_the_inertia_of_balls_cylinders_and_blocks():
     assert_allclose(BALL.inertia, 0.4 * 0.05 * 0.02**2 * np.eye(3))
     along, across = 0.5 * 0.05 * 0.02**2, 0.05 * (0.02**2 / 4 + 0.1**2 / 12)
     assert_allclose(BAR.inertia, np.diag([across, along, across]))
+    mech = moving_hand({"index": Finger(n=2)}, build=Build(palm=0.12, palm_size=(0.06, 0.08, 0.02)))
+    second = 0.01 * np.diag([0.06**2, 0.08**2, 0.02**2])  # integrals of rho x x^T
+    assert_allclose(mech.parts["palm"].second, second, atol=1e-12)
+    bone = mech.parts["index phalanx 1"]
+    m, r, h = 1200 * np.pi * 25e-6 * 0.018, 5e-3, 0.018
+    assert_allclose(bone.mass, m)
+    assert_allclose(bone.second, m * np.diag([r * r / 4, r * r / 4, h * h / 12]), atol=1e-15)
+    drives = {"index": Drive(pull=22 * MM)}
+    refuses(ConfigError, r"0 to 0\.0216 m", moving_hand, {"index": Finger(n=2)}, drives=drives)
 
 
 @pytest.mark.parametrize("axis", [(0, 1, 0), (0, -1, 0)])
@@ -168,18 +177,6 @@ def test_a_bar_stands_on_its_lower_end_whichever_way_it_is_named(axis):
     feet = [mech.design_point(mech.contacts[f"table on thing {k}"].j) for k in (1, 2, 3)]
     assert_allclose(np.array(feet)[:, 1], held.centre[1] - 49 * MM)
     assert_allclose(np.mean(feet, axis=0)[[0, 2]], np.array(held.centre)[[0, 2]])
-
-
-def test_palm_and_phalanges_weigh_as_blocks_and_bars():
-    mech = moving_hand({"index": Finger(n=2)}, build=Build(palm=0.12, palm_size=(0.06, 0.08, 0.02)))
-    second = 0.01 * np.diag([0.06**2, 0.08**2, 0.02**2])  # integrals of rho x x^T
-    assert_allclose(mech.parts["palm"].second, second, atol=1e-12)
-    bone = mech.parts["index phalanx 1"]
-    m, r, h = 1200 * np.pi * 25e-6 * 0.018, 5e-3, 0.018
-    assert_allclose(bone.mass, m)
-    assert_allclose(bone.second, m * np.diag([r * r / 4, r * r / 4, h * h / 12]), atol=1e-15)
-    drives = {"index": Drive(pull=22 * MM)}
-    refuses(ConfigError, r"0 to 0\.0216 m", moving_hand, {"index": Finger(n=2)}, drives=drives)
 
 
 def test_budgets_add_up_and_say_what_is_too_much():

@@ -117,9 +117,6 @@ def test_blades_of_one_rotor_are_alike(azimuth):
     assert_allclose(one.tip, other.tip, atol=1e-8)
 
 
-TORQUE, RISE = 2e6, 2.0  # N m, reached after so many seconds
-
-
 def inertia_of_blades(one):
     """About the rotor axis, of three blades [kg m^2]; sections add a thousandth."""
     return 3 * one.mass @ (one.x[:, 2] ** 2)
@@ -136,40 +133,24 @@ def test_a_locked_generator_leaves_the_shaft_to_twist():
     assert_allclose(2 * np.pi * f, np.sqrt(SHAFT_STIFFNESS / inertia), rtol=5e-3)
 
 
-@pytest.fixture(scope="module")
-def run():
-    model = wind_turbine.rotor(16)
-    motion = simulate(model.rod, 20.0, 0.02, free=model.free, rho_inf=0.9,
-                      load=lambda t: model.torque(TORQUE * min(t / RISE, 1.0)))  # fmt: skip
-    return model, motion
-
-
-def test_momentum_is_the_impulse_of_the_torque(run):
+def test_torque_gives_momentum_and_energy_and_twists_the_shaft():
     """Forces that keep generator and hub on the axis have no moment about it."""
-    model, motion = run
-    impulse = TORQUE * (20.0 - RISE / 2)
-    assert_allclose(model.momentum(motion)[-1], impulse, rtol=1e-3)
-    inertia = inertia_of_blades(blade(16)) + HUB_INERTIA + wind_turbine.SLOW_GENERATOR_INERTIA
-    mean = model.speeds(motion)[-200:, 0].mean()
-    assert_allclose(mean, TORQUE * (18.0 - RISE / 2) / inertia, rtol=0.02)
-
-
-def test_work_of_the_torque_is_energy_and_what_the_shaft_damps(run):
-    """Power in, minus the damping of the shaft, whose twist rate is the difference of speeds."""
-    model, motion = run
+    torque, rise = 2e6, 2.0  # N m, reached after so many seconds
+    model = wind_turbine.rotor(16)
+    load = lambda t: model.torque(torque * min(t / rise, 1.0))  # noqa: E731
+    motion = simulate(model.rod, 20.0, 0.02, free=model.free, rho_inf=0.9, load=load)
+    assert_allclose(model.momentum(motion)[-1], torque * (20.0 - rise / 2), rtol=1e-3)
+    rotor = inertia_of_blades(blade(16)) + HUB_INERTIA
+    whole = rotor + wind_turbine.SLOW_GENERATOR_INERTIA
     speeds = model.speeds(motion)
-    torque = TORQUE * np.minimum(motion.t / RISE, 1.0)
+    assert_allclose(speeds[-200:, 0].mean(), torque * (18.0 - rise / 2) / whole, rtol=0.02)
+    # power in, minus the damping of the shaft, whose twist rate is the difference of speeds
     lost = 6.215e6 * (speeds[:, 0] - speeds[:, 1]) ** 2
-    power = torque * speeds[:, 0] - lost
+    power = torque * np.minimum(motion.t / rise, 1.0) * speeds[:, 0] - lost
     work = 0.02 * ((power[1:] + power[:-1]) / 2).sum()
     assert_allclose(3 * motion.energies().sum(axis=1)[-1], work, rtol=2e-3)
     assert np.abs(speeds[:, 0] - speeds[:, 1]).max() > 1e-3
-
-
-def test_the_shaft_twists_as_the_rotor_needs(run):
-    """Steady gain of speed: the shaft carries the share of hub and blades."""
-    motion = run[1]
+    # at a steady gain of speed the shaft carries the share of hub and blades
     turned = [rotation.log(rotation.multiply(p[0] * [1, -1, -1, -1], p[2])) for p in motion.p]
-    inertia = inertia_of_blades(blade(16)) + HUB_INERTIA
-    share = inertia / (inertia + wind_turbine.SLOW_GENERATOR_INERTIA)
-    assert_allclose(-np.array(turned)[-400:, 2].mean(), share * TORQUE / SHAFT_STIFFNESS, rtol=0.05)
+    twist = rotor / whole * torque / SHAFT_STIFFNESS
+    assert_allclose(-np.array(turned)[-400:, 2].mean(), twist, rtol=0.05)
