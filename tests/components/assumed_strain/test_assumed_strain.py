@@ -54,7 +54,6 @@ def solved(body, metal, f, held):
 
 
 @pytest.mark.long
-@pytest.mark.once
 @pytest.mark.parametrize("n", few(1, COOK_TABLE))
 def test_cooks_membrane(n):
     found = []
@@ -66,7 +65,6 @@ def test_cooks_membrane(n):
 
 
 @pytest.mark.long
-@pytest.mark.once
 @pytest.mark.parametrize(
     ("n", "element", "expected"),
     [(8, "CST", 2.5026), (16, "CST", 3.0770), (8, "F3", 3.2484), (16, "F3", 3.3648),
@@ -305,7 +303,6 @@ def test_explicit_motion_keeps_its_energy():
     assert quarter.work == pytest.approx(kinetic, rel=5e-3)
 
 
-@pytest.mark.once
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("element", "length", "foot", "plastic"),

@@ -13,7 +13,6 @@ from rom.components.assumed_strain.space import bending
 from rom.errors import ConfigError, MeshError, TagError, UnsafeFileError
 from rom.fe.mesh import read_triangles
 
-pytest.importorskip("gmsh", reason="needs gmsh")
 pytestmark = pytest.mark.fenicsx
 BILLET = ROOT / "meshes" / "billet.geo"
 RING = """SetFactory("OpenCASCADE");

@@ -119,7 +119,6 @@ def test_work_of_the_root_is_the_energy_of_the_rod():
 
 
 @pytest.mark.long
-@pytest.mark.once
 def test_viscosity_damps_a_mode_at_its_rate():
     """Stiffness-proportional damping: half the ratio times omega^2."""
     ratio = 2e-3

@@ -103,7 +103,6 @@ def test_what_does_not_fit_is_named():
 @pytest.mark.fenicsx
 def test_bones_of_polyamide_add_less_than_a_hundredth():
     """Solids of 18, 12 and 10 mm; PA12 is our choice. In every direction springs are the finger."""
-    pytest.importorskip("gmsh", reason="gmsh is not installed")
     polyamide = rom.Material(E=1.7e9, nu=0.4, rho=1010.0)
     geometry = ROOT / "meshes" / "phalanx.geo"
     kinds = {"proximal": "rbe2", "distal": "rbe2", "pad": rom.Polynomial(1)}

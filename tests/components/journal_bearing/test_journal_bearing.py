@@ -14,7 +14,6 @@ from rom.components.journal_bearing.closed_forms import short_coefficients, shor
 from rom.errors import ConfigError, ModelError, SolverError
 
 
-@pytest.mark.once
 @pytest.mark.parametrize("row", bearings.RAIMONDI_BOYD, ids=lambda r: f"{r[0]}-{r[1]}")
 def test_a_full_bearing_has_the_numbers_of_raimondi_and_boyd(row):
     slender, e, S, attitude, friction, flow, side, peak = row

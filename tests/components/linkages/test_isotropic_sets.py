@@ -38,10 +38,9 @@ ARM = PolarArm(guide=0.05, slide=2.0, spin=0.01)
 FIVE = FiveBar(0.7, (rod(2.0, 0.3),) * 2, (rod(1.0, 0.8),) * 2, payload=0.5)
 
 
-def along(a, b, mass, k=2):
+def along(a, b):
     """Gauss points of a rod: two carry its exact kinetic energy."""
-    s = 0.5 + np.array([-1, 1]) / np.sqrt(12)
-    return a + s[:, None] * (b - a), np.full(k, mass / k)
+    return a + (0.5 + np.array([[-1], [1]]) / np.sqrt(12)) * (b - a)
 
 
 def points_of_arm(q1, q2):
@@ -53,17 +52,12 @@ def points_of_arm(q1, q2):
 def points_of_slide_arm(q1, q2):
     o = np.array([q1, 0.0])
     e = o + 0.4 * np.array([np.cos(q2), np.sin(q2)])
-    return np.vstack([o, along(o, e, 0.9)[0], e])
+    return np.vstack([o, along(o, e), e])
 
 
-def glide_points(five):
-    def points(q1, q2):
-        left, right = five._elbows(np.array(q1), np.array(q2))
-        tip = five.tip(q1, q2)
-        rods = [along(p, tip, MU)[0] for p in (left, right)]
-        return np.vstack([left, right, *rods, tip])
-
-    return points
+def points_of_glide(q1, q2):
+    ends, tip = TILTED._elbows(np.array(q1), np.array(q2)), TILTED.tip(q1, q2)
+    return np.vstack([*ends, *(along(end, tip) for end in ends), tip])
 
 
 RODS = rod(MU, REACH), rod(MU, 0.5)
@@ -76,7 +70,7 @@ CASES = {
     ),
     "RP": (replace(ARM, offset=0.03), points_of_arm, [1.0, 1.0, 1.0]),
     "PR": (SlideArm(1.5, rod(0.9, 0.4), 0.3), points_of_slide_arm, [1.5, 0.45, 0.45, 0.3]),
-    "PRRRP": (TILTED, glide_points(TILTED), [1.3, 0.7, *[MU / 2] * 4, PAYLOAD]),
+    "PRRRP": (TILTED, points_of_glide, [1.3, 0.7, *[MU / 2] * 4, PAYLOAD]),
 }
 
 
@@ -444,10 +438,6 @@ def core_of(*drives, **tool):
     return Driven(polar_of_the_core(), drives, **tool)
 
 
-def flat(a, s):
-    return ARM.tip(0 * a, s)
-
-
 test_what_is_no_linkage_is_refused = refused(
     (lambda: CrossSlides((1.0, 1.0), angle=np.pi), ModelError, "parallel"),
     (lambda: replace(GLIDE, side=0), ModelError, "needed is 1 or -1"),
@@ -455,7 +445,11 @@ test_what_is_no_linkage_is_refused = refused(
     (lambda: glided(isotropic_set, n=10), ModelError, "none of 10 by 10"),
     (lambda: glided(tool_isotropy, GLIDE.tip), ModelError, "reaches nothing"),
     (lambda: isotropic_set(ARM.inertia, (None, (1, 1))), ConfigError, "low < high"),
-    (lambda: tool_isotropy(ARM.inertia, flat, (None, (0.1, 1))), ModelError, "along a line"),
+    (
+        lambda: tool_isotropy(ARM.inertia, lambda a, s: ARM.tip(0 * a, s), (None, (0.1, 1))),
+        ModelError,
+        "along a line",
+    ),
     (lambda: core_of("turn", "feed", tool="x"), ConfigError, "none of"),
     (lambda: core_of("turn", "feed").tip(0, 0), ConfigError, "no tool"),
     (lambda: core_of("turn", "x"), ConfigError, "x"),

@@ -67,7 +67,6 @@ def test_mean_axes_are_the_strains_orthogonal_to_rotation():
 
 
 @pytest.mark.long
-@pytest.mark.once
 @pytest.mark.parametrize(("Omega", "factor", "period"), SCHEME)
 def test_vibrations_decay_by_the_factor_of_the_scheme(Omega, factor, period):
     (one,) = FREE.stones

@@ -16,7 +16,6 @@ from rom.errors import ConfigError, ModelError
 from rom.fe.mesh import read_triangles
 
 pytestmark = pytest.mark.fenicsx
-pytest.importorskip("gmsh", reason="stones are drawn in gmsh")
 R, T, H = 5.0, 0.8, 4.0
 
 

@@ -76,7 +76,6 @@ def final_speed(n, ratio, *, settle=200, rock=None):
     return np.abs(motion.v[1:]).max(axis=(1, 2))
 
 
-@pytest.mark.once
 @pytest.mark.parametrize(("n", "rests", "moves"), [(10, 0.1075, 0.10725), (20, 0.1085, 0.1065)])
 def test_arch_stands_above_its_limit_and_falls_below(n, rests, moves):
     assert final_speed(n, rests)[-1] < 1e-10

@@ -248,7 +248,6 @@ def test_the_response_to_the_mesh_is_where_a_motion_settles():
 
 
 @pytest.mark.long
-@pytest.mark.once
 @pytest.mark.parametrize(("helix", "rel"), few(1, [(0.0, 0.15), (HELIX, 0.25)]))
 def test_slow_units_have_the_error_of_their_teeth(helix, rel):
     """The error is that of rest; but films resist the tilt of helical gears more when squeezed."""

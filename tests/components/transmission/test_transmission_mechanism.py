@@ -141,7 +141,6 @@ def found(lossy):
     return steady(lossy, steps=STEPS)
 
 
-@pytest.mark.once
 @pytest.mark.long
 def test_it_is_where_motion_through_time_settles(lossy, found):
     """But for the little that its steps damp."""

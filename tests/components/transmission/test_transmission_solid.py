@@ -19,7 +19,6 @@ from rom.components.transmission.housing import motion_of
 from rom.components.transmission.shaft import vibrations
 from rom.errors import ModelError
 
-pytest.importorskip("gmsh", reason="gmsh is not installed")
 pytestmark = pytest.mark.fenicsx
 GEOMETRY = ROOT / "meshes" / "gear_shaft.geo"
 STEEL = rom.Material(E=206e9, nu=0.3, rho=7850.0)

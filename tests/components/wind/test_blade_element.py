@@ -201,7 +201,6 @@ def test_the_whole_turbine_takes_the_steady_power_on_average(wind):
 
 
 @pytest.mark.long
-@pytest.mark.once
 def test_the_wind_bends_the_blades_of_the_turbine_downwind():
     """Metres, as in published runs at 11.4 m/s, where the tip goes 5 to 6 m."""
     whole = turbine(16, tower_segments=8, wind=WIND, speed=RATED_SPEED)

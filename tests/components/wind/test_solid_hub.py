@@ -13,7 +13,6 @@ from cases.refusals import refuses
 from rom.components.wind.whole_turbine import turbine
 from rom.errors import ConfigError
 
-pytest.importorskip("dolfinx", reason="the hub starts from finite elements")
 pytestmark = pytest.mark.fenicsx
 RINGS = {name: "rbe2" for name in ("shaft", "blade_1", "blade_2", "blade_3")}
 

@@ -45,7 +45,6 @@ def test_masses_geometry_and_yaw_are_those_of_the_definition():
 
 
 @pytest.mark.long
-@pytest.mark.once
 def test_driven_rotor_on_a_stiff_tower_runs_up_like_its_blades_alone():
     """Largest lag 0.25181 m at 10.07 s, flapping -0.0492 m, stretch 14.02 mm at speed."""
     whole = on_a_stiff_tower(48, damped=False, shaft=(1e14, 1e11))
