@@ -53,12 +53,10 @@ def unit(torque=200.0, speed=100 * np.pi, helix=0.0, width=0.04, clearance=50e-6
 
 
 def rigid_unit(**more):
-    """`unit` with rigid shafts."""
     return with_shafts(unit(**more), tuple(RigidShaft(*size, SPAN) for size in SIZES))
 
 
 def plane(unit):
-    """The unit with teeth of this program."""
     mesh = unit.mesh
     own = PlaneMesh(mesh.pair, mesh.stiffness, mesh.correction, mesh.damping, mesh.cells)
     return replace(unit, mesh=own)

@@ -9,13 +9,12 @@ from numpy.testing import assert_allclose
 
 import rom
 from cases.components import updating
-from cases.components.updating import BOLTS, assert_alike, fed, halves, noisy_test, refuse
+from cases.components.updating import BOLTS, assert_alike, fed, halves, noisy_test, refuse, walked
 from rom.body.recovery import StressRecovery
 from rom.components.families.parameters import centre
 from rom.components.updating.family_model import Parts
 from rom.components.updating.models import modal
 from rom.components.updating.normal_equations import responses_at
-from rom.components.updating.observers.operation import discrete
 from rom.errors import InterfaceError
 from rom.parametric import FamilyAssembly
 from rom.updating import AddedMass, Channels, Drift, GroundSpring, JointSpring, Sensors
@@ -139,7 +138,7 @@ def test_a_joint_taken_for_rigid_is_refused_and_a_missing_mass_is_named(joined, 
     assert max(found.scores, key=lambda name: abs(found.scores[name])) == "cable"
 
 
-def test_an_assembly_of_one_is_planned_as_a_body(families):
+def test_an_assembly_of_one_is_planned_and_tracked_as_a_body(families):
     family, one = families["frame"], FamilyAssembly({"frame": families["frame"]})
     offered = rom.updating.candidates(family.body, 3, fixed=("root",))
     load = AddedMass("tip", 2.0, 0.1, 10.0)
@@ -153,6 +152,12 @@ def test_an_assembly_of_one_is_planned_as_a_body(families):
     assert_allclose(same.covariance, alone.covariance, rtol=1e-8)
     for line, own in zip(same.csv().split(), alone.csv().split(), strict=True):
         assert line == f"{own},{'body' if own.startswith('kind') else 'frame'}"
+    drift = Drift(0.1, 0.02)
+    alone = tracked(family, *watched(), parameters={"E": drift}, fixed=("root",), **TRACKED)
+    same = tracked(one, *watched("frame"), parameters={"frame.E": drift}, fixed=HELD, **TRACKED)
+    y = np.sqrt(alone.R) * np.random.default_rng(0).standard_normal((200, 3))
+    names = ("values", "forces", "factors", "surprise")
+    assert_alike(same.run(y), alone.run(y), names, 1e-8)
 
 
 def test_channels_name_the_body_on_which_they_lie(bolted):
@@ -184,16 +189,6 @@ def watched(body=None):
     strain = Sensors(Channels([[0.125, 0.05, 0.08]], [[1, 0, 0]]), "strain", 1e-8)
     sensors = strain, Sensors(end, "acceleration", 0.1), Sensors(end, "displacement", 1e-6)
     return sensors, Channels([[0.375, 0.1, 0.08]], up), (Sensors(end, "velocity"),)
-
-
-def test_an_assembly_of_one_is_tracked_as_a_body(families):
-    family, one = families["frame"], FamilyAssembly({"frame": families["frame"]})
-    drift = Drift(0.1, 0.02)
-    alone = tracked(family, *watched(), parameters={"E": drift}, fixed=("root",), **TRACKED)
-    same = tracked(one, *watched("frame"), parameters={"frame.E": drift}, fixed=HELD, **TRACKED)
-    y = np.sqrt(alone.R) * np.random.default_rng(0).standard_normal((200, 3))
-    names = ("values", "forces", "factors", "surprise")
-    assert_alike(same.run(y), alone.run(y), names, 1e-8)
 
 
 def test_bodies_that_are_coupled_are_tracked_with_their_own_damping(families):
@@ -259,20 +254,9 @@ def test_a_joint_that_loosens_is_followed(bolted):
     options = dict(TRACKED, dt=2e-4, walk=1e4, first=10.0, attached={"bolts": BOLTS}, fixed=HELD)
     t = tracked(bolted, sensors, force, wanted,
                           parameters={"bolts": Drift(0.02, 0.05)}, **options)  # fmt: skip
-    rng, n = np.random.default_rng(3), 3000
-    x, y, true = np.zeros(len(t.assumed.before(t.operation))), np.zeros((n, 2)), np.zeros(n)
-    p = 0.02 * rng.standard_normal(1)
-    for k in range(n):
-        if k % 100 == 0:
-            p = p + 0.05 * np.sqrt(100 * t.assumed.dt) * rng.standard_normal(1)
-            at = t.operation.at(p)
-            step, Q = discrete(at.A, t.assumed.white(t.operation), t.assumed.dt)
-            root = np.linalg.cholesky(Q + 1e-13 * np.diag(np.diag(Q)))
-        y[k] = at.C @ x + np.sqrt(t.R) * rng.standard_normal(2)
-        true[k] = np.exp(p[0])
-        x = step @ x + root @ rng.standard_normal(len(x))
+    true, _, y = walked(t, np.random.default_rng(3), 3000, every=100)
     found = t.run(y)
-    off = np.log(found.factors[:, 0] / true) / found.factor_deviations[:, 0]
+    off = (np.log(found.factors) - true)[:, 0] / found.factor_deviations[:, 0]
     assert found.factor_deviations[-1, 0] < 0.03
     assert np.mean(np.abs(off[500:]) < 2.5) > 0.9
     assert_allclose(found.surprise[500:].mean(), 2.0, rtol=0.12)

@@ -190,11 +190,6 @@ WRONG_WORDS = (
 )
 
 
-def test_what_is_wrong_with_the_options_is_said(capsys):
-    for words, message in WRONG_WORDS:
-        refused([*WORDS, *words], message, capsys)
-
-
 HALVES = ["--family", "frame=frame.rom.npz", "--family", "arm=arm.rom.npz",
           "--fixed", "frame.root", "--damping", "0.02"]  # fmt: skip
 LOOSE = {"frame.E": 1.2, "arm.E": 0.9, "bolts": 0.5}
@@ -264,7 +259,9 @@ def test_a_wrong_value_of_an_option_is_named(bolted, capsys, option):
             assert option == "-o" or value not in ("nan", "1e400"), f"{words}: {out}"
 
 
-def test_families_that_are_no_assembly_are_named(bolted, capsys):
+def test_what_is_wrong_with_options_and_families_is_said(bolted, capsys):
+    for words, message in WRONG_WORDS:
+        refused([*WORDS, *words], message, capsys)
     for words, message in (
         (HALVES[:2] * 2, "--family 'frame' is given twice"),
         ([*HALVES, *JOINT, "--spring", "q=tip:1,1,1:1:2"], "'tip' must be BODY.INTERFACE"),

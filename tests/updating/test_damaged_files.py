@@ -61,16 +61,15 @@ def updated(family, folder, averages=50):
     return rom.update(family, test, fixed=("root",))
 
 
-def test_a_whole_file_is_updated(family, responses, tmp_path):
+def test_a_whole_file_is_updated_and_errors_that_are_taken_for_larger_are_warned_of(
+    family, responses, tmp_path
+):
     found = updated(family, written(tmp_path, responses))
     assert found.verdict.ok
     assert_right(found, TRUE)
-
-
-def test_errors_that_are_taken_for_larger_are_warned_of(family, responses, tmp_path):
-    """Of a tenth of the averages chi-square is a tenth, and a wrong model passes more easily."""
+    # of a tenth of the averages chi-square is a tenth, and a wrong model passes more easily
     with pytest.warns(RomWarning, match=r"what is left is 0\.\d+ of the noise"):
-        updated(family, written(tmp_path, responses), averages=5)
+        updated(family, tmp_path, averages=5)
 
 
 DAMAGES = {
@@ -163,7 +162,6 @@ def test_numbers_that_are_none_are_named_in_a_universal_file(tmp_path):
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
-    """A test in HDF5, as bytes."""
     pytest.importorskip("h5py", reason="the file is HDF5")
     test = rom.io.read_responses(HERE / "pyuff_test.uff", averages=20)
     return rom.io.write_responses(test, tmp_path_factory.mktemp("whole") / "a.h5").read_bytes()

@@ -47,8 +47,7 @@ def channels(model, sign=1.0):
     return sensors, force
 
 
-@pytest.fixture(scope="module")
-def dense(model):
+def dense_matrices(model):
     """The finite elements, clamped, with the nodes' dofs as sensors; changes of p are linear."""
     free = np.setdiff1d(np.arange(3 * len(model.points)), model.interfaces["root"].dofs)
     K, M = (getattr(model, name).toarray()[np.ix_(free, free)] for name in "KM")
@@ -74,14 +73,16 @@ def measured(family, model, *, level=0.0, sign=1.0, H=None, seed=0):
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_equations_find_what_they_find_on_dense_matrices(family, model, dense, sign):
+def test_equations_find_what_they_find_on_dense_matrices(family, model, sign):
     """Logarithms of factors here, changes there: the same minimum; a force may point backwards."""
     test = measured(family, model, level=0.01, sign=sign)
     found = rom.update(family, test, damping=0.02, **BY_EQUATIONS)
     m = found.covariance.shape[0] - 3
     weights = 1 / test.noise.errors().own
     there = Measurement(OMEGA, sign * test.H, (DRIVEN,), weights)
-    same = update_by_input(AtSensors(dense), there, np.zeros(3), np.full(m, 0.02), rank=m)
+    same = update_by_input(
+        AtSensors(dense_matrices(model)), there, np.zeros(3), np.full(m, 0.02), rank=m
+    )
     factors = np.array(list(found.factors.values()))
     assert_allclose(factors, 1 + same.p, rtol=1e-8)
     assert_allclose(found.zeta[:m], same.zeta, rtol=1e-7)

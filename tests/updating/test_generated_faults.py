@@ -57,7 +57,6 @@ def in_millimetres(family, test, rng):
 
 
 def times(test, factor, *at):
-    """The test with some of its responses times a factor."""
     H = test.H.copy()
     H[:, *at] *= factor
     return replace(test, H=H)

@@ -8,13 +8,12 @@ from numpy.testing import assert_allclose
 from scipy.stats import chi2
 
 import rom
-from cases.components.updating import assert_alike, family_of, fed, refuse
+from cases.components.updating import assert_alike, family_of, fed, refuse, stepped, walked
 from cases.mbs.fmu_instance import Instance, fmpy
 from cases.refusals import refuses
 from rom import updating
 from rom.body.recovery import StressRecovery
 from rom.components.updating.observers import parameter_tracking
-from rom.components.updating.observers.operation import discrete
 from rom.components.updating.observers.parameter_tracking import LINEAR_REACH
 from rom.errors import ParameterError, SolverError
 from rom.updating import Channels, Drift, Sensors
@@ -56,42 +55,6 @@ def made(family, **options):
     usual = {"dt": DT, "walk": 3000.0, "fixed": ("root",), "unmodelled": 1e-3}
     options = usual | {"parameters": DRIFTS, "attached": SPRING} | options
     return updating.parameter_tracker(family, *channels, **options)
-
-
-def walked(t, rng, n_t):
-    """A record of what a filter assumes: logarithms of factors, values, and samples.
-
-    Parameters walk every 50 steps, as far as they do in that time.
-    """
-    o, first = t.operation, np.array([d.first for d in t.drifts.values()])
-    walk = np.array([d.walk for d in t.drifts.values()])
-    P = t.assumed.before(o)
-    x = np.sqrt(np.diag(P)) * rng.standard_normal(len(P))
-    p = first * rng.standard_normal(len(first))
-    factors, values, clean = [], [], []
-    for k in range(n_t):
-        if k % 50 == 0:
-            p = p + (k > 0) * walk * np.sqrt(50 * DT) * rng.standard_normal(len(p))
-            at, step, root = stepped(t, p)
-        factors.append(p)
-        values.append(at.W @ x)
-        clean.append(at.C @ x)
-        x = step @ x + root @ rng.standard_normal(len(x))
-    clean = np.array(clean)
-    y = clean + np.sqrt(t.R) * rng.standard_normal(clean.shape)
-    return np.array(factors), np.array(values), y
-
-
-def stepped(t, p):
-    """The equations, transition and root of the noise of a step at logarithms p of factors.
-
-    The symmetric root of a matrix that is nearly singular is the same on any machine.
-    """
-    at = t.operation.at(p)
-    step, Q = discrete(at.A, t.assumed.white(t.operation), DT)
-    scale = np.sqrt(np.diag(Q))
-    lam, V = np.linalg.eigh(Q / np.outer(scale, scale))
-    return at, step, scale[:, None] * (V * np.sqrt(np.maximum(lam, 0.0))) @ V.T
 
 
 def test_derivatives_are_those_of_differences(filter_):

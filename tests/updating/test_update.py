@@ -54,7 +54,6 @@ def damped(K, M, zeta, omega, seen, driven):
 
 
 def summed(model, x, amount=1.0):
-    """K and M at logarithms x, which may be complex."""
     k, m = (np.prod(np.exp(x) ** p, axis=1) * amount for p in (model.k_powers, model.m_powers))
     return np.tensordot(k, model.K, 1), np.tensordot(m, model.M, 1)
 

@@ -9,6 +9,7 @@ from cases.solid import STEEL, composite
 from rom.components.updating.family_model import Parts, family_model
 from rom.components.updating.frf_data import estimators, noisy
 from rom.components.updating.normal_equations import responses_at
+from rom.components.updating.observers.operation import discrete
 from rom.errors import ConfigError
 from rom.updating import Channels, JointSpring, Responses
 
@@ -26,7 +27,6 @@ def refuse(*rows, error=ConfigError):
 
 
 def crossed(points, bodies=None):
-    """Channels along y and along z at each point."""
     axes = np.tile([[0, 1, 0], [0, 0, 1]], (len(points), 1))
     return Channels(np.repeat(points, 2, axis=0), axes, bodies)
 
@@ -57,7 +57,6 @@ def family_of(parameters, cells, n_modes, regions=("inner", "outer"), *, size=BE
 
 
 def halves(n_modes=12):
-    """Families of the two halves of a beam, "frame" before "arm", each with its modulus."""
     made = {}
     for name, x in (("frame", 0.0), ("arm", 0.5)):
         modulus, place = {"E": rom.YoungsModulus(name, 0.3, 3.0)}, {"origin": (x, 0, 0)}
@@ -96,6 +95,42 @@ def fed(one, sensors, samples, wanted, dt, first=0):
         one.fmu.doStep(k * dt, dt)
         rows.append(one.get(*wanted))
     return np.array(rows)
+
+
+def walked(t, rng, n_t, every=50):
+    """A record of what a filter assumes: logarithms of factors, values, and samples.
+
+    Parameters walk every so many steps, as far as they do in that time.
+    """
+    o, first = t.operation, np.array([d.first for d in t.drifts.values()])
+    walk = np.array([d.walk for d in t.drifts.values()])
+    P = t.assumed.before(o)
+    x = np.sqrt(np.diag(P)) * rng.standard_normal(len(P))
+    p = first * rng.standard_normal(len(first))
+    factors, values, clean = [], [], []
+    for k in range(n_t):
+        if k % every == 0:
+            p = p + (k > 0) * walk * np.sqrt(every * t.assumed.dt) * rng.standard_normal(len(p))
+            at, step, root = stepped(t, p)
+        factors.append(p)
+        values.append(at.W @ x)
+        clean.append(at.C @ x)
+        x = step @ x + root @ rng.standard_normal(len(x))
+    clean = np.array(clean)
+    y = clean + np.sqrt(t.R) * rng.standard_normal(clean.shape)
+    return np.array(factors), np.array(values), y
+
+
+def stepped(t, p):
+    """The equations, transition and root of the noise of a step at logarithms p of factors.
+
+    The symmetric root of a matrix that is nearly singular is the same on any machine.
+    """
+    at = t.operation.at(p)
+    step, Q = discrete(at.A, t.assumed.white(t.operation), t.assumed.dt)
+    scale = np.sqrt(np.diag(Q))
+    lam, V = np.linalg.eigh(Q / np.outer(scale, scale))
+    return at, step, scale[:, None] * (V * np.sqrt(np.maximum(lam, 0.0))) @ V.T
 
 
 def gauss(rng, shape):

@@ -22,7 +22,6 @@ UNIT = np.sqrt(210e9 * 0.002**2 / 12 / 7850) / 0.4**2 / (2 * np.pi)  # of strips
 
 
 def bent(body, metal):
-    """Frequencies of bending [Hz]."""
     K, M = bending(body, metal).toarray(), mass(body, metal)[::2, ::2].toarray()
     return np.sqrt(np.abs(eigh(K, M, eigvals_only=True))) / (2 * np.pi)
 

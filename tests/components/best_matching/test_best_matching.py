@@ -22,7 +22,6 @@ CORNERS = np.array([(np.cos(a), np.sin(a), 0) for a in 2 * np.pi * np.arange(3) 
 
 
 def cloud(n=7, seed=0):
-    """Masses, positions and velocities of n particles."""
     rng = np.random.default_rng(seed)
     return rng.uniform(0.5, 2, n), rng.normal(size=(n, 3)), rng.normal(size=(n, 3))
 
@@ -81,14 +80,6 @@ def test_points_on_a_line_do_not_turn_about_it():
     v = np.cross([0.2, -0.4, 0.1], x)
     assert match(MASS, x, v).energy < 1e-20
     assert np.linalg.matrix_rank(projector(MASS, x), tol=1e-9) == 5
-
-
-def test_a_frame_is_found_back():
-    m, x, _ = cloud()
-    A, r = turned([2.0, 0.4, -1.0]), np.array([1.0, -7.0, 2.0])
-    found = frame(m, x, r + x @ A.T)
-    assert_allclose(found[0], r, atol=1e-12)
-    assert_allclose(found[1], A, atol=1e-12)
 
 
 @pytest.mark.parametrize("consistent", [False, True])

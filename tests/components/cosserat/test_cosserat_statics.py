@@ -191,7 +191,6 @@ PRINCETON = {  # flapwise and edgewise displacement [mm], twist [deg] by a shoot
 
 
 def princeton(force, angle, **section):
-    """The beam, and the force on its tip."""
     b, t, E = 12.3777e-3, 3.2024e-3, 71.7e9
     G, soft, stiff = E / 2.62, b * t**3 / 12, t * b**3 / 12
     one = straight(0.508, 80, stretch=[G * b * t, G * b * t, E * b * t],
@@ -201,7 +200,6 @@ def princeton(force, angle, **section):
 
 
 def check_princeton(force, angle, tip, A):
-    """Compare place and axes of the tip with the table."""
     twist = np.degrees(np.arctan2(A[0, 1], A[1, 1]))
     flap, edge, turned = np.array(PRINCETON[force])[:, ANGLES.index(angle)]
     assert_allclose(1e3 * tip[:2], (flap, -edge), rtol=2e-3, atol=1e-6)

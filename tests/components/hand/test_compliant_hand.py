@@ -64,7 +64,6 @@ INDEX = {  # tension [N]: angle of a joint [deg], x, z of the tip, pull, inner l
 
 @pytest.fixture(scope="module")
 def closing():
-    """The index finger under growing tension."""
     postures = [rest(Finger())]
     for tension in INDEX:
         postures.append(close(Finger(), tension=tension, start=postures[-1]))

@@ -19,7 +19,6 @@ def ray(angle, effort, n=100):
 
 
 def followed(*rays):
-    """Commands of points one after another."""
     return Chart().follow(*(np.concatenate(part) for part in zip(*rays, strict=True)), DT)
 
 

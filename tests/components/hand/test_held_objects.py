@@ -48,7 +48,6 @@ def upright(mu):
 
 @cache
 def lying():
-    """A ball between fingers and palm."""
     return gripping(BALL, 0.5, (0, 0, -g))
 
 

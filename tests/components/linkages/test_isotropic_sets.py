@@ -250,7 +250,6 @@ def test_units_gears_and_coordinates_do_not_matter():
 
 
 def polar_of_the_core():
-    """ARM as bodies and joints: a guide on a pin, a slide on it, displaced by 0.3 m."""
     mech = rom.Mechanism(gravity=(0, 0, 0))
     guide = mech.add_rigid("guide", mass=1.0, inertia=(0.05,) * 3, at=(0, 0, 0))
     slide = mech.add_rigid("slide", mass=2.0, inertia=(0.01,) * 3, at=(0.3, 0, 0))

@@ -226,19 +226,6 @@ def test_what_stays_is_the_shape_of_the_static_deflection():
     assert_allclose(late, got.plastic * shape, atol=2e-3 * np.abs(late).max())
 
 
-test_messages_name_what_is_wrong = refused(
-    (lambda: Layer(-1.0, 0.6, 0.9), ConfigError, "needed are modulus"),
-    (lambda: Layer(3e6, 0.6, float("nan")), ConfigError, "needed are modulus"),
-    (lambda: Layer(3e6, 0.6, 0.9, angle=30.0), ConfigError, r"angle \[rad\] = 30"),
-    (lambda: Layer(3e6, 0.6, 0.9, recovery=0.0), ConfigError, "0 < recovery <= 1"),
-    (lambda: GOOD.contact(0.9), ConfigError, r"d \[m\] = 0.9 must be"),
-    (lambda: GOOD.spread(-0.1), ConfigError, r"d \[m\] = -0.1"),
-    (lambda: strike(baseline(cushion=GOOD, height=300.0)), ConfigError, "pressed through"),
-    (lambda: strike(baseline(cushion=GOOD, height=300.0), dt=1e-5), SolverError,
-     "through the cushion of 0.9 m"),
-)  # fmt: skip
-
-
 def test_a_contact_that_fails_bears_its_strength_only():
     soft = replace(GOOD, strength=2e5)
     assert soft.force(0.01) == GOOD.force(0.01)
@@ -345,7 +332,19 @@ def test_the_delay_of_a_layer_is_that_of_its_bar_wave():
     assert rockfall.wave_delay(sand, 0.3) == pytest.approx(0.6 / 117.851, rel=1e-5)
 
 
-test_what_cannot_arrive_is_named = refused(
+test_messages_name_what_is_wrong = refused(
+    (lambda: Layer(-1.0, 0.6, 0.9), "needed are modulus"),
+    (lambda: Layer(3e6, 0.6, float("nan")), "needed are modulus"),
+    (lambda: Layer(3e6, 0.6, 0.9, angle=30.0), r"angle \[rad\] = 30"),
+    (lambda: Layer(3e6, 0.6, 0.9, recovery=0.0), "0 < recovery <= 1"),
+    (lambda: GOOD.contact(0.9), r"d \[m\] = 0.9 must be"),
+    (lambda: GOOD.spread(-0.1), r"d \[m\] = -0.1"),
+    (lambda: strike(baseline(cushion=GOOD, height=300.0)), "pressed through"),
+    (
+        lambda: strike(baseline(cushion=GOOD, height=300.0), dt=1e-5),
+        SolverError,
+        "through the cushion of 0.9 m",
+    ),
     (lambda: arriving([0, 1], [1.0], 0.1), "2 instants with 1 forces"),
     (lambda: arriving([0, 0], [1.0, 1.0], 0.1), "instants that grow"),
     (lambda: arriving([0, 1], [1.0, 1.0], 1e-9), "passages of a wave of 1e-09 s in 1 s"),

@@ -72,20 +72,7 @@ def test_the_handbook_formula_is_hertz(tonnes, height, expected):
     assert found[2650.0] / unit == pytest.approx(2.10536, abs=5e-6)
 
 
-def test_a_rigid_gallery_is_struck_as_hertz_says():
-    g = stiff(1e3, 10.0, 1e6)
-    got = strike(g, t_end=0.1, keep=10**5)
-    c, v = g.cushion, g.speed
-    d = (5 * g.boulder * v**2 / (4 * c.stiffness)) ** 0.4
-    assert got.peaks[0] == pytest.approx(609.524e3, rel=1e-3)
-    assert got.deepest == pytest.approx(d, rel=1e-3)
-    contact = got.t[np.flatnonzero(got.forces[:, 0] > 0)[-1]]
-    assert contact == pytest.approx(2.943275 * d / v, rel=1e-3)
-    assert got.t[got.forces[:, 0].argmax()] == pytest.approx(0.042274, rel=1e-3)
-    assert got.v[-1, 0] == pytest.approx(-v, rel=1e-3)
-
-
-def test_how_long_a_sphere_touches():
+def test_a_rigid_gallery_is_struck_as_hard_and_as_long_as_hertz_says():
     """Of depth over speed 2.943275, of (m^2 / k^2 v)^(1/5) 3.218: integral, Gamma function, motion.
 
     Time is twice the integral of dx / v sqrt(1 - x^(5/2)) over the way in.
@@ -94,12 +81,16 @@ def test_how_long_a_sphere_touches():
     assert by_depth == pytest.approx(0.8 * np.sqrt(np.pi) * gamma(0.4) / gamma(0.9), rel=1e-10)
     assert by_depth == pytest.approx(2.943275, abs=5e-7)
     assert by_depth * 1.25**0.4 == pytest.approx(3.218, abs=5e-4)
-    for boulder, height in ((1e3, 10.0), (5e3, 2.0)):
+    for boulder, height in ((5e3, 2.0), (1e3, 10.0)):
         g = stiff(boulder, height, 1e6)
-        got = strike(g, t_end=0.2, keep=10**5)
+        got, v = strike(g, t_end=0.2, keep=10**5), g.speed
         contact = got.t[np.flatnonzero(got.forces[:, 0] > 0)[-1]]
-        unit = (boulder**2 / g.cushion.stiffness**2 / g.speed) ** 0.2
-        assert contact == pytest.approx(by_depth * 1.25**0.4 * unit, rel=1e-3)
+        depth = (5 * boulder * v**2 / (4 * g.cushion.stiffness)) ** 0.4
+        assert contact == pytest.approx(by_depth * depth / v, rel=1e-3)
+        assert got.deepest == pytest.approx(depth, rel=1e-3)
+        assert got.v[-1, 0] == pytest.approx(-v, rel=1e-3)
+    assert got.peaks[0] == pytest.approx(609.524e3, rel=1e-3)
+    assert got.t[got.forces[:, 0].argmax()] == pytest.approx(0.042274, rel=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -307,7 +298,6 @@ def on_strip(slab):
 
 
 def full_slab(model, supports, **more):
-    """All modes of the finite elements."""
     held = sum(model.interfaces[name].dofs.size for name in supports)
     modes = rom.modes(model, model.n_dofs - held, fixed=supports)
     patch = model.interfaces["impact"]

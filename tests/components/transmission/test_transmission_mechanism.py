@@ -155,7 +155,7 @@ def test_it_is_where_motion_through_time_settles(lossy, found):
 
 
 @pytest.mark.long
-def test_it_ends_as_it_began(found):
+def test_it_ends_as_it_began_and_is_the_motion_of_another_program(lossy, found):
     assert found.t[-1] == pytest.approx(found.unit.mesh_period)
     assert found.q.shape == (STEPS + 1, found.unit.load.size)
     assert_allclose(found.q[-1], found.q[0], atol=1e-6 * np.abs(found.q).max())
@@ -166,11 +166,7 @@ def test_it_ends_as_it_began(found):
     assert found.motion.runs < 40  # also on films of half a micrometre
     mean = 300.0 / found.unit.mesh.pair.rb[0]
     assert found.teeth[1:].mean() == pytest.approx(mean, rel=0.01)  # but for friction
-
-
-@pytest.mark.long
-def test_it_is_the_motion_of_another_program(lossy, found):
-    """With its derivatives; but for friction in them, and for how the methods damp a step."""
+    # with its derivatives; but for friction in them, and for how the methods damp a step
     q, teeth, multipliers = repeating(lossy, STEPS)
     assert_allclose(found.q, q, atol=1e-3 * np.abs(q).max())
     assert_allclose(found.teeth, teeth, atol=0.02 * teeth.max())

@@ -48,7 +48,6 @@ def beam(solid):
 
 
 def supported_solid(body):
-    """Mass and stiffness with the ring and the films."""
     M, K = body.full_matrices()
     ring, R = Disc.of_ring(0, **RING), motion_of(body, "wheel")
     M = M + R.T @ np.diag([ring.mass] * 3 + [ring.diametral] * 2 + [ring.polar]) @ R
@@ -57,7 +56,6 @@ def supported_solid(body):
 
 
 def seats_of(z):
-    """Nodes of the beam at the seats."""
     return [int(np.argmin(np.abs(z - at))) for at in SEATS.values()]
 
 
@@ -120,7 +118,6 @@ def test_beam_and_solid_respond_alike_to_unbalance(solid, beam, speed):
 
 @pytest.fixture(scope="module")
 def still(solid):
-    """The solid in axes that do not spin, with its ring."""
     return SolidShaft(solid, tuple(SEATS), [Disc.of_ring(1, **RING)])
 
 
@@ -169,14 +166,9 @@ def unit(shafts, nodes):
     return Transmission(*rotors, Mesh(pair, 15e9, damping=2e-6), 300.0, 60.0 * 36 / 24, 0.03)
 
 
-@pytest.fixture(scope="module")
-def states(still, beam):
-    """At rest: of beams, and of solids."""
+def test_solids_rest_on_films_and_teeth_and_respond_to_the_mesh_as_beams_do(still, beam):
     z, shaft = beam
-    return rest(unit((shaft, shaft), seats_of(z))), rest(unit((still, still), range(3)))
-
-
-def test_solids_rest_on_films_and_teeth_as_beams_do(states):
+    states = rest(unit((shaft, shaft), seats_of(z))), rest(unit((still, still), range(3)))
     one, three = states
     for a, b in zip(one.forces.films, three.forces.films, strict=True):
         assert_allclose(b.force[:2], a.force[:2], rtol=0.01)
@@ -187,9 +179,6 @@ def test_solids_rest_on_films_and_teeth_as_beams_do(states):
     given, taken, heat = three.powers
     # seats of solids move as rigid ones within 1e-6, see above
     assert given - taken - heat == pytest.approx(tilting(three), abs=2e-8 * given)
-
-
-def test_solids_respond_to_the_mesh_as_beams_do(states):
     one, three = (transmission.mesh_response(s, harmonics=3) for s in states)
     assert three.error_rms == pytest.approx(one.error_rms, rel=0.01)
     assert three.load_factor == pytest.approx(one.load_factor, rel=0.01)

@@ -151,7 +151,6 @@ def test_tangents_of_the_wind_are_derivatives(tower, wind):
 
 
 def stiff_blade(n, wind, pitch=0.0):
-    """A stiff blade on a driven hub, in a wind (3,)."""
     A, mech = rotation.matrix(rotation.exp([0.0, 0.0, -pitch])), rom.Mechanism(gravity=(0, 0, 0))
     body, omega = in_wind(stiff_body(n), wind, cone=0.0), A.T @ [RATED_SPEED, 0.0, 0.0]
     part = mech.add_nonlinear("blade", body, orientation=A, omega=omega)

@@ -64,12 +64,8 @@ def test_loads_of_strips_are_the_momentum_that_rings_of_air_lose(ratio):
     C_T, ideal, driving, gained = balances(blades, load)
     assert_allclose(C_T, ideal, atol=1e-8)
     assert_allclose(driving, gained, atol=1e-6 * np.abs(driving).max())
-
-
-def test_high_loading_follows_the_parabola_somewhere():
-    a = rotor_load(straight(), 8.0, tip_ratio(12.0), n_azimuths=1).strip[0, :, 5]
-    assert (a > 0.4).sum() >= 5
-    assert a.max() < 1.0
+    a = load.strip[0, :, 5]  # beyond 0.4 by the parabola, as in outer strips of quick rotors
+    assert a.max() < 1.0 and (ratio < 12 or (a > 0.4).sum() >= 5)
 
 
 def test_inductions_are_those_of_the_usual_iteration():

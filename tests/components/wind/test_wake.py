@@ -21,7 +21,6 @@ SPEED = 1.0  # rad/s
 
 
 def turning_blade(winds, yaw=0.0, n=8):
-    """A stiff blade on a driven hub, and the rotor of its strips."""
     mech, body = rom.Mechanism(gravity=(0, 0, 0)), stiff_body(n)
     A = rotation.matrix(rotation.exp([0.0, 0.0, -yaw]))
     part = mech.add_nonlinear("blade", body, orientation=A, omega=(SPEED, 0.0, 0.0))
