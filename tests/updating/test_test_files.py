@@ -88,11 +88,6 @@ def test_modes_of_another_program_are_read(name, factor):
     assert_allclose(modes.shapes, factor * np.array(SHAPES), rtol=1e-5)
 
 
-@pytest.fixture(scope="module")
-def body():
-    return reduced(12, block(cells=(6, 1, 1)))
-
-
 def modes_of(body, factors, order):
     """Its own first modes, held at the root, at six points."""
     omega, Phi = body.modes(fixed=("root",))
@@ -105,7 +100,8 @@ def modes_of(body, factors, order):
     return rom.updating.MeasuredModes(f, np.zeros(len(order)), points, shapes)
 
 
-def test_mac_of_own_modes_is_one_whatever_their_factor(body):
+def test_mac_of_own_modes_is_one_whatever_their_factor():
+    body = reduced(12, block(cells=(6, 1, 1)))
     modes = modes_of(body, [2.0, -1j, 1 + 1j], [0, 1, 2])
     found = modes.mac(body, fixed=("root",), n=3)
     assert_allclose(np.diag(found), 1.0, rtol=1e-12)
@@ -135,29 +131,29 @@ def table(unit="m/s^2/N", factor=1.0, separator=",", comma=False):
     return TABLE.format(s=separator, u=unit) + "\n".join(lines) + "\n"
 
 
+def read_table(folder, text, points=POINTS):
+    """A test of twenty averages, of a table beside one of its nodes."""
+    (folder / "points.csv").write_text(points)
+    more = {"averages": 20, "coherence": None, "points": folder / "points.csv"}
+    return read(folder / "test.csv", text, **more)
+
+
 UNITS = [("m/s^2/N", 1.0), ("(m/s\u00b2)/N", 1.0), ("g/N", 9.80665), ("mm/s^2/N", 1e-3),
          ("g/lbf", 9.80665 / 4.4482216152605), ("in/s^2/kN", 0.0254 / 1e3)]  # fmt: skip
 
 
 @pytest.mark.parametrize(("unit", "factor"), UNITS)
 def test_a_table_of_an_analyser_is_read(unit, factor, tmp_path):
-    (tmp_path / "test.csv").write_text(table(unit, factor))
-    (tmp_path / "points.csv").write_text(POINTS)
-    points = tmp_path / "points.csv"
-    test = rom.io.read_responses(tmp_path / "test.csv", averages=20, points=points)
+    test = read_table(tmp_path, table(unit, factor))
     same = rom.io.read_responses(HERE / "pyuff_test.uff", averages=20)
     for found, expected in zip(fields(test)[:-1], fields(same)[:-1], strict=True):
         assert_allclose(found, expected, rtol=1e-6)
 
 
 def test_a_table_with_decimal_commas_and_in_velocities_is_read(tmp_path):
-    (tmp_path / "test.txt").write_text(table(separator=";", comma=True))
-    (tmp_path / "points.csv").write_text(POINTS)
-    read = {"averages": 20, "points": tmp_path / "points.csv"}
-    test = rom.io.read_responses(tmp_path / "test.txt", **read)
+    test = read_table(tmp_path, table(separator=";", comma=True))
     assert_allclose(test.H[:, 0, 0], -ACCELERANCE[0] / (2 * np.pi * F) ** 2, rtol=1e-8)
-    (tmp_path / "test.csv").write_text(table("mm/s/N", 1e-3))
-    test = rom.io.read_responses(tmp_path / "test.csv", **read)
+    test = read_table(tmp_path, table("mm/s/N", 1e-3))
     assert_allclose(test.H[:, 1, 0], ACCELERANCE[1] / (2j * np.pi * F), rtol=1e-8)
 
 
@@ -281,7 +277,7 @@ def test_a_coordinate_system_of_dataset_2420(turned, same, tmp_path):
     if same:
         read(path, text)
     else:
-        refuses(FileFormatError, "node 8 is in the local coordinate system 3 HUB", read, path, text)
+        refuses(FileFormatError, "node 8 .* system 3 HUB", read, path, text)
     cut = f"{-1:6d}\n{18:6d}\n{3:10d}\n{-1:6d}\n{node}"
     refuses(FileFormatError, "dataset 18 or 2420 is cut", read, path, cut)
 
@@ -294,12 +290,8 @@ def test_pairs_that_were_not_measured_do_not_count(tmp_path):
 
 
 def test_what_a_table_lacks_is_named(tmp_path):
-    (tmp_path / "points.csv").write_text(POINTS)
-    path = tmp_path / "x.csv"
-
-    def refused(text, words):
-        points = tmp_path / "points.csv"
-        refuses(FileFormatError, words, read, path, text, coherence=None, points=points)
+    def refused(text, words, points=POINTS):
+        refuses(FileFormatError, words, read_table, tmp_path, text, points)
 
     whole = table()
     refused(whole.replace("5+Y/11-Z real", "tip real"), "column 2 has the name 'tip real")
@@ -310,22 +302,19 @@ def test_what_a_table_lacks_is_named(tmp_path):
     refused(whole.replace("0.02", "x", 1), "line 8: could not convert")
     refused(whole + "1,2\n", "line 9 has 2 numbers under 7 names")
     refused("a\nb\n", "no column is named")
-    (tmp_path / "points.csv").write_text(POINTS.replace("x [mm]", "x"))
-    refused(whole, "columns .* node, x")
+    refused(whole, "columns .* node, x", POINTS.replace("x [mm]", "x"))
 
 
 def test_lines_in_other_units_and_texts_in_other_alphabets_are_read(tmp_path):
-    (tmp_path / "points.csv").write_text(POINTS)
-    path, options = tmp_path / "x.csv", {"averages": 5, "points": tmp_path / "points.csv"}
     whole = table(unit="m/s\u00b2/N", separator=";", comma=True)
-    for text, code in ((whole, "cp1252"), (whole, "utf-16"), (whole, "utf-8")):
-        path.write_bytes(text.encode(code))
-        assert_allclose(rom.io.read_responses(path, **options).frequencies, F)
-    path.write_text(whole.replace("[Hz]", "[rad/s]"))
-    assert_allclose(rom.io.read_responses(path, **options).frequencies, F / (2 * np.pi))
+    for code in ("cp1252", "utf-16", "utf-8"):
+        (tmp_path / "test.csv").write_bytes(whole.encode(code))
+        assert_allclose(read_table(tmp_path, None).frequencies, F)
+    turning = whole.replace("[Hz]", "[rad/s]")
+    assert_allclose(read_table(tmp_path, turning).frequencies, F / (2 * np.pi))
     for new, words in (("[rpm]", "the unit 'rpm' is no frequency"), ("[Hz]", "of thousands")):
-        path.write_text(whole.replace("[Hz]", new).replace("0,02", "0.02", new == "[Hz]"))
-        refuses(FileFormatError, words, rom.io.read_responses, path, **options)
+        text = whole.replace("[Hz]", new).replace("0,02", "0.02", new == "[Hz]")
+        refuses(FileFormatError, words, read_table, tmp_path, text)
     path = tmp_path / "x.unv"
     assert_allclose(read(path, labelled("rad/s", 18)).frequencies, X / (2 * np.pi))
     refuses(FileFormatError, "the unit 'rpm' is no frequency", read, path, labelled("rpm", 18))
@@ -333,7 +322,7 @@ def test_lines_in_other_units_and_texts_in_other_alphabets_are_read(tmp_path):
 
 def test_bodies_of_an_assembly_are_named_by_entities_or_by_a_table_of_points(tmp_path):
     """Node 7 is on both sides of a joint; ten characters of a name are kept in universal files."""
-    of = {"bodies": ("frame", "counterweight"), "averages": 5, "coherence": 0.9}
+    of = {"bodies": ("frame", "counterweight")}
 
     def written(*owners, force="frame"):
         functions = [dataset(6, 1, [RE, IM], entities=(own, force)) for own in owners]
@@ -341,18 +330,14 @@ def test_bodies_of_an_assembly_are_named_by_entities_or_by_a_table_of_points(tmp
         (tmp_path / "x.unv").write_text(nodes + "".join(functions))
         return tmp_path / "x.unv"
 
-    test = rom.io.read_responses(written("FRAME", "counterwei"), **of)
+    test = read(written("FRAME", "counterwei"), **of)
     assert test.sensors.bodies == ("counterweight", "frame") and test.inputs.bodies == ("frame",)
     assert_array_equal(test.sensors.points[0], test.sensors.points[1])
     for wrong, words in (("wing", "node 7 is of 'wing'; bodies are 'frame'"), ("NONE", "no body")):
-        path = written("frame", wrong)
-        refuses(FileFormatError, words, rom.io.read_responses, path, **of)
-    test = rom.io.read_responses(written("left", force="left"), **of)
+        refuses(FileFormatError, words, read, written("frame", wrong), **of)
+    test = read(written("left", force="left"), **of)
     assert test.sensors.bodies is None
-
-    (tmp_path / "test.csv").write_text(table())
-    lines, owners = POINTS.splitlines(), ("body", "frame", "counterweight", "frame")
-    text = "\n".join(f"{line},{own}" for line, own in zip(lines, owners, strict=True))
-    (tmp_path / "points.csv").write_text(text)
-    test = rom.io.read_responses(tmp_path / "test.csv", averages=20, points=tmp_path / "points.csv")
+    owners = ("body", "frame", "counterweight", "frame")
+    points = zip(POINTS.splitlines(), owners, strict=True)
+    test = read_table(tmp_path, table(), "\n".join(f"{line},{own}" for line, own in points))
     assert test.sensors.bodies == owners[1:3] and test.inputs.bodies == ("frame",)

@@ -26,18 +26,14 @@ FEW = (
     Sensors(Channels([[0.5, 0, 0]], [[0, 0, 1]]), "displacement", 1e-6),
     Sensors(Channels([[1.0, 0.1, 0], [0.75, 0, 0]], [[0, 0, 1]] * 2), "acceleration", 0.5),
 )
+MODEL = block(cells=(8, 2, 2))
 GAUGE = [[0.125, 0.05, 0.08], [0.25, 0.05, 0.08]]
 WANTED = (Sensors(Channels(GAUGE[:1], [[1, 0, 0]]), "stress"), Sensors(TIP, "displacement"))
 
 
 @pytest.fixture(scope="module")
-def model():
-    return block(cells=(8, 2, 2))
-
-
-@pytest.fixture(scope="module")
-def body(model):
-    body = reduced(4, model, reference="root", damping=rom.ModalDamping(0.02))
+def body():
+    body = reduced(4, MODEL, reference="root", damping=rom.ModalDamping(0.02))
     # strain between two points of the surface, along x, stands for the stress of a gauge
     surface = body.surface
     a, b = (int(np.linalg.norm(surface.points - x, axis=1).argmin()) for x in GAUGE)
@@ -115,12 +111,12 @@ def test_errors_and_innovations_are_as_large_as_the_filter_says(filter_):
         assert chi2.ppf(1e-3, 60) < total < chi2.ppf(1 - 1e-3, 60)
 
 
-def test_force_and_stress_of_the_full_model_are_found(model, body):
-    modes = rom.modes(model, model.n_dofs - model.interfaces["root"].dofs.size, fixed=("root",))
+def test_force_and_stress_of_the_full_model_are_found(body):
+    modes = rom.modes(MODEL, MODEL.n_dofs - MODEL.interfaces["root"].dofs.size, fixed=("root",))
     omega, shapes = modes.omega, modes.shapes
-    where = {tuple(np.round(x, 9)): 3 * k for k, x in enumerate(model.points)}
+    where = {tuple(np.round(x, 9)): 3 * k for k, x in enumerate(MODEL.points)}
     n_t, F = 600, 50.0
-    load = np.zeros(model.n_dofs)
+    load = np.zeros(MODEL.n_dofs)
     load[where[1.0, 0.0, 0.0] + 2] = F
     g, wd = shapes.T @ load, omega * np.sqrt(1 - 0.02**2)
     times = DT * np.arange(n_t)[:, None]

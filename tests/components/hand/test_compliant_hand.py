@@ -62,35 +62,29 @@ INDEX = {  # tension [N]: angle of a joint [deg], x, z of the tip, pull, inner l
 }
 
 
-@pytest.fixture(scope="module")
-def closing():
+def test_index_finger_closes_until_coils_touch():
+    """Without a load on the tip every joint feels the tension alone: all three bend alike.
+
+    Beyond 2.65 N the pull hardly grows; springs without a stop would bend on.
+    """
     postures = [rest(Finger())]
-    for tension in INDEX:
-        postures.append(close(Finger(), tension=tension, start=postures[-1]))
-    return postures[1:]
-
-
-def test_index_finger_closes_by_its_tension_or_its_pull(closing):
-    """Without a load on the tip every joint feels the tension alone: all three bend alike."""
-    for posture, (angle, x, z, pull, inner) in zip(closing, INDEX.values(), strict=True):
+    for tension, (angle, x, z, pull, inner) in INDEX.items():
+        posture = close(Finger(), tension=tension, start=postures[-1])
         assert_allclose(np.degrees(posture.angles), 3 * [angle], rtol=3e-4)
         assert_allclose(posture.tip / MM, [x, 0, z], rtol=5e-4, atol=1e-9)
         assert_allclose(posture.pull / MM, pull, rtol=3e-4)
         length = posture.finger.clearances(posture.shape) / MM + 3.5
         assert_allclose(length, 3 * [inner], rtol=8e-3)
         assert not posture.bound.any()
-    posture = close(closing[2].finger, pull=closing[2].pull)
-    assert_allclose(posture.tension, 2.0, rtol=1e-8)
-    assert_allclose(posture.shape.x, closing[2].shape.x, atol=1e-10)
-
-
-def test_coils_that_touch_stop_a_joint(closing):
-    """Beyond 2.65 N the pull hardly grows; springs without a stop would bend on."""
-    posture = close(closing[0].finger, tension=4.0, start=closing[-1])
-    assert posture.bound.all()
-    assert (posture.finger.clearances(posture.shape) > -0.1 * MM).all()
-    assert_allclose(np.degrees(posture.angles.sum()), 113, atol=8)
-    assert 0 < posture.pull - closing[-1].pull < 1.5 * MM
+        postures.append(posture)
+    by_pull = close(Finger(), pull=postures[3].pull)
+    assert_allclose(by_pull.tension, 2.0, rtol=1e-8)
+    assert_allclose(by_pull.shape.x, postures[3].shape.x, atol=1e-10)
+    last = close(Finger(), tension=4.0, start=posture)
+    assert last.bound.all()
+    assert (last.finger.clearances(last.shape) > -0.1 * MM).all()
+    assert_allclose(np.degrees(last.angles.sum()), 113, atol=8)
+    assert 0 < last.pull - posture.pull < 1.5 * MM
 
 
 def test_compliance_of_the_tip():

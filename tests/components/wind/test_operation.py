@@ -261,36 +261,25 @@ def test_gains_fall_with_the_pitch_as_published():
     assert_allclose(there.pitch, DOUBLING_PITCH)  # where the factor of `at` is that of the steps
 
 
-@pytest.fixture(scope="module")
-def curve():
-    return control.power_curve(np.arange(3.0, 25.5))
-
-
-def test_pitch_above_the_rated_wind_is_that_of_the_report(curve):
-    """Table 7-1, within a tenth of a degree to 21 m/s and 0.4 at 25."""
+def test_the_power_curve_is_that_of_the_report_of_openfast_and_of_a_specialist():
+    """Pitch of table 7-1, within a tenth of a degree to 21 m/s and 0.4 at 25."""
+    curve = control.power_curve(np.arange(3.0, 25.5))
     winds, pitch = np.array(control.PUBLISHED_PITCH).T
     found = np.degrees(np.interp(winds, curve["wind"], curve["pitch"]))
     assert_allclose(found[winds < 21.5], pitch[winds < 21.5], atol=0.11)
     assert_allclose(found, pitch, atol=0.4)
-
-
-def test_power_thrust_and_speed_are_those_of_openfast_and_of_a_specialist(curve):
     wind, speed, pitch, power, thrust = OPENFAST.T
     at = np.isin(curve["wind"], wind)
     assert_allclose(curve["speed"][at], speed * RPM, rtol=0.011)
     assert_allclose(np.degrees(curve["pitch"][at]), pitch, atol=0.3)
     assert_allclose(curve["power"][at], 1e3 * power, rtol=0.036)
     assert_allclose(curve["thrust"][at], 1e3 * thrust, rtol=0.03)
-    rated = steady(11.4)
-    assert_allclose(0.944 * rated.power, 5e6, rtol=0.02)
+    assert_allclose(0.944 * steady(11.4).power, 5e6, rtol=0.02)
     assert (curve["power"] < 5.0001e6).all()
     assert_allclose(curve["power"][curve["wind"] >= 12.0], 5e6, rtol=1e-4)
     assert (curve["power_coefficient"] < BETZ_LIMIT).all()
     assert_allclose(curve["power_coefficient"][5:8], 0.482, rtol=0.01)
     assert abs(curve["wind"][curve["thrust"].argmax()] - 11.4) < 1.0
-
-
-def test_balance_of_torque_and_power(curve):
     below = curve["wind"] < 11.0
     asked = [GEAR_RATIO * generator_torque(GEAR_RATIO * w) for w in curve["speed"][below]]
     assert_allclose(curve["torque"][below], asked, rtol=1e-6)

@@ -110,18 +110,14 @@ def test_blades_whirl_on_a_stiff_tower_as_one_of_them_swings():
     refuses(ConfigError, "no steady motion", turbine(4).turning, RATED_SPEED)  # with its weight
 
 
-@pytest.fixture(scope="module")
-def driven():
-    """Two meganewton metres, from rest, without weight."""
+def test_torque_gives_momentum_and_energy():
+    """Two meganewton metres, from rest, without weight; about the shaft.
+
+    The generator stores its own momentum times the ratio of the gear.
+    """
     whole = on_a_stiff_tower(16)
     whole.turn_with(lambda t, x, v: 2e6 * min(t / 2.0, 1.0))
-    return whole, rom.simulate(whole.mechanism, t_end=12.0, dt=0.01, rho_inf=0.9)
-
-
-@pytest.mark.long
-def test_momentum_is_the_impulse_of_the_torque(driven):
-    """About the shaft; the generator stores its own times the ratio of the gear."""
-    _, sol = driven
+    sol = rom.simulate(whole.mechanism, t_end=12.0, dt=0.01, rho_inf=0.9)
     one = blade(16)
     blades = whole_turbine.N_BLADES * (one.mass @ one.x[:, 2] ** 2 + one.inertia[:, :2].sum() / 2)
     fast = GEAR_RATIO**2 * wind_turbine.GENERATOR_INERTIA
@@ -131,10 +127,6 @@ def test_momentum_is_the_impulse_of_the_torque(driven):
     late = sol.t > 6.0
     slope = np.polyfit(sol.t[late], speed[late], 1)[0]
     assert_allclose(slope, 2e6 / (blades + still), rtol=5e-3)
-
-
-def test_work_of_the_torque_is_the_energy(driven):
-    _, sol = driven
     assert sol.energy.drives[-1] > 1e6
     assert np.abs(sol.energy.balance).max() < 1e-3 * sol.energy.kinetic.max()
     assert rom.audit(sol).ok
