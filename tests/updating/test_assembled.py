@@ -73,7 +73,9 @@ def test_coupled_families_have_the_frequencies_of_their_assembly(joined):
     assert_allclose(same, H, rtol=1e-6, atol=1e-9 * np.abs(H).max())
 
 
-def test_two_bodies_on_a_spring_swing_as_two_masses(bolted):
+def test_two_bodies_on_a_soft_spring_swing_as_two_masses_and_a_stiff_joint_is_a_coupling(
+    joined, bolted
+):
     """A soft spring along x: omega^2 = k (1/m + 1/m) of two halves; 11 other motions are free."""
     k = 1e3
     soft = JointSpring(("frame", "tip"), ("arm", "root"), (k, 0, 0), 0.1, 10.0)
@@ -82,6 +84,9 @@ def test_two_bodies_on_a_spring_swing_as_two_masses(bolted):
     half = 7850.0 * 0.5 * 0.1 * 0.08
     assert_allclose(modal(model.at(np.zeros(3)), ()).lam[11], 2 * k / half, rtol=1e-5)
     assert model_of(bolted, {"bolts": BOLTS}, fixed=()).n_rigid == 6
+    stiff = replace(BOLTS, stiffness=(1e14,) * 3 + (1e12,) * 3)
+    found = modal(model_of(bolted, {"bolts": stiff}).at(np.zeros(3)), ()).lam[:6]
+    assert_allclose(found, modal(model_of(joined, {}).at(np.zeros(2)), ()).lam[:6], rtol=1e-4)
 
 
 def test_a_spring_reaches_a_body_that_is_apart_by_a_rigid_arm(bolted):
@@ -96,12 +101,6 @@ def test_a_spring_reaches_a_body_that_is_apart_by_a_rigid_arm(bolted):
     moved[parts.columns["arm"].start + np.array([2, 5])] = 2.0, 1.0  # along and about z
     y = 0.05  # of the root, which is at x = 0: along x the turn moves it by -y
     assert_allclose(moved @ K @ moved, 5.0 * 2.0**2 + 3.0 * y**2)
-
-
-def test_a_stiff_joint_is_a_coupling(joined, bolted):
-    stiff = replace(BOLTS, stiffness=(1e14,) * 3 + (1e12,) * 3)
-    found = modal(model_of(bolted, {"bolts": stiff}).at(np.zeros(3)), ()).lam[:6]
-    assert_allclose(found, modal(model_of(joined, {}).at(np.zeros(2)), ()).lam[:6], rtol=1e-4)
 
 
 def test_a_joint_and_both_moduli_are_found(bolted):

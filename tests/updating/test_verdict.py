@@ -24,9 +24,6 @@ def test_scores_are_those_of_one_more_column_in_least_squares():
     change, covariance = -np.linalg.lstsq(J, r, rcond=None)[0], np.linalg.inv(J.T @ J)
     assert list(found) == ["c"]
     assert_allclose(found["c"], change[2] / np.sqrt(covariance[2, 2]), rtol=1e-10)
-
-
-def test_a_parameter_that_others_replace_has_no_score():
     J = np.array([[1.0, 2.0], [2.0, 4.0], [3.0, 6.0]])
     assert scores(J.T @ J, J.T @ np.ones(3), np.array([0]), ("a", "b")) == {}
 

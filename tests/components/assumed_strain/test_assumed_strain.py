@@ -230,16 +230,15 @@ def pulled(stretches, metal, state="plane stress"):
     return np.array(found)
 
 
-def test_hencky_bar_follows_the_closed_form():
-    """T = E ln(stretch) on the current section times length; the force is T / stretch."""
+def test_bars_follow_the_closed_forms_of_hencky_and_of_yield():
+    """T = E ln(stretch) on the current section times length; the force is T / stretch.
+
+    Beyond yield T = (sy + H e E / E) E / (E + H); unloading is elastic.
+    """
     stretches = np.array([1.05, 1.3, 1.8, 0.7])
     force, width, _ = pulled(stretches, Metal(3.0, 0.3)).T
     assert_allclose(force, 3.0 * np.log(stretches) / stretches, rtol=1e-9)
     assert_allclose(width, stretches**-0.3, rtol=1e-9)
-
-
-def test_yield_of_a_bar_follows_the_closed_form():
-    """Beyond yield T = (sy + H e E / E) E / (E + H); unloading is elastic."""
     E, sy, hard = 1000.0, 5.0, 50.0
     strains = np.array([0.004, 0.02, 0.2, 0.198])
     force, _, plastic = pulled(np.exp(strains), Metal(E, 0.3, 1.0, sy, hard)).T

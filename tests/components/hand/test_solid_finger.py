@@ -68,16 +68,13 @@ def test_stiff_phalanges_make_the_rigid_finger():
     assert_allclose(*scaled(C, rest(Finger()).tip_compliance()), atol=1e-4)
 
 
-def test_springs_weigh_as_much_as_their_wire():
+def test_springs_weigh_as_much_as_their_wire_and_stretch_under_their_weight():
     """Steel wire of 0.7 mm, 5 coils of 7 mm: 0.332 g; a thin tube turns as its radius says."""
     rod = hand.heavy_spring(HAND_SPRING)
     wire = 7850 * np.pi / 4 * 0.7e-3**2 * 5 * np.hypot(np.pi * 7e-3, 8e-3 / 5)
     assert_allclose(rod.mass.sum(), wire, rtol=1e-12)
     assert_allclose(rod.inertia.sum(axis=0), wire * 3.5e-3**2 * np.array([0.5, 0.5, 1]))
-
-
-def test_hanging_finger_stretches_under_its_weight():
-    """Each spring carries what hangs below it and half of its own weight."""
+    # each spring carries what hangs below it and half of its own weight
     solids = bars(rom.Material(E=200e9, nu=0.3, rho=1000.0))
     mech, _ = finger(solids, (HAND_SPRING,) * 3, gravity=(0, 0, 0.5))
     state = rom.equilibrium(mech)

@@ -12,22 +12,10 @@ import rom
 from cases.mbs import linkages
 from cases.mbs.linkages import five_bar_of_the_core, two_link_of_the_core
 from cases.refusals import refused, refuses
-from rom.components.linkages import (
-    CrossSlides,
-    Driven,
-    FiveBar,
-    PolarArm,
-    SlideArm,
-    SlideFiveBar,
-    TwoLink,
-    angle_grid,
-    closed_loci,
-    index_map,
-    isotropic_set,
-    rigid_link,
-    rod,
-    tool_isotropy,
-)
+from rom.components.linkages import Driven, FiveBar, TwoLink, isotropic_set, rigid_link, rod
+from rom.components.linkages.dynamic_isotropy import angle_grid, closed_loci, index_map
+from rom.components.linkages.isotropic_sets import tool_isotropy
+from rom.components.linkages.prismatic_linkages import CrossSlides, PolarArm, SlideArm, SlideFiveBar
 from rom.errors import ConfigError, ModelError
 
 RAILS = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))

@@ -27,15 +27,12 @@ def bar():
     return reduced(4, block(size=(0.3, 0.02, 0.02), cells=(6, 2, 2), origin=(0.1, -0.03, 0.0)))
 
 
-def test_two_link_chain_has_its_textbook_inertia():
+def test_two_link_chain_has_its_textbook_inertia_also_with_a_mass_centre_aside():
     """In absolute angles; uniform links turn about their ends by a third of m l^2."""
     A, b = TWO.inertia(0.4, 1.3), 2.0 * 0.5 * 0.2 * np.cos(0.4 - 1.3)
     assert_allclose(A, [[0.5**2 / 3 + 2.0 * 0.5**2, b], [b, 2.0 * 0.4**2 / 3]], rtol=1e-14)
     assert_allclose(np.diag(A), [0.583333, 0.106667], atol=1e-6)
-
-
-def test_a_mass_centre_aside_of_the_axis_couples_by_cosine_and_sine():
-    """Velocity of the centre: l1 e1' + (x e2' - y e2), primes for a quarter turn ahead."""
+    # velocity of the centre: l1 e1' + (x e2' - y e2), primes for a quarter turn ahead
     m, l1, x, y, J = 2.0, 0.5, 0.15, 0.08, 0.03
     chain = TwoLink(rod(1.0, l1), linkages.rigid_link(m, 0.4, (x, y), J))
     A, turn = chain.inertia(0.4, 1.3), 1.3 - 0.4

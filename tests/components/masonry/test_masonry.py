@@ -40,8 +40,11 @@ def test_mass_of_a_block_is_that_of_finite_elements():
     assert_allclose(one.K, (U.T @ (model.K @ U))[3:, 3:], atol=1e-9 * one.K.max())
 
 
-def test_mass_of_a_skew_block_from_random_points():
-    """Couplings of rotation and strains need Sxy; the entries are integrals of T^T T."""
+def test_mass_and_mean_axes_of_a_skew_block():
+    """Entries are integrals of T^T T at random points; couplings of rotation and strains need Sxy.
+
+    Vibrations with rotation in the equations, and without it in a frame of mean axes.
+    """
     one = stone(SKEW, **SOFT)
     area, _, S = polygon_moments(SKEW)
     x = np.random.default_rng(0).uniform(SKEW.min(axis=0), SKEW.max(axis=0), (400_000, 2))
@@ -53,10 +56,6 @@ def test_mass_of_a_skew_block_from_random_points():
     exact = 2000.0 * area * np.einsum("aik,ajk->ij", T, T) / X.size
     assert_allclose(one.M, exact, atol=0.01 * one.M.max())
     assert one.M[2, 3] == -2000.0 * S[0, 1] and abs(S[0, 1]) > 0.005
-
-
-def test_mean_axes_are_the_strains_orthogonal_to_rotation():
-    one = stone(SKEW, **SOFT)
     K = np.zeros((6, 6))
     K[3:, 3:] = one.K
     with_frame = np.sqrt(eigh(K, one.M, eigvals_only=True)[3:])

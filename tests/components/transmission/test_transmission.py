@@ -50,7 +50,13 @@ def test_a_free_shaft_has_the_frequencies_of_timoshenko():
         assert np.abs(omega / (np.pi / 2 / l * np.sqrt(modulus / RHO)) - 1).min() < 4e-4
 
 
-def test_a_free_rotor_precesses_by_the_ratio_of_its_inertias():
+def test_a_free_rotor_precesses_by_the_ratio_of_its_inertias_and_a_ring_has_those_of_a_ring():
+    solid = Disc.of_ring(0, outer=0.2, inner=0.0, width=1e-9)
+    assert solid.polar == pytest.approx(2 * solid.diametral) == pytest.approx(solid.mass * 0.005)
+    hole, ring = (Disc.of_ring(0, outer=d, inner=i, width=0.05) for d, i in ((0.1, 0), (0.2, 0.1)))
+    whole = Disc.of_ring(0, outer=0.2, inner=0.0, width=0.05)
+    for name in ("mass", "polar", "diametral"):
+        assert getattr(hole, name) + getattr(ring, name) == pytest.approx(getattr(whole, name))
     s = transmission.Shaft(NODES, 0.05, [Disc.of_ring(2, outer=0.3, inner=0.05, width=0.04)])
     (M, K, G), speed = s.matrices(), 500.0
     turn, spin = np.zeros((2, s.n))
@@ -60,15 +66,6 @@ def test_a_free_rotor_precesses_by_the_ratio_of_its_inertias():
     assert np.abs(values - 1j * speed * ratio).min() < 5e-3 * speed * ratio
     across, volume = M[0::6, 0::6], np.pi / 4 * (0.05**2 * 0.2 + (0.3**2 - 0.05**2) * 0.04)
     assert np.trace(across) < across.sum() == pytest.approx(RHO * volume)
-
-
-def test_a_ring_has_the_inertias_of_a_ring():
-    solid = Disc.of_ring(0, outer=0.2, inner=0.0, width=1e-9)
-    assert solid.polar == pytest.approx(2 * solid.diametral) == pytest.approx(solid.mass * 0.005)
-    hole, ring = (Disc.of_ring(0, outer=d, inner=i, width=0.05) for d, i in ((0.1, 0), (0.2, 0.1)))
-    whole = Disc.of_ring(0, outer=0.2, inner=0.0, width=0.05)
-    for name in ("mass", "polar", "diametral"):
-        assert getattr(hole, name) + getattr(ring, name) == pytest.approx(getattr(whole, name))
 
 
 def test_both_journals_rest_where_a_journal_alone_would(loaded):

@@ -9,22 +9,12 @@ from scipy.linalg import eig, eigh
 from cases.components.updating import gauss
 from cases.files.decks import dataset
 from cases.refusals import refused, refuses
-from rom.components.updating import (
-    AtSensors,
-    Measurement,
-    ParametricModel,
-    common_basis,
-    damping_matrix,
-    modal,
-    parametric_basis,
-    response_function_method,
-    responses,
-    sensitivity,
-    update_by_input,
-    update_by_output,
-)
+from rom.components import updating
 from rom.components.updating import frf_data as data
+from rom.components.updating import response_function_method, responses, update_by_input
 from rom.components.updating.airframe import airframe, torsion_constant
+from rom.components.updating.methods import update_by_output
+from rom.components.updating.models import AtSensors, Measurement, ParametricModel, modal
 from rom.errors import ConfigError, ModelError
 from rom.io.fields.universal import assemble, read_universal
 
@@ -85,7 +75,7 @@ def test_the_beam_is_that_of_the_table_and_of_euler_and_bernoulli():
 @pytest.mark.parametrize("model", [BEAM, AtSensors(BEAM)], ids=["full", "at sensors"])
 def test_responses_by_modes_equal_the_inverted_dynamic_stiffness(model):
     here = model.at(TRUE)
-    C = damping_matrix(here, ZETA)
+    C = updating.damping_matrix(here, ZETA)
     Z = here.K - OMEGA[:, None, None] ** 2 * here.M + 1j * OMEGA[:, None, None] * C
     direct = here.sensors @ np.linalg.inv(Z) @ here.sensors[list(INPUTS)].T
     assert_allclose(EXACT[:, 7, 0], EXACT[:, 2, 1], rtol=1e-9)  # reciprocal
@@ -95,7 +85,7 @@ def test_responses_by_modes_equal_the_inverted_dynamic_stiffness(model):
 def test_damping_gives_the_poles_their_decay():
     """Eigenvalues of the first-order equations: -zeta omega +- i omega sqrt(1 - zeta^2)."""
     here = AtSensors(BEAM).at(TRUE)
-    C, n = damping_matrix(here, ZETA), 8
+    C, n = updating.damping_matrix(here, ZETA), 8
     A = np.block([[np.zeros((n, n)), np.eye(n)], [-here.K, -C]])
     B = np.block([[np.eye(n), np.zeros((n, n))], [np.zeros((n, n)), here.M]])
     poles = eig(A, B, right=False)
@@ -120,10 +110,12 @@ def test_a_shaken_oscillator_settles_to_its_response():
 
 @pytest.mark.parametrize("condensed", [False, True])
 def test_derivatives_agree_with_differences(condensed):
-    reduced = BEAM.in_basis(parametric_basis(BEAM, 6, [START]))  # no stiff modes, less round-off
+    reduced = BEAM.in_basis(
+        updating.parametric_basis(BEAM, 6, [START])
+    )  # no stiff modes, less round-off
     model = AtSensors(BEAM) if condensed else reduced
     x = np.concatenate([TRUE / 2, np.log(ZETA)])
-    dH = sensitivity(model, x[:9], np.exp(x[9:]), OMEGA, INPUTS)[1]
+    dH = updating.sensitivity(model, x[:9], np.exp(x[9:]), OMEGA, INPUTS)[1]
 
     def at(change):
         y = x + change
@@ -163,7 +155,7 @@ def test_noise_moves_parameters_as_much_as_the_residual_says(level):
     assert found.residual == pytest.approx(level / np.sqrt(2), rel=0.06)
 
 
-def test_static_condensation_floors_the_error_whatever_the_noise():
+def test_static_condensation_raises_frequencies_and_floors_the_error():
     """Table: .053, .054, .054 for stiffness and .022, .023, .023 for mass."""
     model = AtSensors(BEAM)
     for level in (0.0, 0.05, 0.10):
@@ -171,9 +163,6 @@ def test_static_condensation_floors_the_error_whatever_the_noise():
         assert found[0] == pytest.approx(0.0535, abs=0.004)
         assert found[1] == pytest.approx(0.0225, abs=0.005)
         assert found[2] < 0.01 + level  # damping: .009 without noise, else what the draw says
-
-
-def test_condensed_frequencies_are_too_high_by_what_is_known():
     ratio = frequencies(AtSensors(BEAM), TRUE) / frequencies(BEAM, TRUE) - 1
     assert_allclose(100 * ratio, [0, 0.017, 0.12, 0.48, 1.33], atol=0.006)
 
@@ -182,7 +171,7 @@ def test_fixed_interface_modes_lift_the_floor():
     """A Craig-Bampton basis for a range of parameters is as good as the full model."""
     rng = np.random.default_rng(4)
     samples = np.vstack([START, rng.uniform(-0.35, 0.35, (3, 9))])
-    T = parametric_basis(BEAM, 4, samples)
+    T = updating.parametric_basis(BEAM, 4, samples)
     found = errors(update_by_output(BEAM.in_basis(T), measured(), START, GUESS))
     assert T.shape[1] < 40
     assert found[0] < 1e-3 and found[1] < 1e-3
@@ -201,12 +190,14 @@ def test_a_verdict_says_whether_noise_alone_is_left(level):
     assert not by_input.ok
 
 
-@pytest.mark.parametrize("rank", [8, 5])
-def test_the_common_basis_works_from_as_many_columns_as_modes(rank):
+def test_the_common_basis_works_from_as_many_columns_as_modes():
     """Table: .065 and .061 for stiffness, .012 for mass, .037 and .035 for damping."""
-    found = errors(update_by_input(AtSensors(BEAM), measured(0.05), START, GUESS, rank=rank))
-    assert found[0] == pytest.approx(0.065, abs=0.015)
-    assert found[1] < 0.03 and found[2] < 0.08
+    for rank in (8, 5):
+        found = errors(update_by_input(AtSensors(BEAM), measured(0.05), START, GUESS, rank=rank))
+        assert found[0] == pytest.approx(0.065, abs=0.015)
+        assert found[1] < 0.03 and found[2] < 0.08
+    found = errors(update_by_input(AtSensors(BEAM), measured(0.05), START, GUESS, rank=4))
+    assert found[0] > 0.3 and found[1] > 0.2 and found[2] > 0.2
 
 
 def test_equations_converge_as_newton_does():
@@ -217,21 +208,16 @@ def test_equations_converge_as_newton_does():
     assert error[0] < 1e-3 and error[1] < 1e-6 and error[-1] < 1e-9
 
 
-def test_fewer_columns_than_modes_fail():
-    found = errors(update_by_input(AtSensors(BEAM), measured(0.05), START, GUESS, rank=4))
-    assert found[0] > 0.3 and found[1] > 0.2 and found[2] > 0.2
-
-
 def test_the_common_basis_holds_both_sets():
     other = responses(BEAM, START, GUESS, OMEGA, INPUTS)
-    U = common_basis(EXACT, other, 6)
+    U = updating.common_basis(EXACT, other, 6)
     assert_allclose(U.T @ U, np.eye(6), atol=1e-12)
     for H in (EXACT, other):
         assert data.deviation(U @ (U.T @ H), H).max() < 0.06
 
 
 def test_one_linear_solution_is_exact_when_everything_is_measured():
-    C = damping_matrix(BEAM.at(TRUE), ZETA)
+    C = updating.damping_matrix(BEAM.at(TRUE), ZETA)
     seen = ParametricModel(BEAM.K, BEAM.M, BEAM.dK, BEAM.dM, np.eye(48))
     inputs, w = (16, 46), OMEGA[:, None, None]
     H = responses(seen, TRUE, ZETA, OMEGA, inputs)
@@ -245,7 +231,7 @@ def test_one_linear_solution_is_exact_when_everything_is_measured():
 
 def test_eight_sensors_need_some_linear_solutions():
     """The first step is cut at 0.2 of 0.35; after it each step squares the error."""
-    C = damping_matrix(BEAM.at(TRUE), ZETA)
+    C = updating.damping_matrix(BEAM.at(TRUE), ZETA)
     found = response_function_method(BEAM, measured(weights=1 / np.abs(EXACT)), START, C, steps=5)
     error = np.abs(found.history - TRUE).max(axis=1)
     assert error[0] == pytest.approx(0.15, abs=1e-6)
@@ -258,7 +244,7 @@ def test_unmeasured_dofs_as_the_model_says_converge_slower_to_the_same():
     Equations relative to both responses. Table: .41, .27, .073 and 1e-4 in the steps 1, 2, 3, 5,
     with a scaling of which nothing is known; one step later all scalings have converged.
     """
-    C = damping_matrix(BEAM.at(TRUE), ZETA)
+    C = updating.damping_matrix(BEAM.at(TRUE), ZETA)
     s = BEAM.sensors.argmax(axis=1)
     w, p, error = OMEGA[:, None, None], START, []
     for _ in range(6):
@@ -306,7 +292,7 @@ def test_weights_help_when_lines_differ_in_noise():
 
 def test_lines_beside_the_poles_forgive_wrong_damping():
     """Damping kept half too large: near the poles the stiffness would be blamed for it."""
-    C = damping_matrix(BEAM.at(TRUE), 1.5 * ZETA)
+    C = updating.damping_matrix(BEAM.at(TRUE), 1.5 * ZETA)
     poles, relative = 2 * np.pi * frequencies(BEAM, TRUE), 1 / np.abs(EXACT)
     w = data.beside_poles(OMEGA, poles, ZETA, 30.0)
     assert w.min() < 0.1 and w.max() == 1.0
