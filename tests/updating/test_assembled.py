@@ -73,9 +73,7 @@ def test_coupled_families_have_the_frequencies_of_their_assembly(joined):
     assert_allclose(same, H, rtol=1e-6, atol=1e-9 * np.abs(H).max())
 
 
-def test_two_bodies_on_a_soft_spring_swing_as_two_masses_and_a_stiff_joint_is_a_coupling(
-    joined, bolted
-):
+def test_a_soft_spring_lets_two_masses_swing_and_a_stiff_joint_couples_them(joined, bolted):
     """A soft spring along x: omega^2 = k (1/m + 1/m) of two halves; 11 other motions are free."""
     k = 1e3
     soft = JointSpring(("frame", "tip"), ("arm", "root"), (k, 0, 0), 0.1, 10.0)

@@ -157,9 +157,7 @@ DRAWN = [(0, 0.0), (1, 0.0), (2, 0.0), (1, 0.1), (1, 0.3)]
 
 @pytest.mark.parametrize(("seed", "on_force"), DRAWN)
 @pytest.mark.parametrize(("true", "there", "name", "sign"), WRONG)
-def test_the_largest_score_is_that_of_what_is_wrong(
-    family, true, there, name, sign, seed, on_force
-):
+def test_the_largest_score_names_what_is_wrong(family, true, there, name, sign, seed, on_force):
     update = found(family, true, seed, on_force, **there)
     assert not update.verdict.ok
     assert max(update.scores, key=lambda k: abs(update.scores[k])) == name, update.scores

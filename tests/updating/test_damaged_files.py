@@ -20,6 +20,8 @@ F = np.linspace(20.0, 700.0, 60)
 NODES = {1: (0.5, 0.0, 0.08), 2: (0.75, 0.1, 0.08), 3: (1.0, 0.1, 0.0), 4: (1.0, 0.0, 0.08)}
 SENSORS = tuple((node, axis) for node in NODES for axis in "YZ")
 FORCE = (3, "Z")
+SCALES = {-1.0: "turned around", 1e3: "millimetres", 1e-3: "millimetres", 0.75: "worst sensor"}
+SCALES |= {1 / 9.80665: "in g|for g", 9.80665: "in g|for g"}
 TRUE = {"inner": 1.2, "outer": 0.9}
 AXES = {"Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
 
@@ -61,9 +63,7 @@ def updated(family, folder, averages=50):
     return rom.update(family, test, fixed=("root",))
 
 
-def test_a_whole_file_is_updated_and_errors_that_are_taken_for_larger_are_warned_of(
-    family, responses, tmp_path
-):
+def test_a_whole_file_is_updated_and_larger_errors_are_warned_of(family, responses, tmp_path):
     found = updated(family, written(tmp_path, responses))
     assert found.verdict.ok
     assert_right(found, TRUE)
@@ -101,11 +101,7 @@ def test_what_is_wrong_in_a_table_is_named(family, responses, tmp_path, name):
 
 
 @pytest.mark.parametrize("seed", range(2))
-@pytest.mark.parametrize(
-    ("factor", "why"),
-    [(-1.0, "turned around"), (1 / 9.80665, "in g|for g"), (9.80665, "in g|for g"),
-     (1e3, "millimetres"), (1e-3, "millimetres"), (0.75, "worst sensor")],
-)  # fmt: skip
+@pytest.mark.parametrize(("factor", "why"), SCALES.items())
 def test_a_sensor_drawn_at_random_is_named(family, responses, tmp_path, factor, why, seed):
     """Ranges from 0.1 to 10 explain a level by themselves: the verdict then says what is wrong."""
     wide = {n: replace(p, low=0.1, high=10.0) for n, p in family.parameters.items()}

@@ -61,26 +61,25 @@ def drawn(family, exact):
 KNOWN = {"coherence": 1 / (1 + 0.1**2)}
 PLAIN = {"force_noise": 0.0, "estimator": None}  # as if no estimator had a bias
 ESTIMATORS = ("H1", "H2", "Hv")
-NOISES = [("H1", 0.1, 0.03, {}), ("H2", 0.03, 0.1, {}), ("Hv", 0.1, 0.1, {})]
-NOISES += [("H1", 0.0, 0.1, KNOWN), ("Hv", 0.01, 0.01, {}), ("Hv", 0.1, 0.03, {})]
+# estimator, noise of the force and of the response
+NOISES = [(("H1", 0.1, 0.03), {}), (("H2", 0.03, 0.1), {}), (("Hv", 0.1, 0.1), {})]
+NOISES += [(("H1", 0.0, 0.1), KNOWN), (("Hv", 0.01, 0.01), {}), (("Hv", 0.1, 0.03), {})]
 # H1 is too small by 1.01, H2 too large by it; Hv by the root of their quotient
-BIASED = [("Hv", 0.2, 0.05, np.sqrt(1.04 / 1.0025)), ("H1", 0.1, 0.1, 1.01)]
-BIASED += [("H2", 0.1, 0.1, 1 / 1.01)]
+BIASED = [(("Hv", 0.2, 0.05), np.sqrt(1.04 / 1.0025)), (("H1", 0.1, 0.1), 1.01)]
+BIASED += [(("H2", 0.1, 0.1), 1 / 1.01)]
 
 
-@pytest.mark.parametrize(("name", "on_force", "on_response", "known"), few(3, NOISES))
-def test_parameters_lie_inside_two_deviations_as_often_as_they_must(
-    drawn, name, on_force, on_response, known
-):
+@pytest.mark.parametrize(("noise", "known"), few(3, NOISES))
+def test_parameters_lie_inside_two_deviations_as_often_as_they_must(drawn, noise, known):
     """Of 100 draws 95 are expected, 90 to 99 by chance; of damping ratios with their prior too."""
-    scaled, _, found = drawn(name, on_force, on_response, **known)
+    scaled, _, found = drawn(*noise, **known)
     inside = np.count_nonzero(np.abs(scaled) < 2, axis=0)
     assert (inside >= 90).all() and (inside <= 99).all(), inside
     for k in (0, 1):
         ratios = [np.log(u.zeta[k] / 0.02) / u.deviations[f"zeta {k + 1}"] for u in found]
         assert np.count_nonzero(np.abs(ratios) < 2.0) >= 88
     assert np.mean([u.verdict.ok for u in found]) >= 0.95
-    if on_force == on_response:  # what is left of half a variance varies as the whole one
+    if noise[1] == noise[2]:  # what is left of half a variance varies as the whole one
         assert_allclose(np.mean([u.verdict.rows[0].value for u in found]), 1.0, atol=0.02)
 
 
@@ -88,9 +87,7 @@ def test_parameters_lie_inside_two_deviations_as_often_as_they_must(
 @pytest.mark.parametrize("level", [0.01, 0.03, 0.1])
 @pytest.mark.parametrize("name", ESTIMATORS)
 @pytest.mark.parametrize("share", [(1, 1), (1, 0.3), (0.3, 1)])
-def test_a_thousand_draws_lie_inside_two_deviations_as_often_as_they_must(
-    drawn, name, level, share
-):
+def test_a_thousand_draws_lie_inside_as_often_as_they_must(drawn, name, level, share):
     """95.4 % of each factor within the band that chance leaves 999 of 1000 counts of it."""
     seed = [20261127, ESTIMATORS.index(name), round(100 * level), round(10 * share[0])]
     scaled, *_ = drawn(name, level * share[0], level * share[1], 1000, tuple(seed))
@@ -99,15 +96,13 @@ def test_a_thousand_draws_lie_inside_two_deviations_as_often_as_they_must(
     assert (inside >= low).all() and (inside <= high).all(), inside
 
 
-@pytest.mark.parametrize(("name", "on_force", "on_response", "bias"), few(1, BIASED))
-def test_an_estimator_taken_for_unbiased_is_wrong_by_its_bias(
-    drawn, name, on_force, on_response, bias
-):
+@pytest.mark.parametrize(("noise", "bias"), few(1, BIASED))
+def test_an_estimator_taken_for_unbiased_is_wrong_by_its_bias(drawn, noise, bias):
     """Stiffness and mass are too large by what H is too small; named, by nothing."""
-    scaled, errors, _ = drawn(name, on_force, on_response, 15, **PLAIN)
+    scaled, errors, _ = drawn(*noise, 15, **PLAIN)
     assert_allclose(errors.mean(axis=0)[[0, 2]], np.log(bias), rtol=0.15)
     assert np.count_nonzero(np.abs(scaled[:, [0, 2]]) < 2, axis=0).max() <= 3
-    _, errors, _ = drawn(name, on_force, on_response, 15)
+    _, errors, _ = drawn(*noise, 15)
     assert np.abs(errors.mean(axis=0)[[0, 2]]).max() < 0.3 * abs(np.log(bias))
 
 

@@ -219,9 +219,7 @@ def test_a_wrong_model_is_refused(family, name):
     assert abs(np.log(cured.factors[name])) < 4 * cured.deviations[name]
 
 
-def test_a_search_that_does_not_end_names_what_is_missing_or_is_an_error_where_the_model_fits(
-    family, monkeypatch
-):
+def test_a_search_without_end_names_what_is_missing_or_is_an_error(family, monkeypatch):
     """Everything is free and 1 kg is missing: 12 steps are not enough, its score is the largest."""
     monkeypatch.setattr("rom.components.updating.estimate.MAX_STEPS", 12)
     test = synthetic(family, attached={"tip mass": TIP["tip mass"]})

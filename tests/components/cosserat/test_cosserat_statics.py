@@ -279,7 +279,7 @@ def test_buckling_load_of_a_column():
     assert lowest(0.999 * P) > 0 > lowest(1.001 * P)
 
 
-def test_what_is_no_rod_or_cannot_be_cut_or_found_is_named():
+def test_what_is_no_rod_or_cannot_be_cut_or_found_is_named_and_the_last_shape_is_kept():
     section = {"stretch": 1.0, "bend": 1.0}
     turned = np.tile([1.0, 0, 0, 0], (4, 1))
     refuses(ModelError, "segment 1", rod, [[0, 0, 0], [0, 0, 1], [0, 0, 1]], turned, **section)
@@ -297,9 +297,6 @@ def test_what_is_no_rod_or_cannot_be_cut_or_found_is_named():
     refuses(ConfigError, "5 pieces of a rod of 4 segments", cut, one, 5)
     load = np.outer([0, 0, 0, 0, 1.0], [30.0, 0, -60.0])
     refuses(SolverError, "2 linear pieces found no equilibrium", bend_in_pieces, one, 2, load)
-
-
-def test_without_equilibrium_the_last_shape_is_kept():
     one = straight(1.0, 10, stretch=10.0, bend=1.0)
     free = np.ones_like(cosserat.clamped(one))
     with pytest.raises(SolverError, match="no equilibrium beyond 0 % of the load") as error:

@@ -13,23 +13,20 @@ from rom.components.masonry.limits import Rock, arch, load_factor, minimum_thick
 from rom.components.masonry.motion import simulate
 from rom.errors import ConfigError
 
+SMOOTH = {0.38: 0.12157, 0.35: 0.15185, 0.32: 0.18560, 0.31: 0.19756}  # by friction
 
-def heyman():
-    """Thrust tangent to the intrados: H = beta cot beta."""
 
-    def gap(x):
+def test_limits_of_the_semicircular_arch():
+    def tangent(x):
+        """Of thrust on the intrados as Heyman has it, H = beta cot beta: gap, beta, H."""
         Ro = 1 + x / 2
         H = np.pi / 2 - 1 / Ro
         beta = brentq(lambda b: b / np.tan(b) - H, 0.3, 1.5)
         r = (H * Ro + 1 - np.cos(beta)) / (H * np.cos(beta) + beta * np.sin(beta))
         return r - (1 - x / 2), beta, H
 
-    x = brentq(lambda x: gap(x)[0], 0.05, 0.2)
-    return x, *gap(x)[1:]
-
-
-def test_limits_of_the_semicircular_arch():
-    x, beta, H = heyman()
+    x = brentq(lambda x: tangent(x)[0], 0.05, 0.2)
+    _, beta, H = tangent(x)
     assert_allclose([x, np.degrees(beta), H], [0.105965, 58.829, 0.621113], rtol=2e-5)
     line, true = minimum_thickness(true_weight=False), minimum_thickness()
     exacts = (0.107426, 54.496, 0.621772), (0.107478, 54.484, 0.620881)
@@ -54,9 +51,7 @@ def test_flatter_arches_obey_the_same_two_theories(degrees):
         assert stands(model) is answer, factor
 
 
-@pytest.mark.parametrize(
-    ("mu", "limit"), [(0.38, 0.12157), (0.35, 0.15185), (0.32, 0.18560), (0.31, 0.19756)]
-)
+@pytest.mark.parametrize(("mu", "limit"), SMOOTH.items())
 def test_friction_below_that_of_hinging_thickens_the_arch(mu, limit):
     rock = Rock(friction=mu)
     for factor, answer in ((1 + 2e-4, True), (1 - 2e-4, False)):

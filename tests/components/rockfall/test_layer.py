@@ -101,7 +101,9 @@ def test_a_boulder_that_never_stops_is_named(monkeypatch):
     assert error.value.solution.t[-1] == pytest.approx(0.2, rel=0.01)
 
 
-GOOD = Layer(3e6, 0.6, 0.9)
+GOOD, HARD = Layer(3e6, 0.6, 0.9), Cushion(2e6, limit=0.5, hardening=1.0)
+PRESSED = [(Cushion(2e6), 0.4), (HARD, 0.45), (HARD, 0.49), (GOOD, 0.5)]
+PRESSED += [(replace(GOOD, strength=2e5), 0.8)]
 
 
 def test_a_thick_layer_is_hertz():
@@ -234,11 +236,7 @@ def test_a_contact_that_fails_bears_its_strength_only():
 
 
 @pytest.mark.parametrize("recovery", [1.0, 0.3, 0.03])
-@pytest.mark.parametrize(
-    ("cushion", "deepest"),
-    [(Cushion(2e6), 0.4), (Cushion(2e6, limit=0.5, hardening=1.0), 0.45), (GOOD, 0.5),
-     (Cushion(2e6, limit=0.5, hardening=1.0), 0.49), (replace(GOOD, strength=2e5), 0.8)],
-)  # fmt: skip
+@pytest.mark.parametrize(("cushion", "deepest"), PRESSED)
 def test_recovery_is_the_share_of_the_energy(cushion, deepest, recovery):
     """Of compacted sand too: it gave back more than it took, or a ninth instead of 3 %."""
     c = replace(cushion, recovery=recovery)

@@ -93,12 +93,11 @@ def test_a_rigid_gallery_is_struck_as_hard_and_as_long_as_hertz_says():
     assert got.t[got.forces[:, 0].argmax()] == pytest.approx(0.042274, rel=1e-3)
 
 
-@pytest.mark.parametrize(
-    ("change", "power"), [({"height": 40.0}, 0.6), ({"boulder": 4e3}, 2 / 3), ({"lame": 4e6}, 0.4)]
-)
-def test_peaks_scale_as_hertz_says(change, power):
+@pytest.mark.parametrize(("name", "power"), [("height", 0.6), ("boulder", 2 / 3), ("lame", 0.4)])
+def test_peaks_scale_as_hertz_says(name, power):
     first = {"boulder": 1e3, "height": 10.0, "lame": 1e6}
-    peaks = [strike(stiff(**case)).peaks[0] for case in (first, first | change)]
+    cases = first, first | {name: 4 * first[name]}
+    peaks = [strike(stiff(**case)).peaks[0] for case in cases]
     assert peaks[1] / peaks[0] == pytest.approx(4.0**power, rel=2e-3)
 
 

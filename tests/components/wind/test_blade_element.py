@@ -22,6 +22,7 @@ from rom.mbs.equations.packing import pack
 from rom.mbs.kernels.work import workspace
 
 WIND = 11.4
+BLOWN = [(False, (WIND, 2.0, 0.0)), (True, (WIND, 2.0, 0.0)), (False, (1.0, 9.0, 4.0))]
 
 
 def a_blade(n=6, **options):
@@ -109,10 +110,7 @@ def test_strips_of_a_rod_have_the_loads_of_the_rotor_whose_wake_leans(tilt, yaw,
         assert_allclose(found, expected, rtol=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("tower", "wind"),
-    [(False, (WIND, 2.0, 0.0)), (True, (WIND, 2.0, 0.0)), (False, (1.0, 9.0, 4.0))],
-)
+@pytest.mark.parametrize(("tower", "wind"), BLOWN)
 def test_tangents_of_the_wind_are_derivatives(tower, wind):
     """By rotations, by velocities, and by places if there is a tower, five metres behind.
 

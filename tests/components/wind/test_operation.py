@@ -19,6 +19,8 @@ from rom.errors import ConfigError
 RPM = np.pi / 30
 LATE = getattr(late, "py_func", late)
 SPEED, PITCH = 1.0, np.radians(3.7)  # rad/s, rad
+# wind [m/s] and pitch [rad] before and after
+STEPS = [((8.7, 0.0), (8.7, PITCH)), ((7.0, 0.0), (9.0, 0.0)), ((9.0, 0.0), (4.5, 0.0))]
 
 
 def straight():
@@ -49,10 +51,7 @@ def answer(t, slow, fast):
 
 
 def after_a_step(before, then, dt, cone=0.0):
-    """Steady inductions [m/s] before and after a step of wind or pitch, and what `operate` finds.
-
-    ``before`` and ``then`` are wind [m/s] and pitch [rad]; the step is at 1 s.
-    """
+    """Steady inductions [m/s] before and after a step at 1 s, and what `operate` finds."""
     blades = blading(0.0, cone)
     states = before, then
     rows = [rotor_load(blades, V, SPEED, pitch, n_azimuths=1).strip[0] for V, pitch in states]
@@ -76,10 +75,7 @@ def remembered(blades, axial, t, V, a):
     return share, axial[0] + change * share, np.abs(change).max()
 
 
-@pytest.mark.parametrize(
-    ("before", "then"),
-    [((8.7, 0.0), (8.7, PITCH)), ((7.0, 0.0), (9.0, 0.0)), ((9.0, 0.0), (4.5, 0.0))],
-)
+@pytest.mark.parametrize(("before", "then"), STEPS)
 def test_the_wake_of_each_strip_follows_a_step_as_the_closed_form_does(before, then):
     """Steady values and induction are constant after it; 1 / (1 - 1.3 a) is capped at a = 0.5."""
     dt, V = 0.01, then[0]
