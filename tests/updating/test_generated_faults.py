@@ -50,8 +50,7 @@ def moved_off(family, test, rng):
 
 
 def in_millimetres(family, test, rng):
-    factor = rng.choice([1000.0, 100.0])
-    points = factor * np.asarray(SENSORS.points)
+    points = rng.choice([1000.0, 100.0]) * np.asarray(SENSORS.points)
     words = ["millimetres taken", "centimetres taken"]
     return replace(test, sensors=Channels(points, SENSORS.directions)), words
 

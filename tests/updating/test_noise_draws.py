@@ -197,20 +197,6 @@ def test_deviations_say_what_estimated_weights_cost(family, exact):
     assert (np.diag(found.covariance)[:3] > 1.05 * np.diag(C)[:3]).all()
 
 
-def test_what_estimated_weights_cost_is_that_of_dense_matrices():
-    """Q = J^T V^-1 diag(V^-1) v^2 d^2 V^-1 J of one line, written out; a sensor stays out."""
-    rng, c = np.random.default_rng(0), 0.05
-    weight, varied = np.array([30.0, 0.0, 80.0, 10.0]), np.array([0.2, 0.3, 0.4, 0.1])
-    J = gauss(rng, (4, 2))
-    at = weight[None, :, None]
-    A = unsure(white(J[None, :, None], at, c), at, c, varied[None, :, None])[0, :, 0]
-    used = weight > 0
-    V = np.diag(weight[used] ** -2.0) + c**2
-    N, d = np.linalg.inv(V), weight[used] ** -2.0
-    Q = N @ np.diag(np.diag(N) * varied[used] ** 2 * d**2) @ N
-    assert_allclose(A.conj().T @ A, J[used].conj().T @ Q @ J[used], rtol=1e-10)
-
-
 def test_what_is_positive_has_the_mean_of_the_truncated_distribution():
     mean, s = np.array([-3.0, 0.0, 0.2, 4.0]), np.array([0.5, 1.0, 2.0, 0.1])
     found = positive_mean(mean, s**2)
@@ -306,13 +292,22 @@ def test_large_errors_have_the_variance_of_their_logarithm():
     assert_allclose(np.mean(np.abs(np.log(H) / error[:, 0, 0]) ** 2) / 2, 1.0, atol=0.03)
 
 
-def test_errors_that_sensors_share_are_made_independent():
-    """The covariance D^-1 + c^2 becomes the identity; a sensor without weight stays out."""
+def test_errors_that_sensors_share_and_what_estimated_weights_cost_are_those_of_dense_matrices():
     weight = np.array([30.0, 0.0, 80.0, 10.0])[None, :, None]
     A = white(np.eye(4)[None, :, None, :], weight, 0.05)[0, :, 0]
     own = np.diag(1 / np.where(weight, weight, np.inf).ravel() ** 2)
     covariance = A @ (own + 0.05**2) @ A.T
     assert_allclose(covariance, np.diag([1.0, 0.0, 1.0, 1.0]), atol=1e-12)
+    rng, c = np.random.default_rng(0), 0.05
+    weight, varied = np.array([30.0, 0.0, 80.0, 10.0]), np.array([0.2, 0.3, 0.4, 0.1])
+    J = gauss(rng, (4, 2))
+    at = weight[None, :, None]
+    A = unsure(white(J[None, :, None], at, c), at, c, varied[None, :, None])[0, :, 0]
+    used = weight > 0
+    V = np.diag(weight[used] ** -2.0) + c**2
+    N, d = np.linalg.inv(V), weight[used] ** -2.0
+    Q = N @ np.diag(np.diag(N) * varied[used] ** 2 * d**2) @ N
+    assert_allclose(A.conj().T @ A, J[used].conj().T @ Q @ J[used], rtol=1e-10)
 
 
 def test_noise_of_forces_and_few_averages_are_checked(exact):

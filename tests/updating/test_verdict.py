@@ -35,7 +35,7 @@ def test_a_direction_is_seen_from_half_its_range_on(width, named):
     assert [list(direction) for direction in found] == [["a"]] * named
 
 
-def test_each_row_is_over_its_own_expectation():
+def test_each_row_is_over_its_own_expectation_and_the_worst_sensor_is_so_by_its_deviations():
     """Ten values of twelve count: 20 numbers less 3; bands and sensors by theirs."""
     weight = np.ones(SHAPE)
     weight[5] = 0.0
@@ -47,10 +47,7 @@ def test_each_row_is_over_its_own_expectation():
     assert_allclose(values, [25 / 17, 15 / 10, 9 / 4])
     assert [row.quantity.split(",")[0] for row in report.rows[1:]] == ["worst sensor", "worst band"]
     assert "worst sensor, 1" in report.rows[1].quantity and "4 to 4 Hz" in report.rows[2].quantity
-
-
-def test_the_worst_sensor_is_so_by_its_deviations():
-    """Of two numbers 12 are 5 deviations too much, of ten 24 are 3.1: 14 more, but less rare."""
+    # of two numbers 12 are 5 deviations too much, of ten 24 are 3.1: 14 more, but less rare
     weight = np.ones(SHAPE)
     weight[1:, 0] = 0.0
     weight[5] = 0.0
@@ -65,6 +62,7 @@ def test_limits_are_those_of_all_trials_and_allow_for_what_is_not_known_of_varia
     weight[0] = 1.0
     report = verdict(Sums(np.eye(1), np.zeros(1), 2 * weight), data_of(weight), 0, {}, [])
     assert report.rows[1].limit == f"<= {-np.log(0.0005):g}"
+    # half the freedom: chi-square of two; a scale that varies by a half: F of two and four
     half = chi_row("x", 1.0, 4.0, 1, known=0.5)
     assert half.limit == f"<= {-np.log(0.001):g}"
     scaled = chi_row("x", 1.0, 2.0, 1, scale=0.5)

@@ -251,10 +251,8 @@ def test_elimination_along_the_rod_is_the_dense_solution():
     assert_allclose(one.lam, two.lam, atol=1e-9 * np.abs(two.lam).max())
 
 
-# ## A law from outside: a spring and a damper between two origins
-
-
 def spring(numbers, pose, wanted, answer, _space):
+    """A law from outside: a spring and a damper between two origins."""
     k, c, free = numbers[0], numbers[1], numbers[2]
     s, out = carray(pose, (26,)), carray(answer, (302,))
     out[:] = 0.0

@@ -156,7 +156,7 @@ def test_pressure_and_void_complement_each_other():
     assert_allclose(film(b, STATE, RATE, **RUN, warm=start).P, f.P, atol=1e-12)
 
 
-def test_oil_is_conserved_around_the_bearing():
+def test_oil_is_conserved_and_both_laws_agree_when_it_comes_in_at_the_largest_gap():
     b = bearing(1.0, [Groove(np.pi)], cavitation="jfo")
     f = film(b, [0.5e-4, 0.0], **RUN)
     into, out = f.flow_around[[90, 89]]
@@ -164,9 +164,6 @@ def test_oil_is_conserved_around_the_bearing():
     void = ~np.any(f.active, axis=1) & (np.arange(180) != 90)
     assert void.sum() > 40
     assert_allclose(f.flow_around[void], out, rtol=1e-10)
-
-
-def test_both_laws_agree_when_oil_comes_in_at_the_largest_gap():
     laws = (bearing(1.0, [Groove(np.pi)], cavitation=law) for law in ("reynolds", "jfo"))
     one, other = (film(b, [0.6e-4, 0.0], **RUN) for b in laws)
     assert_allclose(one.P, other.P, atol=1e-12)

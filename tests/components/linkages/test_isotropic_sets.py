@@ -186,16 +186,7 @@ def test_a_double_point_is_no_curve():
     assert_allclose(found.q, 0.0, atol=1e-4)
 
 
-def test_slides_have_the_tool_isotropy_of_their_masses():
-    """2 sqrt(m2 (m1 + m2)) / (m1 + 2 m2) in any coordinates of the plane, on any rectangle."""
-    m1, m2 = 3.0, 2.0
-    slides = CrossSlides((m1, m2))
-    found = tool_isotropy(slides.inertia, slides.tip, ((0, 0.5), (-1, 2)), n=10)
-    assert found.mean == pytest.approx(2 * np.sqrt(m2 * (m1 + m2)) / (m1 + 2 * m2), rel=1e-9)
-    assert found.area == pytest.approx(1.5, rel=1e-9)
-
-
-def test_the_polar_arm_has_the_tool_isotropy_of_its_closed_form():
+def test_slides_and_the_polar_arm_have_the_tool_isotropy_of_their_closed_forms():
     """The tool feels m along and m + J / s^2 across; integrated over s ds by w = 2 m s^2 + J."""
     m, J, (s1, s2) = 2.0, 0.06, (0.1, 0.6)
 
@@ -209,6 +200,12 @@ def test_the_polar_arm_has_the_tool_isotropy_of_its_closed_form():
     found = tool_isotropy(ARM.inertia, ARM.tip, (None, (s1, s2)), n=300)
     assert found.mean == pytest.approx(expected, rel=1e-5)
     assert found.area == pytest.approx(np.pi * (s2**2 - s1**2), rel=1e-9)
+    # of slides in any coordinates of the plane, on any rectangle
+    m1, m2 = 3.0, 2.0
+    slides = CrossSlides((m1, m2))
+    found = tool_isotropy(slides.inertia, slides.tip, ((0, 0.5), (-1, 2)), n=10)
+    assert found.mean == pytest.approx(2 * np.sqrt(m2 * (m1 + m2)) / (m1 + 2 * m2), rel=1e-9)
+    assert found.area == pytest.approx(1.5, rel=1e-9)
 
 
 def test_a_tool_without_a_machine_is_isotropic():
@@ -409,9 +406,6 @@ def test_loci_within_a_window_are_those_of_the_torus():
     assert all(np.allclose(end[0], centre[0]) for c in halves for end in c[[0, -1]]
                if np.abs(c - centre).max() < 1.2 * reach.max())  # fmt: skip
     assert not any(np.array_equal(c[0], c[-1]) for c in halves)
-
-
-# --- what cannot be ---
 
 
 NOWHERE = ((0, 0.1), (1.3, 1.5))

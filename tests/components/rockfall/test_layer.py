@@ -18,9 +18,8 @@ HERTZ_SLOPE = np.sqrt(2) / np.pi / (1 - 0.25**2)
 
 def baseline(**change):
     """The illustration of `test_rockfall`, with the cushion of the default."""
-    g = rockfall.Gallery(4000.0, 15.0, 2500.0, Cushion.of_sand(4000.0, 1e6), rockfall.Shear(2e9),
-                Slab.of_mass(6000.0, 1.2e8))  # fmt: skip
-    return replace(g, **change)
+    parts = Cushion.of_sand(4000.0, 1e6), rockfall.Shear(2e9), Slab.of_mass(6000.0, 1.2e8)
+    return replace(rockfall.Gallery(4000.0, 15.0, 2500.0, *parts), **change)
 
 
 @pytest.mark.parametrize("height", [2.0, 15.0, 40.0])
@@ -137,23 +136,13 @@ def test_a_shallow_contact_on_a_thick_layer_loses_no_digits():
     assert layer.force(0.09) == pytest.approx(3e6 * np.pi * way[0], rel=1e-6)
 
 
-def test_contact_grows_with_depth_and_the_load_spreads():
+def test_contact_spreads_the_plug_has_the_mass_of_its_cones_and_its_ring_shears_as_lame_says():
     layer = Layer(3e6, 0.6, 0.9)
     assert layer.contact(0.0) == 0.0
     assert layer.contact(0.6) == layer.contact(0.8) == 0.6  # the equator
     assert layer.contact(0.3) == pytest.approx(np.sqrt(0.6**2 - 0.3**2))  # a chord
     assert layer.spread(0.3) == pytest.approx(layer.contact(0.3) + 0.3)  # 2:1 over 0.6 m
     assert layer.spread(0.0) == pytest.approx(0.45)
-
-
-def test_a_thinner_layer_is_stiffer_and_strikes_harder():
-    layers = (Layer.of_sand(4000.0, 1e6, e) for e in (5.0, 2.0, 1.2))
-    peaks = [strike(baseline(cushion=layer)).peaks[0] for layer in layers]
-    assert peaks[0] < peaks[1] < peaks[2]
-    assert peaks[0] == pytest.approx(strike(baseline()).peaks[0], rel=0.1)
-
-
-def test_the_plug_has_the_mass_of_its_cones_and_its_ring_shears_as_lame_says():
     layer = Layer(3e6, 0.6, 0.9, angle=0.4)
     r = layer.spread(0.3)
     sand = quad(lambda z: np.pi * (layer.contact(0.3) + np.tan(0.4) * z) ** 2, 0, 0.6)[0]
@@ -168,6 +157,13 @@ def test_the_plug_has_the_mass_of_its_cones_and_its_ring_shears_as_lame_says():
     assert shear.stiffness == pytest.approx(1 / way)
     assert shear.capacity == pytest.approx(1e6 * 2 * np.pi * (r + 0.125) * 0.25)
     assert shear.reinforced == 1e7
+
+
+def test_a_thinner_layer_is_stiffer_and_strikes_harder():
+    layers = (Layer.of_sand(4000.0, 1e6, e) for e in (5.0, 2.0, 1.2))
+    peaks = [strike(baseline(cushion=layer)).peaks[0] for layer in layers]
+    assert peaks[0] < peaks[1] < peaks[2]
+    assert peaks[0] == pytest.approx(strike(baseline()).peaks[0], rel=0.1)
 
 
 def test_the_modulus_of_a_layer_is_varied_as_its_stiffness():

@@ -256,9 +256,6 @@ def test_slow_units_have_the_error_of_their_teeth(helix, rel):
     assert linear.error_rms == pytest.approx(np.std(error), rel=rel)
 
 
-# --- what cannot be ---
-
-
 test_what_cannot_be_is_said = refused(
     (lambda: unit(torque=-5.0), "contact is lost: a load of"),
     (lambda: unit(speed=0.0), "must be positive"),

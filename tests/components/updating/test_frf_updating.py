@@ -208,12 +208,16 @@ def test_equations_converge_as_newton_does():
     assert error[0] < 1e-3 and error[1] < 1e-6 and error[-1] < 1e-9
 
 
-def test_the_common_basis_holds_both_sets():
+def test_the_common_basis_holds_both_sets_and_criteria_forgive_a_factor():
     other = responses(BEAM, START, GUESS, OMEGA, INPUTS)
     U = updating.common_basis(EXACT, other, 6)
     assert_allclose(U.T @ U, np.eye(6), atol=1e-12)
     for H in (EXACT, other):
         assert data.deviation(U @ (U.T @ H), H).max() < 0.06
+    assert_allclose(data.frac(EXACT, 3j * EXACT), 1.0)
+    assert_allclose(np.diag(data.fdac(EXACT, -2 * EXACT)), 1.0)
+    assert data.frac(EXACT, other).max() < 0.9
+    assert_allclose(data.deviation(1.5 * EXACT, EXACT), 0.5)
 
 
 def test_one_linear_solution_is_exact_when_everything_is_measured():
@@ -299,14 +303,6 @@ def test_lines_beside_the_poles_forgive_wrong_damping():
     tests = (measured(weights=x) for x in (relative, w * relative))
     plain, careful = (response_function_method(BEAM, test, START, C, steps=12) for test in tests)
     assert np.abs(careful.p - TRUE).max() < 0.7 * np.abs(plain.p - TRUE).max()
-
-
-def test_criteria_say_one_for_equals_and_forgive_a_factor():
-    other = responses(BEAM, START, GUESS, OMEGA, INPUTS)
-    assert_allclose(data.frac(EXACT, 3j * EXACT), 1.0)
-    assert_allclose(np.diag(data.fdac(EXACT, -2 * EXACT)), 1.0)
-    assert data.frac(EXACT, other).max() < 0.9
-    assert_allclose(data.deviation(1.5 * EXACT, EXACT), 0.5)
 
 
 def airframe_frequencies(bed, hangers=()):
