@@ -42,7 +42,6 @@ def responses(family):
 
 
 def written(folder, H, *, nodes=None, unit="m/s^2/N", length="m", force=FORCE):
-    """A table of an analyser and one of its nodes."""
     names = ["Frequency [Hz]"]
     by = f"{force[0]}+{force[1]}"
     for node, axis in SENSORS:

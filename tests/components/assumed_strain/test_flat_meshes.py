@@ -32,8 +32,6 @@ Mesh.CharacteristicLengthMax = 0.1;
 
 @pytest.fixture
 def drawn(tmp_path):
-    """The function that meshes a geometry."""
-
     def meshed(text):
         (tmp_path / "drawn.geo").write_text(text)
         return read_triangles(tmp_path / "drawn.geo")

@@ -24,7 +24,6 @@ def pair(helix=0.0, **more):
 
 
 def stiffness(p, **more):
-    """Of a pair of teeth at the pitch point."""
     return gear_mesh.pair_stiffness(p, p.pitch_point, force=3e5, **more)
 
 

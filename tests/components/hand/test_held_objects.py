@@ -28,7 +28,6 @@ def at_rest(mech):
 
 
 def gripping(held, mu, gravity, leaves=None):
-    """Three fingers close within 0.25 s."""
     law = replace(SKIN_CONTACT, mu=mu)
     drive = Drive(pull=lambda t: 12 * MM * np.sin(np.pi / 2 * min(t / 0.25, 1.0)) ** 2)
     fingers = {name: one for name, one in hand(n=2).items() if name in THREE}

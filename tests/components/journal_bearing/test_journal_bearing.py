@@ -70,7 +70,6 @@ SHORT = [bearings.numbers(line) for line in """
 
 
 def short_rest(e):
-    """Where a journal rests in a short bearing, over the clearance."""
     attitude = journal_bearing.short_attitude(e)
     return e * np.array([np.cos(attitude), np.sin(attitude)])
 

@@ -371,7 +371,6 @@ BRIEF_TABLE, BRIEF = masonry.Table([0.0, 0.05], [0.0, 1.0]), dict(t_end=0.1, dt=
 
 
 def acted(*actions):
-    """The call that lets actions work on a stone."""
     return lambda: simulate(on_ground(stone(box(), **SOFT)), **BRIEF, actions=actions)
 
 

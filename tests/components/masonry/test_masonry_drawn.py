@@ -69,7 +69,6 @@ def test_a_buttress_tips_at_the_width_that_statics_says():
 
 
 def stones_of(*outlines):
-    """Squares of two triangles each."""
     first = 4 * np.arange(len(outlines))[:, None]
     T = np.hstack([first, first + 1, first + 2, first, first + 2, first + 3]).reshape(-1, 3)
     return np.vstack(outlines), T, {f"stone {k}": [2 * k, 2 * k + 1] for k in range(len(outlines))}

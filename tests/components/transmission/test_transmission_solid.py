@@ -154,7 +154,6 @@ def test_a_solid_spins_as_a_beam_in_axes_that_do_not_spin(still, beam):
 
 
 def unit(shafts, nodes):
-    """Both shafts alike, 24 to 36 teeth of module 4."""
     loose = GearPair((24, 36), 4e-3, 0.03)
     pair = replace(loose, centre_distance=loose.distance + 5e-5)
     a, wheel, b = nodes

@@ -111,7 +111,6 @@ def test_gravity_shakes_a_turning_blade_once_a_turn():
 
 @pytest.mark.parametrize("azimuth", [0.0, 2 * np.pi / 3])
 def test_blades_of_one_rotor_are_alike(azimuth):
-    """Without gravity the deflection does not depend on where a blade starts."""
     one = run_up(blade(12, azimuth=azimuth), t_end=4.0, dt=0.04)
     other = run_up(blade(12, azimuth=1.0), t_end=4.0, dt=0.04)
     assert_allclose(one.tip, other.tip, atol=1e-8)
