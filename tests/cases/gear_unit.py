@@ -53,12 +53,10 @@ def unit(torque=200.0, speed=100 * np.pi, helix=0.0, width=0.04, clearance=50e-6
 
 
 def rigid_unit(**more):
-    """`unit` with rigid shafts."""
     return with_shafts(unit(**more), tuple(RigidShaft(*size, SPAN) for size in SIZES))
 
 
 def plane(unit):
-    """The unit with teeth of this program."""
     mesh = unit.mesh
     own = PlaneMesh(mesh.pair, mesh.stiffness, mesh.correction, mesh.damping, mesh.cells)
     return replace(unit, mesh=own)
@@ -216,9 +214,6 @@ def repeating(state, steps, alpha=-0.05, rtol=1e-6):
     raise AssertionError(f"the motion does not close by {gap:.3g}")
 
 
-# --- teeth in one position ---
-
-
 class PlaneMesh(Mesh):
     """Two wheels whose flanks approach to the first order of shifts along the axis and tilts."""
 
@@ -258,17 +253,11 @@ class PlaneMesh(Mesh):
 
 @dataclass(frozen=True)
 class Line:
-    """The line of action of wheels whose centres moved.
+    """The line of action of wheels whose centres moved."""
 
-    Attributes:
-        alpha: pressure angle [rad].
-        turn: of the line of centres [rad].
-        datum: pressure angle at the datum [rad].
-    """
-
-    alpha: float
-    turn: float
-    datum: float
+    alpha: float  # pressure angle [rad]
+    turn: float  # of the line of centres [rad]
+    datum: float  # pressure angle at the datum [rad]
 
     @classmethod
     def of(cls, pair, q):

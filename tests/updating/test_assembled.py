@@ -9,31 +9,23 @@ from numpy.testing import assert_allclose
 
 import rom
 from cases.components import updating
-from cases.components.updating import BOLTS, assert_alike, halves, noisy_test, refuse
+from cases.components.updating import BOLTS, assert_alike, fed, halves, noisy_test, refuse, walked
 from rom.body.recovery import StressRecovery
 from rom.components.families.parameters import centre
 from rom.components.updating.family_model import Parts
 from rom.components.updating.models import modal
 from rom.components.updating.normal_equations import responses_at
-from rom.components.updating.observers.operation import discrete
 from rom.errors import InterfaceError
 from rom.parametric import FamilyAssembly
-from rom.updating import (
-    AddedMass,
-    Channels,
-    Drift,
-    GroundSpring,
-    JointSpring,
-    Sensors,
-    candidates,
-    parameter_tracker,
-    place,
-    tracker,
-)  # fmt: skip
+from rom.updating import AddedMass, Channels, Drift, GroundSpring, JointSpring, Sensors
 
+tracked = rom.updating.parameter_tracker
 HELD = (("frame", "root"),)
 LINES = np.linspace(20, 1000, 150)
-AVERAGES, LEVEL = 50, 0.03
+TEST = {"level": 0.03, "averages": 50}
+POINTS = [[x, y, 0.08] for x in (0.25, 0.375, 0.625, 0.75, 1.0) for y in (0.0, 0.1)]
+CHANNELS = updating.crossed(POINTS), Channels([[0.75, 0.1, 0.0]], [[0, 1, 2]])
+TRACKED = {"dt": 1e-3, "walk": 100.0, "unmodelled": 1e-3, "damping": 0.02}
 
 
 @pytest.fixture(scope="module")
@@ -51,18 +43,12 @@ def joined(families):
     return FamilyAssembly(families, ((("frame", "tip"), ("arm", "root")),))
 
 
-def channels():
-    points = [[x, y, 0.08] for x in (0.25, 0.375, 0.625, 0.75, 1.0) for y in (0.0, 0.1)]
-    return updating.crossed(points), Channels([[0.75, 0.1, 0.0]], [[0, 1, 2]])
-
-
 def model_of(family, attached, fixed=HELD):
-    return updating.model_of(family, channels(), fixed, attached)
+    return updating.model_of(family, CHANNELS, fixed, attached)
 
 
-def measured(family, attached, true, seed=0):
-    how = {"level": LEVEL, "averages": AVERAGES, "seed": seed, "attached": attached, "fixed": HELD}
-    return noisy_test(family, true, channels(), LINES, **how)
+def measured(family, attached, true):
+    return noisy_test(family, true, CHANNELS, LINES, attached=attached, fixed=HELD, **TEST)
 
 
 def test_coupled_families_have_the_frequencies_of_their_assembly(joined):
@@ -78,7 +64,7 @@ def test_coupled_families_have_the_frequencies_of_their_assembly(joined):
             * (np.asarray(side.points)[:, :1] > 0.5 if name == "arm"
                else np.asarray(side.points)[:, :1] < 0.5)
             for name, body in joined.nominal.bodies.items())
-        for side in channels()
+        for side in CHANNELS
     )  # fmt: skip
     w = 2 * np.pi * LINES
     H = np.einsum("sn,fn,en->fse", seen, 1 / (modes.omega**2 - w[:, None] ** 2), driven)
@@ -87,7 +73,7 @@ def test_coupled_families_have_the_frequencies_of_their_assembly(joined):
     assert_allclose(same, H, rtol=1e-6, atol=1e-9 * np.abs(H).max())
 
 
-def test_two_bodies_on_a_spring_swing_as_two_masses(bolted):
+def test_a_soft_spring_lets_two_masses_swing_and_a_stiff_joint_couples_them(joined, bolted):
     """A soft spring along x: omega^2 = k (1/m + 1/m) of two halves; 11 other motions are free."""
     k = 1e3
     soft = JointSpring(("frame", "tip"), ("arm", "root"), (k, 0, 0), 0.1, 10.0)
@@ -96,10 +82,12 @@ def test_two_bodies_on_a_spring_swing_as_two_masses(bolted):
     half = 7850.0 * 0.5 * 0.1 * 0.08
     assert_allclose(modal(model.at(np.zeros(3)), ()).lam[11], 2 * k / half, rtol=1e-5)
     assert model_of(bolted, {"bolts": BOLTS}, fixed=()).n_rigid == 6
+    stiff = replace(BOLTS, stiffness=(1e14,) * 3 + (1e12,) * 3)
+    found = modal(model_of(bolted, {"bolts": stiff}).at(np.zeros(3)), ()).lam[:6]
+    assert_allclose(found, modal(model_of(joined, {}).at(np.zeros(2)), ()).lam[:6], rtol=1e-4)
 
 
 def test_a_spring_reaches_a_body_that_is_apart_by_a_rigid_arm(bolted):
-    """No rigid motion of the whole stretches it, wherever its ends are."""
     parts = Parts.of(bolted)
     long = JointSpring(("frame", "root"), ("arm", "tip"), (3.0, 4.0, 5.0), 0.1, 10.0)
     K, _ = long.term(parts)
@@ -111,12 +99,6 @@ def test_a_spring_reaches_a_body_that_is_apart_by_a_rigid_arm(bolted):
     moved[parts.columns["arm"].start + np.array([2, 5])] = 2.0, 1.0  # along and about z
     y = 0.05  # of the root, which is at x = 0: along x the turn moves it by -y
     assert_allclose(moved @ K @ moved, 5.0 * 2.0**2 + 3.0 * y**2)
-
-
-def test_a_stiff_joint_is_a_coupling(joined, bolted):
-    stiff = replace(BOLTS, stiffness=(1e14,) * 3 + (1e12,) * 3)
-    found = modal(model_of(bolted, {"bolts": stiff}).at(np.zeros(3)), ()).lam[:6]
-    assert_allclose(found, modal(model_of(joined, {}).at(np.zeros(2)), ()).lam[:6], rtol=1e-4)
 
 
 def test_a_joint_and_both_moduli_are_found(bolted):
@@ -137,7 +119,7 @@ def test_a_joint_and_both_moduli_are_found(bolted):
     assert bodies["arm"].provenance["updating"]["factors"] == found.factors
     alone = bolted.families["arm"].at(E=found.factors["arm.E"])
     assert_allclose(bodies["arm"].frequencies(4), alone.frequencies(4), rtol=1e-12)
-    drawn = found.drawn(LINES[:3], *channels(), n=2)
+    drawn = found.drawn(LINES[:3], *CHANNELS, n=2)
     assert drawn.shape == (2, 3, 20, 1)
 
 
@@ -153,25 +135,31 @@ def test_a_joint_taken_for_rigid_is_refused_and_a_missing_mass_is_named(joined, 
     assert max(found.scores, key=lambda name: abs(found.scores[name])) == "cable"
 
 
-def test_an_assembly_of_one_is_planned_as_a_body(families):
+def test_an_assembly_of_one_is_planned_and_tracked_as_a_body(families):
     family, one = families["frame"], FamilyAssembly({"frame": families["frame"]})
-    offered = candidates(family.body, 3, fixed=("root",))
+    offered = rom.updating.candidates(family.body, 3, fixed=("root",))
     load = AddedMass("tip", 2.0, 0.1, 10.0)
     options = {"n_sensors": 2, "noise": 0.05}
-    alone = place(family, offered, offered, LINES[::5], fixed=("root",),
+    alone = rom.updating.place(family, offered, offered, LINES[::5], fixed=("root",),
                   attached={"load": load}, **options)  # fmt: skip
     named = replace(offered, bodies="frame")
-    same = place(one, named, named, LINES[::5], fixed=HELD,
+    same = rom.updating.place(one, named, named, LINES[::5], fixed=HELD,
                  attached={"load": replace(load, at=("frame", "tip"))}, **options)  # fmt: skip
     assert alone.names[:2] == ("E", "load") and same.names[:2] == ("frame.E", "load")
     assert_allclose(same.covariance, alone.covariance, rtol=1e-8)
     for line, own in zip(same.csv().split(), alone.csv().split(), strict=True):
         assert line == f"{own},{'body' if own.startswith('kind') else 'frame'}"
+    drift = Drift(0.1, 0.02)
+    alone = tracked(family, *watched(), parameters={"E": drift}, fixed=("root",), **TRACKED)
+    same = tracked(one, *watched("frame"), parameters={"frame.E": drift}, fixed=HELD, **TRACKED)
+    y = np.sqrt(alone.R) * np.random.default_rng(0).standard_normal((200, 3))
+    names = ("values", "forces", "factors", "surprise")
+    assert_alike(same.run(y), alone.run(y), names, 1e-8)
 
 
 def test_channels_name_the_body_on_which_they_lie(bolted):
-    """Points of the joint are on both; each body has motions of its own there."""
-    bodies, parts = Parts.of(bolted).bodies, Parts.of(bolted)
+    parts = Parts.of(bolted)
+    bodies = parts.bodies
     at = [[0.5, 0.1, 0.08]] * 2, [[0, 0, 1]] * 2
     both = Channels(*at, ("arm", "frame"))
     rows = both.rows(bodies, "sensor")
@@ -188,34 +176,16 @@ def test_channels_name_the_body_on_which_they_lie(bolted):
         (lambda: both.rows(bodies["arm"], "sensor"), "lies on 'arm'; give none of this body"),
         (lambda: Channels(*at, ("arm",)), "1 names of bodies for 2 channels"),
     )
-    offered = candidates(bolted, 12, fixed=HELD)
+    offered = rom.updating.candidates(bolted, 12, fixed=HELD)
     assert set(offered.bodies) == {"frame", "arm"} and len(offered.points) == 36
 
 
-TRACKED = {"dt": 1e-3, "walk": 100.0, "unmodelled": 1e-3, "damping": 0.02}
-
-
 def watched(body=None):
-    up, ends = [[0.0, 0.0, 1.0]], [[0.5, 0.1, 0.08]]
-    sensors = (
-        Sensors(Channels([[0.125, 0.05, 0.08]], [[1, 0, 0]]), "strain", 1e-8),
-        Sensors(Channels(ends, up, body), "acceleration", 0.1),
-        Sensors(Channels(ends, up, body), "displacement", 1e-6),
-    )
-    return sensors, Channels([[0.375, 0.1, 0.08]], up), (Sensors(Channels(ends, up, body),
-                                                                 "velocity"),)  # fmt: skip
-
-
-def test_an_assembly_of_one_is_tracked_as_a_body(families):
-    family, one = families["frame"], FamilyAssembly({"frame": families["frame"]})
-    drift = Drift(0.1, 0.02)
-    alone = parameter_tracker(family, *watched(), parameters={"E": drift}, fixed=("root",),
-                              **TRACKED)  # fmt: skip
-    same = parameter_tracker(one, *watched("frame"), parameters={"frame.E": drift}, fixed=HELD,
-                             **TRACKED)  # fmt: skip
-    y = np.sqrt(alone.R) * np.random.default_rng(0).standard_normal((200, 3))
-    names = ("values", "forces", "factors", "surprise")
-    assert_alike(same.run(y), alone.run(y), names, 1e-8)
+    up = [[0.0, 0.0, 1.0]]
+    end = Channels([[0.5, 0.1, 0.08]], up, body)
+    strain = Sensors(Channels([[0.125, 0.05, 0.08]], [[1, 0, 0]]), "strain", 1e-8)
+    sensors = strain, Sensors(end, "acceleration", 0.1), Sensors(end, "displacement", 1e-6)
+    return sensors, Channels([[0.375, 0.1, 0.08]], up), (Sensors(end, "velocity"),)
 
 
 def test_bodies_that_are_coupled_are_tracked_with_their_own_damping(families):
@@ -224,18 +194,16 @@ def test_bodies_that_are_coupled_are_tracked_with_their_own_damping(families):
     bodies = {name: replace(one.body, D=beta * one.body.K) for name, one in families.items()}
     whole = rom.Assembly(bodies, couplings)
     sensors, force, _ = watched("arm")
-    t = tracker(whole, sensors, force, sensors[2:], dt=dt, walk=1.0, fixed=HELD)
+    t = rom.updating.tracker(whole, sensors, force, sensors[2:], dt=dt, walk=1.0, fixed=HELD)
     modes = whole.modes(fixed=HELD)
     damped = np.array([np.roots([1.0, beta * w**2, w**2]) for w in modes.omega]).ravel()
     found, expected = np.linalg.eigvals(t.A), np.r_[np.exp(damped * dt), 1.0]
     assert found.size == expected.size
     assert max(np.abs(found - one).min() for one in expected) < 1e-7
     motion = np.linalg.solve(np.eye(len(t.A) - 1) - t.A[:-1, :-1], t.A[:-1, -1])
-    ends = (sensors[2].channels, "arm"), (force, "frame")
-    tip, driven = (
-        replace(c, bodies=None).rows(bodies[name], "channel") @ modes.shapes[name]
-        for c, name in ends
-    )
+    end = replace(sensors[2].channels, bodies=None).rows(bodies["arm"], "channel")
+    tip = end @ modes.shapes["arm"]
+    driven = force.rows(bodies["frame"], "channel") @ modes.shapes["frame"]
     assert_allclose(t.W[0, :-1] @ motion, np.sum(tip * driven / modes.omega**2), rtol=1e-6)
 
 
@@ -249,62 +217,43 @@ def test_a_body_beside_one_that_it_does_not_touch_is_tracked_as_alone(families):
     sensors, force, _ = watched("frame")
     options = dict(TRACKED, parameters={"E": Drift(0.1, 0.02)})
     wanted = (Sensors(Channels(at, [[1, 0, 0]]), "stress"),)
-    alone = parameter_tracker(family, watched()[0], force, wanted, fixed=("root",), **options)
+    alone = tracked(family, watched()[0], force, wanted, fixed=("root",), **options)
     options["parameters"] = {"frame.E": Drift(0.1, 0.02)}
     two = FamilyAssembly({"arm": families["arm"], "frame": family})
-    same = parameter_tracker(two, sensors, force, wanted, fixed=(("arm", "root"), *HELD), **options)
+    same = tracked(two, sensors, force, wanted, fixed=(("arm", "root"), *HELD), **options)
     y = np.sqrt(alone.R) * rng.standard_normal((200, 3))
     assert_alike(same.run(y), alone.run(y), ("values", "deviations", "factors"), 1e-8)
 
 
 @pytest.mark.long  # that of a family is tried in test_parameter_tracking.py
 def test_the_fmu_of_an_assembly_follows_as_python_does(bolted, tmp_path):
-    """Bolts and the modulus of one body; names of parameters carry that of the body."""
     fmus = importlib.import_module("cases.mbs.fmu_instance")  # skips where fmpy is not installed
     drifts = {"arm.E": Drift(0.05, 0.05), "bolts": Drift(0.05, 0.05)}
-    t = parameter_tracker(bolted, *watched("arm"), parameters=drifts, fixed=HELD,
+    t = tracked(bolted, *watched("arm"), parameters=drifts, fixed=HELD,
                           attached={"bolts": BOLTS}, **TRACKED)  # fmt: skip
     y = 30 * np.sqrt(t.R) * np.sin(np.arange(60)[:, None] * [0.5, 0.9, 0.2])
     expected = t.run(y)
     one = fmus.Instance(rom.io.write_observer_fmu(t, tmp_path / "bolted.fmu"), tmp_path).begin()
-    wanted = ("velocity[1]", "force[1]", "factor.'arm.E'", "factor.bolts")
-    found = []
-    for k, sample in enumerate(y):
-        for name, value in zip(("strain", "acceleration", "displacement"), sample, strict=True):
-            one.set(f"sensor.{name}[1]", value)
-        one.fmu.doStep(k * TRACKED["dt"], TRACKED["dt"])
-        found.append(one.get(*(f"estimate.{name}" for name in wanted)))
+    sensors = [f"{name}[1]" for name in ("strain", "acceleration", "displacement")]
+    names = ("velocity[1]", "force[1]", "factor.'arm.E'", "factor.bolts")
+    found = fed(one, sensors, y, [f"estimate.{name}" for name in names], TRACKED["dt"])
     same = np.hstack([expected.values, expected.forces, expected.factors])
     scale = np.abs(same).max(axis=0)
-    assert_allclose(np.array(found) / scale, same / scale, rtol=0, atol=1e-10)
+    assert_allclose(found / scale, same / scale, rtol=0, atol=1e-10)
 
 
 def test_a_joint_that_loosens_is_followed(bolted):
-    """A record of what the filter assumes: the stiffness of the bolts walks."""
     up = [[0.0, 0.0, 1.0]]
-    sensors = tuple(
-        Sensors(Channels([[0.5, 0.1, 0.08]], up, name), "displacement", 1e-8)
-        for name in bolted.families
-    )
-    force, wanted = Channels([[1.0, 0.1, 0.08]], up), (Sensors(
-        Channels([[1.0, 0.1, 0.08]], up), "displacement"),)  # fmt: skip
+    ends = (Channels([[0.5, 0.1, 0.08]], up, name) for name in bolted.families)
+    sensors = tuple(Sensors(end, "displacement", 1e-8) for end in ends)
+    force = Channels([[1.0, 0.1, 0.08]], up)
+    wanted = (Sensors(force, "displacement"),)
     options = dict(TRACKED, dt=2e-4, walk=1e4, first=10.0, attached={"bolts": BOLTS}, fixed=HELD)
-    t = parameter_tracker(bolted, sensors, force, wanted,
+    t = tracked(bolted, sensors, force, wanted,
                           parameters={"bolts": Drift(0.02, 0.05)}, **options)  # fmt: skip
-    rng, n = np.random.default_rng(3), 3000
-    x, y, true = np.zeros(len(t.assumed.before(t.operation))), np.zeros((n, 2)), np.zeros(n)
-    p = 0.02 * rng.standard_normal(1)
-    for k in range(n):
-        if k % 100 == 0:
-            p = p + 0.05 * np.sqrt(100 * t.assumed.dt) * rng.standard_normal(1)
-            at = t.operation.at(p)
-            step, Q = discrete(at.A, t.assumed.white(t.operation), t.assumed.dt)
-            root = np.linalg.cholesky(Q + 1e-13 * np.diag(np.diag(Q)))
-        y[k] = at.C @ x + np.sqrt(t.R) * rng.standard_normal(2)
-        true[k] = np.exp(p[0])
-        x = step @ x + root @ rng.standard_normal(len(x))
+    true, _, y = walked(t, np.random.default_rng(3), 3000, every=100)
     found = t.run(y)
-    off = np.log(found.factors[:, 0] / true) / found.factor_deviations[:, 0]
+    off = (np.log(found.factors) - true)[:, 0] / found.factor_deviations[:, 0]
     assert found.factor_deviations[-1, 0] < 0.03
     assert np.mean(np.abs(off[500:]) < 2.5) > 0.9
     assert_allclose(found.surprise[500:].mean(), 2.0, rtol=0.12)
@@ -319,12 +268,14 @@ def test_what_does_not_fit_an_assembly_is_named(families, bolted):
         return rom.update(bolted, test, fixed=fixed, attached={"bolts": attached})
 
     seam = replace(test, inputs=Channels([[0.5, 0.1, 0.08]], [[0, 0, 1]]))
-    arm = families["arm"]
+    arm, single = families["arm"], families["frame"]
     two = replace(arm, parameters={"b.E": arm.parameters["E"]})
     inches = replace(arm, body=replace(arm.body, units="mm-t-s"))
     one, leg, knee = AddedMass("tip", 1.0, 0.1, 1.0), ("leg", "tip"), ("arm", "knee")
-    whole, single = updated(), families["frame"]
-    part, place = rom.update(single, alone(single), fixed=("root",)), "must be .body, interface"
+    there = (Channels([[0.375, 0.1, 0.08]], [[0, 1, 2]]),) * 2
+    own = noisy_test(single, {}, there, LINES, fixed=("root",), **TEST)
+    part, whole = rom.update(single, own, fixed=("root",)), updated()
+    place = "must be .body, interface"
     refuse(
         (lambda: updated(seam), "input 0 at .* is as near to one as to another of 'frame', 'arm'"),
         (lambda: updated(attached=one), "'tip' must be .body, interface. of .'arm', 'frame'"),
@@ -342,10 +293,3 @@ def test_what_does_not_fit_an_assembly_is_named(families, bolted):
         (lambda: part.assembly, "one body was updated"),
         (lambda: whole.body, "has several bodies"),
     )
-
-
-def alone(family):
-    """A test of one body."""
-    sensors = Channels([[0.375, 0.1, 0.08]], [[0, 1, 2]])
-    how = {"level": LEVEL, "averages": AVERAGES, "fixed": ("root",)}
-    return noisy_test(family, {}, (sensors,) * 2, LINES, **how)

@@ -51,31 +51,32 @@ def there(folder, monkeypatch):
     monkeypatch.chdir(folder)
 
 
-def answered(words, capsys, code=0, file="test.h5"):
-    return told(["update", file, *WORDS, *words, "--json"], capsys, code)
-
-
 def told(words, capsys, code=0):
-    capsys.readouterr()
-    assert main(words) == code
+    assert ended(words, capsys) == code
     found = json.loads(capsys.readouterr().out)
     assert errors(found, schema("update")) == []
     return found
 
 
-def refused(words, message, capsys):
-    """What is wrong is said, by the parser or by the verb."""
+def ended(words, capsys):
+    """The exit code, of the parser or of the verb; what was written before is forgotten."""
     capsys.readouterr()
     try:
-        code = main(["update", *words])
+        return main(words)
     except SystemExit as end:
-        code = end.code
-    assert code == 2
+        return end.code
+
+
+def answered(words, capsys, code=0, file="test.h5"):
+    return told(["update", file, *WORDS, *words, "--json"], capsys, code)
+
+
+def refused(words, message, capsys):
+    assert ended(["update", *words], capsys) == 2
     assert message in capsys.readouterr().err
 
 
 def updated(file="test.h5", **options):
-    """What the function finds."""
     family, test = rom.load("family.rom.npz"), rom.io.read_responses(file)
     noise = {name: options.pop(name) for name in ("force_noise", "estimator") if name in options}
     return rom.update(family, replace(test, **noise), fixed=("root",), damping=0.02, **options)
@@ -98,12 +99,9 @@ def test_the_verb_finds_what_the_function_finds_and_writes_the_body(capsys):
     assert own["lines"] == 80 and own["sensors"] == 12
 
 
-def test_noise_of_forces_is_taken(capsys):
+def test_noise_of_forces_springs_masses_candidates_and_priors_are_taken(capsys):
     found = answered(["--force-noise", "0.03", "--estimator", "H1"], capsys)
     assert_same(found, updated(force_noise=0.03, estimator="H1"))
-
-
-def test_springs_masses_candidates_and_priors_are_taken(capsys):
     found = answered([*ATTACHED, "--candidate", "cable", "--free", "inner",
                       "--prior", "inner=0.5"], capsys, code=5)  # fmt: skip
     options = {"free": ("inner",), "prior": {"inner": 0.5}}
@@ -135,8 +133,8 @@ def test_a_test_is_planned(capsys, ending):
     )  # fmt: skip
     assert Path(f"plan.{ending}").read_text() == getattr(same, ending)()
     assert found["deviations"] == same.deviations
-    assert_allclose(found["plan"]["sensors"], np.hstack([same.sensors.points,
-                                                        same.sensors.directions]))  # fmt: skip
+    points = np.hstack([same.sensors.points, same.sensors.directions])
+    assert_allclose(found["plan"]["sensors"], points)
     assert_allclose(np.array(found["plan"]["inputs"])[:, :3], same.inputs.points)
 
 
@@ -159,15 +157,13 @@ def test_points_are_drawn_also_where_they_are_off_the_body(capsys, monkeypatch):
     points[3, 2] += 0.5
     off = replace(test, sensors=updating.Channels(points, test.sensors.directions))
     rom.io.write_responses(off, "off.h5")
-    capsys.readouterr()
-    assert main(["update", "off.h5", *WORDS, "--picture", "points.png"]) == 2
-    assert "sensor 3" in capsys.readouterr().err
+    refused(["off.h5", *WORDS, "--picture", "points.png"], "sensor 3", capsys)
     ((scenes, path, words),) = drawn
     assert str(path) == "points.png" and len(scenes) == 2
     assert "Largest distance of the 13 points from one of the surface: 0.5 m" in words["caption"]
     assert np.ptp(scenes[0].things["sensors"][0][:, 2]) > 0.5
-    assert main(["update", "off.h5", *WORDS, "--picture", "points.svg"]) == 2
-    assert "picture is written as .png" in capsys.readouterr().err
+    picture = ["--picture", "points.svg"]
+    refused(["off.h5", *WORDS, *picture], "picture is written as .png", capsys)
 
 
 LINES = ["--lines", "20:900"]
@@ -194,11 +190,6 @@ WRONG_WORDS = (
 )
 
 
-def test_what_is_wrong_with_the_options_is_said(capsys):
-    for words, message in WRONG_WORDS:
-        refused([*WORDS, *words], message, capsys)
-
-
 HALVES = ["--family", "frame=frame.rom.npz", "--family", "arm=arm.rom.npz",
           "--fixed", "frame.root", "--damping", "0.02"]  # fmt: skip
 LOOSE = {"frame.E": 1.2, "arm.E": 0.9, "bolts": 0.5}
@@ -212,10 +203,8 @@ def bolted(folder):
     for name, family in families.items():
         rom.save(family, folder / f"{name}.rom.npz")
     points = [[x, y, 0.08] for x in (0.25, 0.5, 0.75, 1.0) for y in (0.0, 0.1)]
-    channels = (
-        crossed(points, ("frame",) * 8 + ("arm",) * 8),
-        updating.Channels([[0.75, 0.1, 0]], [[0, 1, 2]]),
-    )
+    sensors = crossed(points, ("frame",) * 8 + ("arm",) * 8)
+    channels = sensors, updating.Channels([[0.75, 0.1, 0]], [[0, 1, 2]])
     whole, f = FamilyAssembly(families), np.linspace(20, 900, 100)
     how = {"level": 0.03, "averages": 50, "seed": 4, "fixed": (("frame", "root"),)}
     test = noisy_test(whole, LOOSE, channels, f, attached={"bolts": BOLTS}, **how)
@@ -228,8 +217,8 @@ def test_families_on_a_joint_are_updated_and_written_one_by_one(bolted, capsys):
     found = told(["update", *words], capsys)
     test = rom.io.read_responses("bolted.h5")
     assert test.sensors.bodies == ("frame",) * 8 + ("arm",) * 8 and test.inputs.bodies is None
-    same = rom.update(bolted, test, fixed=(("frame", "root"),), attached={"bolts": BOLTS},
-                      damping=0.02)  # fmt: skip
+    options = {"fixed": (("frame", "root"),), "damping": 0.02}
+    same = rom.update(bolted, test, attached={"bolts": BOLTS}, **options)
     assert_same(found, same)
     assert_right(same, LOOSE)
     for name, body in same.assembly.bodies.items():
@@ -258,14 +247,9 @@ OPTIONS = (
 
 @pytest.mark.parametrize("option", OPTIONS)
 def test_a_wrong_value_of_an_option_is_named(bolted, capsys, option):
-    """Each option with each wrong value, also of other options: an error of the user, or right."""
     for value in WRONG if ROM_LONG else WRONG[OPTIONS.index(option) % 2 :: 2]:
         words = ["update", "bolted.h5", *HALVES, *JOINT, option, value]
-        capsys.readouterr()
-        try:
-            code = main(words)
-        except SystemExit as end:
-            code = end.code
+        code = ended(words, capsys)
         out, err = capsys.readouterr()
         assert code in (0, 2, 3, 4, 5), f"{words}: {code}\n{err}"
         assert "Traceback" not in out + err
@@ -275,7 +259,9 @@ def test_a_wrong_value_of_an_option_is_named(bolted, capsys, option):
             assert option == "-o" or value not in ("nan", "1e400"), f"{words}: {out}"
 
 
-def test_families_that_are_no_assembly_are_named(bolted, capsys):
+def test_what_is_wrong_with_options_and_families_is_said(bolted, capsys):
+    for words, message in WRONG_WORDS:
+        refused([*WORDS, *words], message, capsys)
     for words, message in (
         (HALVES[:2] * 2, "--family 'frame' is given twice"),
         ([*HALVES, *JOINT, "--spring", "q=tip:1,1,1:1:2"], "'tip' must be BODY.INTERFACE"),

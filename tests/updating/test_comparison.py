@@ -7,31 +7,24 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
-from cases.components.updating import (
-    averaged,
-    exact_responses,
-    family_of,
-    model_of,
-    noisy_test,
-    refuse,
-)
+from cases.components import updating
+from cases.components.updating import family_of, noisy_test, refuse
 from cases.long import few
 from rom.errors import ParameterError
 from rom.updating import AddedMass, Channels, Comparison, GroundSpring, compare
 
 REGIONS = ("inner", "middle", "outer")
 PARAMETERS = {f"E_{name}": rom.YoungsModulus(name, 0.4, 2.5) for name in REGIONS}
-MODULI = tuple(PARAMETERS)
+MODULI, ONE = tuple(PARAMETERS), {"one modulus": {"free": ("E_inner",)}}
 PARAMETERS |= {f"rho_{name}": rom.Density(name, 0.4, 2.5) for name in REGIONS}
-SENSORS = Channels(
-    [[x, 0.1, 0.08] for x in (0.33, 0.67, 1.0)] * 2, [[0, 1, 0]] * 3 + [[0, 0, 1]] * 3
-)
+EDGE = [[x, 0.1, 0.08] for x in (0.33, 0.67, 1.0)]
+SENSORS = Channels(EDGE * 2, [[0, 1, 0]] * 3 + [[0, 0, 1]] * 3)
 INPUTS = Channels([[1.0, 0.0, 0.0]], [[0, 1, 1]])
 LINES, LEVEL, AVERAGES = np.linspace(30, 900, 83), 0.05, 60
 HELD = {"root": "x y z rx ry rz"}
 MASS = AddedMass("tip", 0.2, 0.1, 10)
 SETS = {
-    "one modulus": {"free": ("E_inner",)},
+    **ONE,
     "two moduli": {"free": ("E_inner", "E_outer")},
     "three moduli": {"free": MODULI},
     "two moduli and a mass": {"free": ("E_inner", "E_outer"), "attached": {"mass": MASS}},
@@ -52,27 +45,30 @@ def measured(family, seed, true, **there):
 def test_lines_are_foretold_by_the_update_of_all_others(family):
     """By hand, in thirds: |ln H - ln H_test|^2 over the variance of an average."""
     test = measured(family, 0, {"E_inner": 1.2})
-    found = compare(family, test, {"one modulus": SETS["one modulus"]}, folds=3, **COMMON)
+    found = compare(family, test, ONE, folds=3, **COMMON)
     for first in range(3):
         aside = np.arange(LINES.size) % 3 == first
         part = replace(test, frequencies=LINES[~aside], H=test.H[~aside])
         own = rom.update(family, part, free=("E_inner",), **COMMON)
         log = np.log(own.responses(LINES[aside]) / test.H[aside])
         variance = LEVEL**2 / 2 * AVERAGES / (AVERAGES - 1) * (1 + LEVEL**2 / 2)
-        assert_allclose(found.by_line[0, aside], (np.abs(log) ** 2).sum(axis=(1, 2)) / variance,
-                        rtol=1e-6)  # fmt: skip
+        expected = (np.abs(log) ** 2).sum(axis=(1, 2)) / variance
+        assert_allclose(found.by_line[0, aside], expected, rtol=1e-6)
     assert_allclose(found.expected, 2 * 6)
     assert_allclose(found.misfit["one modulus"], found.by_line.mean() / 12)
 
 
-def test_noise_of_forces_follows_its_lines(family):
-    test = replace(measured(family, 0, {"E_inner": 1.2}), force_noise=0.01, estimator="H1")
-    each = replace(test, force_noise=np.full((LINES.size, test.H.shape[2]), 0.01))
-    one, other = (
-        compare(family, t, {"one modulus": SETS["one modulus"]}, folds=2, **COMMON)
-        for t in (test, each)
-    )
-    assert_allclose(other.by_line, one.by_line, rtol=1e-9)
+def test_noise_of_forces_and_coherence_of_each_line_go_with_it(family):
+    test = measured(family, 0, {"E_inner": 1.2})
+    one = replace(test, force_noise=0.01, estimator="H1")
+    each = replace(one, force_noise=np.full((LINES.size, test.H.shape[2]), 0.01))
+    same, other = (compare(family, t, ONE, folds=2, **COMMON) for t in (one, each))
+    assert_allclose(other.by_line, same.by_line, rtol=1e-9)
+    c = np.full(test.H.shape, float(test.coherence))
+    c[::3] = 0.0
+    found = compare(family, replace(test, coherence=c), ONE, **COMMON)
+    assert not found.by_line[0, ::3].any() and not found.expected[::3].any()
+    assert_allclose(found.misfit["one modulus"], 1.0, atol=0.2)
 
 
 @pytest.mark.parametrize("seed", few(1, range(2)))
@@ -86,7 +82,6 @@ def test_noise_of_forces_follows_its_lines(family):
     ],
 )
 def test_the_set_that_is_right_and_no_larger_one_is_chosen(family, true, there, best, seed):
-    """Four structures, four sets; noise alone is left of the right one."""
     found = compare(family, measured(family, seed, true, **there), SETS, folds=3, **COMMON)
     assert found.best == best, str(found)
     assert_allclose(found.misfit[best], 1.0, atol=0.2)
@@ -122,16 +117,6 @@ def test_what_cannot_be_compared_is_named(family):
     )
 
 
-def test_coherence_of_each_line_goes_with_it(family):
-    """Every third line has none: not counted, wherever it is kept."""
-    test = measured(family, 0, {"E_inner": 1.2})
-    c = np.full(test.H.shape, float(test.coherence))
-    c[::3] = 0.0
-    found = compare(family, replace(test, coherence=c), {"one": SETS["one modulus"]}, **COMMON)
-    assert not found.by_line[0, ::3].any() and not found.expected[::3].any()
-    assert_allclose(found.misfit["one"], 1.0, atol=0.2)
-
-
 POINTS = [[x, 0.1, 0.08] for x in (0.33, 0.5, 0.67, 1.0)]
 EIGHT = Channels(POINTS * 2, [[0, 1, 0]] * 4 + [[0, 0, 1]] * 4)
 SHAKERS = Channels([[1.0, 0.0, 0.0], [0.5, 0.1, 0.08]], [[0, 1, 1], [0, 1, -0.5]])
@@ -151,13 +136,11 @@ def found(family, true, seed, on_force=0.0, **there):
     channels, more = (EIGHT, SHAKERS), {"fixed": HINGE, "attached": {"clamp": CLAMP} | there}
     test = noisy_test(family, true, channels, BAND, level=0.03, averages=100, seed=seed, **more)
     if on_force:
-        H = exact_responses(model_of(family, channels, **more), true, BAND)
+        H = updating.exact_responses(updating.model_of(family, channels, **more), true, BAND)
         rng = np.random.default_rng(seed)
-        test = averaged(H, channels, BAND, rng, noise=(on_force, 0.1), n=50)
-    return rom.update(
-        family, test, free=MODULI, fixed=HINGE, attached={"clamp": CLAMP}, candidates=OFFERED,
-        prior={"clamp": 1e-4}, damping=0.02,
-    )  # fmt: skip
+        test = updating.averaged(H, channels, BAND, rng, noise=(on_force, 0.1), n=50)
+    options = {"fixed": HINGE, "attached": {"clamp": CLAMP}, "prior": {"clamp": 1e-4}}
+    return rom.update(family, test, free=MODULI, candidates=OFFERED, damping=0.02, **options)
 
 
 WRONG = [
@@ -174,10 +157,7 @@ DRAWN = [(0, 0.0), (1, 0.0), (2, 0.0), (1, 0.1), (1, 0.3)]
 
 @pytest.mark.parametrize(("seed", "on_force"), DRAWN)
 @pytest.mark.parametrize(("true", "there", "name", "sign"), WRONG)
-def test_the_largest_score_is_that_of_what_is_wrong(
-    family, true, there, name, sign, seed, on_force
-):
-    """Of a joint, a support, the mass of a region and one that was added; of seven offered."""
+def test_the_largest_score_names_what_is_wrong(family, true, there, name, sign, seed, on_force):
     update = found(family, true, seed, on_force, **there)
     assert not update.verdict.ok
     assert max(update.scores, key=lambda k: abs(update.scores[k])) == name, update.scores

@@ -50,14 +50,12 @@ def moved_off(family, test, rng):
 
 
 def in_millimetres(family, test, rng):
-    factor = rng.choice([1000.0, 100.0])
-    points = factor * np.asarray(SENSORS.points)
+    points = rng.choice([1000.0, 100.0]) * np.asarray(SENSORS.points)
     words = ["millimetres taken", "centimetres taken"]
     return replace(test, sensors=Channels(points, SENSORS.directions)), words
 
 
 def times(test, factor, *at):
-    """The test with some of its responses times a factor."""
     H = test.H.copy()
     H[:, *at] *= factor
     return replace(test, H=H)
@@ -192,7 +190,6 @@ def leaky(test, poles, depth=0.4, reach=4.0):
 
 
 def test_lines_beside_poles_that_are_wrong_can_count_less(family):
-    """What is lost at resonances is refused; beside them the model is right, and is found."""
     rng = np.random.default_rng(5)
     test = measured(family, rng, factor=1.15)
     poles = rom.update(family, test, fixed=HELD).body.frequencies(6, fixed=HELD)

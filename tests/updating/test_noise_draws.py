@@ -9,29 +9,18 @@ from numpy.testing import assert_allclose
 from scipy.stats import binom, chi2, kstest, norm, truncnorm
 
 import rom
-from cases.components.updating import (
-    averaged,
-    exact_responses,
-    family_of,
-    gauss,
-    model_of,
-    refuse,
-)
+from cases.components.updating import averaged, exact_responses, family_of, gauss, model_of, refuse
 from cases.long import few
 from rom.components.updating.estimate import DAMPING_LOG_DEVIATION
 from rom.components.updating.frf_data import estimators, pooled, positive_mean
 from rom.components.updating.normal_equations import Data, sums, unsure, white
 from rom.updating import Channels, Responses
 
-PARAMETERS = {
-    "E_inner": rom.YoungsModulus("inner", 0.4, 2.5),
-    "E_outer": rom.YoungsModulus("outer", 0.4, 2.5),
-    "rho": rom.Density(None, 0.5, 2.0),
-}
+PARAMETERS = {f"E_{name}": rom.YoungsModulus(name, 0.4, 2.5) for name in ("inner", "outer")}
+PARAMETERS |= {"rho": rom.Density(None, 0.5, 2.0)}
 TRUE = {"E_inner": 1.05, "E_outer": 0.9, "rho": 1.1}
-SENSORS = Channels(
-    [[x, 0.1, 0.08] for x in (0.5, 0.75, 1.0)] * 2, [[0, 1, 0]] * 3 + [[0, 0, 1]] * 3
-)
+POINTS = [[x, 0.1, 0.08] for x in (0.5, 0.75, 1.0)]
+SENSORS = Channels(POINTS * 2, [[0, 1, 0]] * 3 + [[0, 0, 1]] * 3)
 INPUTS = Channels([[1.0, 0.0, 0.0], [0.5, 0.1, 0.08]], [[0, 1, 1], [0, 1, -0.5]])
 LINES = np.linspace(40, 160, 20)
 HELD = ("root",)
@@ -72,31 +61,25 @@ def drawn(family, exact):
 KNOWN = {"coherence": 1 / (1 + 0.1**2)}
 PLAIN = {"force_noise": 0.0, "estimator": None}  # as if no estimator had a bias
 ESTIMATORS = ("H1", "H2", "Hv")
+# estimator, noise of the force and of the response
+NOISES = [(("H1", 0.1, 0.03), {}), (("H2", 0.03, 0.1), {}), (("Hv", 0.1, 0.1), {})]
+NOISES += [(("H1", 0.0, 0.1), KNOWN), (("Hv", 0.01, 0.01), {}), (("Hv", 0.1, 0.03), {})]
+# H1 is too small by 1.01, H2 too large by it; Hv by the root of their quotient
+BIASED = [(("Hv", 0.2, 0.05), np.sqrt(1.04 / 1.0025)), (("H1", 0.1, 0.1), 1.01)]
+BIASED += [(("H2", 0.1, 0.1), 1 / 1.01)]
 
 
-@pytest.mark.parametrize(
-    ("name", "on_force", "on_response", "known"),
-    few(3, [
-        ("H1", 0.1, 0.03, {}),
-        ("H2", 0.03, 0.1, {}),
-        ("Hv", 0.1, 0.1, {}),
-        ("H1", 0.0, 0.1, KNOWN),
-        ("Hv", 0.01, 0.01, {}),
-        ("Hv", 0.1, 0.03, {}),
-    ]),
-)  # fmt: skip
-def test_parameters_lie_inside_two_deviations_as_often_as_they_must(
-    drawn, name, on_force, on_response, known
-):
+@pytest.mark.parametrize(("noise", "known"), few(3, NOISES))
+def test_parameters_lie_inside_two_deviations_as_often_as_they_must(drawn, noise, known):
     """Of 100 draws 95 are expected, 90 to 99 by chance; of damping ratios with their prior too."""
-    scaled, _, found = drawn(name, on_force, on_response, **known)
+    scaled, _, found = drawn(*noise, **known)
     inside = np.count_nonzero(np.abs(scaled) < 2, axis=0)
     assert (inside >= 90).all() and (inside <= 99).all(), inside
-    ratios = [[np.log(u.zeta[k] / 0.02) / u.deviations[f"zeta {k + 1}"] for k in (0, 1)]
-              for u in found]  # fmt: skip
-    assert (np.count_nonzero(np.abs(ratios) < 2.0, axis=0) >= 88).all()
+    for k in (0, 1):
+        ratios = [np.log(u.zeta[k] / 0.02) / u.deviations[f"zeta {k + 1}"] for u in found]
+        assert np.count_nonzero(np.abs(ratios) < 2.0) >= 88
     assert np.mean([u.verdict.ok for u in found]) >= 0.95
-    if on_force == on_response:  # what is left of half a variance varies as the whole one
+    if noise[1] == noise[2]:  # what is left of half a variance varies as the whole one
         assert_allclose(np.mean([u.verdict.rows[0].value for u in found]), 1.0, atol=0.02)
 
 
@@ -104,9 +87,7 @@ def test_parameters_lie_inside_two_deviations_as_often_as_they_must(
 @pytest.mark.parametrize("level", [0.01, 0.03, 0.1])
 @pytest.mark.parametrize("name", ESTIMATORS)
 @pytest.mark.parametrize("share", [(1, 1), (1, 0.3), (0.3, 1)])
-def test_a_thousand_draws_lie_inside_two_deviations_as_often_as_they_must(
-    drawn, name, level, share
-):
+def test_a_thousand_draws_lie_inside_as_often_as_they_must(drawn, name, level, share):
     """95.4 % of each factor within the band that chance leaves 999 of 1000 counts of it."""
     seed = [20261127, ESTIMATORS.index(name), round(100 * level), round(10 * share[0])]
     scaled, *_ = drawn(name, level * share[0], level * share[1], 1000, tuple(seed))
@@ -115,23 +96,13 @@ def test_a_thousand_draws_lie_inside_two_deviations_as_often_as_they_must(
     assert (inside >= low).all() and (inside <= high).all(), inside
 
 
-@pytest.mark.parametrize(
-    ("name", "on_force", "on_response", "bias"),
-    few(1, [("Hv", 0.2, 0.05, np.sqrt(1.04 / 1.0025)), ("H1", 0.1, 0.1, 1.01),
-            ("H2", 0.1, 0.1, 1 / 1.01)]),
-)  # fmt: skip
-def test_an_estimator_taken_for_unbiased_is_wrong_by_its_bias(
-    drawn, name, on_force, on_response, bias
-):
-    """Stiffness and mass are too large by what H is too small; named, by nothing.
-
-    Noise of 10 % on both makes H1 too small by 1.01, H2 too large by it; of 20 and 5 % Hv by the
-    root of their quotient.
-    """
-    scaled, errors, _ = drawn(name, on_force, on_response, 15, **PLAIN)
+@pytest.mark.parametrize(("noise", "bias"), few(1, BIASED))
+def test_an_estimator_taken_for_unbiased_is_wrong_by_its_bias(drawn, noise, bias):
+    """Stiffness and mass are too large by what H is too small; named, by nothing."""
+    scaled, errors, _ = drawn(*noise, 15, **PLAIN)
     assert_allclose(errors.mean(axis=0)[[0, 2]], np.log(bias), rtol=0.15)
     assert np.count_nonzero(np.abs(scaled[:, [0, 2]]) < 2, axis=0).max() <= 3
-    _, errors, _ = drawn(name, on_force, on_response, 15)
+    _, errors, _ = drawn(*noise, 15)
     assert np.abs(errors.mean(axis=0)[[0, 2]]).max() < 0.3 * abs(np.log(bias))
 
 
@@ -224,20 +195,6 @@ def test_deviations_say_what_estimated_weights_cost(family, exact):
     size = np.sqrt(np.outer(*[np.diag(expected)] * 2))
     assert_allclose(found.covariance / size, expected / size, atol=6e-3)
     assert (np.diag(found.covariance)[:3] > 1.05 * np.diag(C)[:3]).all()
-
-
-def test_what_estimated_weights_cost_is_that_of_dense_matrices():
-    """Q = J^T V^-1 diag(V^-1) v^2 d^2 V^-1 J of one line, written out; a sensor stays out."""
-    rng, c = np.random.default_rng(0), 0.05
-    weight, varied = np.array([30.0, 0.0, 80.0, 10.0]), np.array([0.2, 0.3, 0.4, 0.1])
-    J = gauss(rng, (4, 2))
-    at = weight[None, :, None]
-    A = unsure(white(J[None, :, None], at, c), at, c, varied[None, :, None])[0, :, 0]
-    used = weight > 0
-    V = np.diag(weight[used] ** -2.0) + c**2
-    N, d = np.linalg.inv(V), weight[used] ** -2.0
-    Q = N @ np.diag(np.diag(N) * varied[used] ** 2 * d**2) @ N
-    assert_allclose(A.conj().T @ A, J[used].conj().T @ Q @ J[used], rtol=1e-10)
 
 
 def test_what_is_positive_has_the_mean_of_the_truncated_distribution():
@@ -335,13 +292,22 @@ def test_large_errors_have_the_variance_of_their_logarithm():
     assert_allclose(np.mean(np.abs(np.log(H) / error[:, 0, 0]) ** 2) / 2, 1.0, atol=0.03)
 
 
-def test_errors_that_sensors_share_are_made_independent():
-    """The covariance D^-1 + c^2 becomes the identity; a sensor without weight stays out."""
+def test_errors_that_sensors_share_and_what_estimated_weights_cost_are_those_of_dense_matrices():
     weight = np.array([30.0, 0.0, 80.0, 10.0])[None, :, None]
     A = white(np.eye(4)[None, :, None, :], weight, 0.05)[0, :, 0]
     own = np.diag(1 / np.where(weight, weight, np.inf).ravel() ** 2)
     covariance = A @ (own + 0.05**2) @ A.T
     assert_allclose(covariance, np.diag([1.0, 0.0, 1.0, 1.0]), atol=1e-12)
+    rng, c = np.random.default_rng(0), 0.05
+    weight, varied = np.array([30.0, 0.0, 80.0, 10.0]), np.array([0.2, 0.3, 0.4, 0.1])
+    J = gauss(rng, (4, 2))
+    at = weight[None, :, None]
+    A = unsure(white(J[None, :, None], at, c), at, c, varied[None, :, None])[0, :, 0]
+    used = weight > 0
+    V = np.diag(weight[used] ** -2.0) + c**2
+    N, d = np.linalg.inv(V), weight[used] ** -2.0
+    Q = N @ np.diag(np.diag(N) * varied[used] ** 2 * d**2) @ N
+    assert_allclose(A.conj().T @ A, J[used].conj().T @ Q @ J[used], rtol=1e-10)
 
 
 def test_noise_of_forces_and_few_averages_are_checked(exact):

@@ -8,13 +8,12 @@ from numpy.testing import assert_allclose
 from scipy.stats import chi2
 
 import rom
-from cases.components.updating import assert_alike, family_of, refuse
+from cases.components.updating import assert_alike, family_of, fed, refuse, stepped, walked
 from cases.mbs.fmu_instance import Instance, fmpy
 from cases.refusals import refuses
 from rom import updating
 from rom.body.recovery import StressRecovery
 from rom.components.updating.observers import parameter_tracking
-from rom.components.updating.observers.operation import discrete
 from rom.components.updating.observers.parameter_tracking import LINEAR_REACH
 from rom.errors import ParameterError, SolverError
 from rom.updating import Channels, Drift, Sensors
@@ -30,6 +29,7 @@ FEW = (
     Sensors(GAUGE, "strain", 2e-7),
     Sensors(Channels([[0.5, 0.1, 0], [1.0, 0.1, 0]], [[0, 0, 1]] * 2), "acceleration", 0.5),
 )
+SENSORS = ("strain[1]", "acceleration[1]", "acceleration[2]")
 WANTED = (Sensors(TIP, "displacement"), Sensors(GAUGE, "stress"))
 SPRING = {"clamp": updating.GroundSpring("tip", (0.0, 0.0, 4e6), 0.2, 5.0)}
 DRIFTS = {"E_inner": Drift(0.05, 0.02), "clamp": Drift(0.05, 0.02)}
@@ -51,48 +51,10 @@ def filter_(family):
 
 
 def made(family, **options):
-    options = {
-        "sensors": FEW, "forces": TIP, "wanted": WANTED, "parameters": DRIFTS, "dt": DT,
-        "walk": 3000.0, "fixed": ("root",), "unmodelled": 1e-3, "attached": SPRING, **options,
-    }  # fmt: skip
-    channels = [options.pop(name) for name in ("sensors", "forces", "wanted")]
+    channels = options.pop("sensors", FEW), options.pop("forces", TIP), WANTED
+    usual = {"dt": DT, "walk": 3000.0, "fixed": ("root",), "unmodelled": 1e-3}
+    options = usual | {"parameters": DRIFTS, "attached": SPRING} | options
     return updating.parameter_tracker(family, *channels, **options)
-
-
-def walked(t, rng, n_t):
-    """A record of what a filter assumes: logarithms of factors, values, and samples.
-
-    Parameters walk every 50 steps, as far as they do in that time.
-    """
-    o, first = t.operation, np.array([d.first for d in t.drifts.values()])
-    walk = np.array([d.walk for d in t.drifts.values()])
-    P = t.assumed.before(o)
-    x = np.sqrt(np.diag(P)) * rng.standard_normal(len(P))
-    p = first * rng.standard_normal(len(first))
-    factors, values, clean = [], [], []
-    for k in range(n_t):
-        if k % 50 == 0:
-            p = p + (k > 0) * walk * np.sqrt(50 * DT) * rng.standard_normal(len(p))
-            at, step, root = stepped(t, p)
-        factors.append(p)
-        values.append(at.W @ x)
-        clean.append(at.C @ x)
-        x = step @ x + root @ rng.standard_normal(len(x))
-    clean = np.array(clean)
-    y = clean + np.sqrt(t.R) * rng.standard_normal(clean.shape)
-    return np.array(factors), np.array(values), y
-
-
-def stepped(t, p):
-    """The equations, transition and root of the noise of a step at logarithms p of factors.
-
-    The symmetric root of a matrix that is nearly singular is the same on any machine.
-    """
-    at = t.operation.at(p)
-    step, Q = discrete(at.A, t.assumed.white(t.operation), DT)
-    scale = np.sqrt(np.diag(Q))
-    lam, V = np.linalg.eigh(Q / np.outer(scale, scale))
-    return at, step, scale[:, None] * (V * np.sqrt(np.maximum(lam, 0.0))) @ V.T
 
 
 def test_derivatives_are_those_of_differences(filter_):
@@ -113,13 +75,12 @@ def test_derivatives_are_those_of_differences(filter_):
     ("factors", "damping"), [({}, 0.02), ({"E_inner": 1.5, "rho_outer": 0.7}, 0.0)]
 )
 def test_held_factors_are_those_of_the_body_there(family, factors, damping):
-    """The family's equations, in modes at factors of one, and the body's own in its modes."""
     drifts = {name: Drift(0.1) for name in PARAMETERS}
-    askew = [replace(c.channels, directions=[[1, 2, 3]] * len(c.names)) for c in FEW[1:]]
-    few = FEW[0], replace(FEW[1], channels=askew[0])  # all motions are seen
+    askew = replace(FEW[1].channels, directions=[[1, 2, 3]] * 2)
+    few = FEW[0], replace(FEW[1], channels=askew)  # all motions are seen
     force = replace(TIP, directions=[[1, 2, 3]])
-    held = made(family, sensors=few, forces=force, parameters=drifts, attached=None,
-                unmodelled=0.0, damping=damping).held(**factors)  # fmt: skip
+    given = {"sensors": few, "forces": force, "parameters": drifts, "attached": None}
+    held = made(family, **given, unmodelled=0.0, damping=damping).held(**factors)
     body = family.at(**factors)
     held_ratios = rom.ModalDamping(damping, fixed=("root",))
     body = replace(body, D=held_ratios.matrix(body))
@@ -179,17 +140,10 @@ def totals(t, assumed, n_draws, n_t, seed):
 
 
 def test_errors_are_as_large_as_the_filter_says(filter_):
-    """20 records with parameters that walk: inside chi-square bands, on both sides."""
     n, n_t = 20, 300
     surprise, factors, wanted = totals(filter_, filter_, n, n_t, 11)
-    inside(surprise, 3 * n * n_t)
-    inside(factors, 2 * n)
-    for total in wanted:
-        inside(total, n)
-
-
-def inside(total, freedom):
-    assert chi2.ppf(1e-3, freedom) < total < chi2.ppf(1 - 1e-3, freedom)
+    for total, freedom in ((surprise, 3 * n * n_t), (factors, 2 * n), *((x, n) for x in wanted)):
+        assert chi2.ppf(1e-3, freedom) < total < chi2.ppf(1 - 1e-3, freedom)
 
 
 @pytest.mark.parametrize(("noise", "side"), [(1.1, -1), (0.9, 1)])
@@ -205,7 +159,6 @@ def test_noise_wrong_by_a_tenth_leaves_the_band(filter_, noise, side):
 
 
 def test_a_joint_that_loosens_is_followed(family):
-    """The spring at the tip loses half in a second; nobody told the filter when."""
     t = made(family, parameters={"clamp": Drift(0.02, 0.5)})
     rng, n_t = np.random.default_rng(3), 3000
     true = np.log(0.5) * np.clip((np.arange(n_t) // 50 * 50 - 500) / 1000, 0, 1)
@@ -227,7 +180,6 @@ def test_a_joint_that_loosens_is_followed(family):
 
 
 def test_the_fmu_follows_as_python_does(family, tmp_path):
-    """400 steps in which the point of linearisation moves; a state is kept and taken up again."""
     t = made(family, parameters=DRIFTS | {"rho_outer": Drift(0.05, 0.02)})
     _, _, y = walked(t, np.random.default_rng(1), 400)
     path = rom.io.write_observer_fmu(t, tmp_path / "joint.fmu")
@@ -235,30 +187,16 @@ def test_the_fmu_follows_as_python_does(family, tmp_path):
     one, expected = Instance(path, tmp_path).begin(), t.run(y)
     assert np.ptp(np.log(expected.factors), axis=0).min() > 2 * LINEAR_REACH
     wanted = ("displacement[1]", "stress[1]", "force[1]", *(f"factor.{name}" for name in t.names))
-    sensors = ("strain[1]", "acceleration[1]", "acceleration[2]")
-    found = []
-    for k, sample in enumerate(y):
-        if k == 100:
-            kept = one.fmu.getFMUState()
-        if k == 120:
-            one.fmu.setFMUState(kept)
-            for j in range(100, 120):  # the same again
-                step(one, sensors, y[j], j)
-        step(one, sensors, sample, k)
-        found.append([one.get(*(f"{kind}.{name}" for name in wanted))
-                      for kind in ("estimate", "deviation")])  # fmt: skip
-    for j, parts in enumerate(
-        (("values", "forces", "factors"), ("deviations", "force_deviations", "factor_deviations"))
-    ):
-        same = np.hstack([getattr(expected, part) for part in parts])
-        scale = np.abs(same).max(axis=0)
-        assert_allclose(np.array(found)[:, j] / scale, same / scale, rtol=0, atol=1e-10)
-
-
-def step(one, sensors, sample, k):
-    for name, value in zip(sensors, sample, strict=True):
-        one.set(f"sensor.{name}", value)
-    one.fmu.doStep(k * DT, DT)
+    names = [f"{kind}.{name}" for kind in ("estimate", "deviation") for name in wanted]
+    found = [fed(one, SENSORS, y[:100], names, DT)]
+    kept = one.fmu.getFMUState()
+    fed(one, SENSORS, y[100:120], names, DT, 100)
+    one.fmu.setFMUState(kept)
+    found.append(fed(one, SENSORS, y[100:], names, DT, 100))  # the same again, and on
+    parts = ("values", "forces", "factors", "deviations", "force_deviations", "factor_deviations")
+    same = np.hstack([getattr(expected, part) for part in parts])
+    scale = np.abs(same).max(axis=0)
+    assert_allclose(np.vstack(found) / scale, same / scale, rtol=0, atol=1e-10)
 
 
 def test_the_fmu_names_the_parameter_that_leaves_its_range(family, tmp_path):
@@ -267,10 +205,7 @@ def test_the_fmu_names_the_parameter_that_leaves_its_range(family, tmp_path):
     _, _, y = walked(made(family), np.random.default_rng(2), 400)
     refuses(SolverError, "'clamp' has reached", t.run, y)
     one = Instance(rom.io.write_observer_fmu(t, tmp_path / "joint.fmu"), tmp_path).begin()
-    sensors = ("strain[1]", "acceleration[1]", "acceleration[2]")
-    with pytest.raises(fmpy.fmi1.FMICallException):
-        for k, sample in enumerate(y):
-            step(one, sensors, sample, k)
+    refuses(fmpy.fmi1.FMICallException, "status 3", fed, one, SENSORS, y, (), DT)
     assert "parameter 'clamp' has reached the factor" in one.log[-1]
     assert "from 0.97 to 1.03" in one.log[-1]
 
@@ -278,9 +213,10 @@ def test_the_fmu_names_the_parameter_that_leaves_its_range(family, tmp_path):
 def test_what_cannot_be_followed_is_named(family, filter_):
     wide = {name: Drift(0.3) for name in DRIFTS}
     _, _, y = walked(replace(filter_, drifts=wide), np.random.default_rng(0), 200)
-    narrow = {"clamp": updating.GroundSpring("tip", (0.0, 0.0, 4e6), 0.98, 1.02)}
+    narrow = {"clamp": replace(SPRING["clamp"], low=0.98, high=1.02)}
     lost, left = made(family, parameters=wide, attached=narrow), r"has reached .* 0\.98 to 1\.02"
     unknown = {"E_outer": Drift(0.1)}
+    assert filter_.run(np.zeros((0, 3))).factors.shape == (0, 2)
     refuse(
         (lambda: made(family, parameters=unknown), "no parameter 'E_outer'.*clamp"),
         (lambda: made(family, parameters={}), "no parameter changes"),
@@ -288,7 +224,3 @@ def test_what_cannot_be_followed_is_named(family, filter_):
         (lambda: filter_.held(E=1.0), ParameterError, "'E' must be one of .'E_inner'"),
         (lambda: lost.run(y), SolverError, f"'clamp' {left}"),
     )
-
-
-def test_a_record_without_samples_is_empty(filter_):
-    assert filter_.run(np.zeros((0, 3))).factors.shape == (0, 2)

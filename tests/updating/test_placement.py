@@ -36,16 +36,26 @@ def volume(plan):
     return np.linalg.det(plan.covariance[:3, :3]) ** (1 / 6)
 
 
-def test_the_best_three_of_nine_are_those_of_an_exhaustive_search(family):
+def test_a_plan_and_effective_independence_find_what_an_exhaustive_search_finds(family):
     offered = candidates(family.body, 3, fixed=("root",))
     shaker = SHAKERS.some([0])
     plan = planned(family, offered, 3, shakers=shaker)
-    trials = {
-        c: volume(planned(family, offered.some(list(c)), 3, shakers=shaker))
-        for c in combinations(range(9), 3)
-    }
+    sets = list(combinations(range(9), 3))
+    plans = (planned(family, offered.some(list(c)), 3, shakers=shaker) for c in sets)
+    trials = dict(zip(sets, map(volume, plans), strict=True))
     assert tuple(plan.sensor_numbers) == min(trials, key=trials.get)
     assert_allclose(volume(plan), min(trials.values()), rtol=1e-9)
+    body, offered = family.body, candidates(family.body, 4, fixed=("root",))
+    _, V = body.modes(fixed=("root",))
+    Phi = offered.rows(body, "sensor") @ V[:, :3]
+    sets = [list(c) for c in combinations(range(12), 4)]
+    best = max(sets, key=lambda c: np.linalg.det(Phi[c].T @ Phi[c]))
+    kept, table = independent(body, offered, 4, modes=3, fixed=("root",))
+    assert_array_equal(kept, best)
+    P = Phi[kept]
+    for i, j in np.ndindex(3, 3):
+        cosine = P[:, i] @ P[:, j] / np.linalg.norm(P[:, i]) / np.linalg.norm(P[:, j])
+        assert_allclose(table[i, j], cosine**2, atol=1e-12)
 
 
 def test_the_information_is_the_inverse_covariance_of_linear_estimation(family):
@@ -73,22 +83,6 @@ def test_the_information_is_the_inverse_covariance_of_linear_estimation(family):
     assert_allclose(np.linalg.eigvals(ratio), 1.0, atol=0.12)
 
 
-def test_effective_independence_finds_what_an_exhaustive_search_finds(family):
-    body = family.body
-    offered = candidates(body, 4, fixed=("root",))
-    _, V = body.modes(fixed=("root",))
-    Phi = offered.rows(body, "sensor") @ V[:, :3]
-    best = max(
-        combinations(range(12), 4), key=lambda c: np.linalg.det(Phi[list(c)].T @ Phi[list(c)])
-    )
-    kept, table = independent(body, offered, 4, modes=3, fixed=("root",))
-    assert_array_equal(kept, best)
-    P = Phi[kept]
-    for i, j in np.ndindex(3, 3):
-        cosine = P[:, i] @ P[:, j] / np.linalg.norm(P[:, i]) / np.linalg.norm(P[:, j])
-        assert_allclose(table[i, j], cosine**2, atol=1e-12)
-
-
 def test_damping_is_sought_too():
     """Information on one parameter, a second one unknown: n11 - n12^2 / n22."""
     N = np.array([[4.0, 2.0], [2.0, 3.0]])
@@ -111,7 +105,6 @@ def test_what_is_not_seen_is_named(family):
 
 
 def test_the_floor_is_a_thousandth_of_the_largest_response(family):
-    """Accelerations per force of the finest peak among the candidates, at factors of one."""
     offered = candidates(family.body, 4, fixed=("root",))
     H = exact_responses(model_of(family, (offered, offered), ("root",)), {}, LINES, 0.01)
     largest = ((2 * np.pi * LINES) ** 2 * np.abs(H).max(axis=(1, 2))).max()
@@ -199,7 +192,6 @@ def measures(plan):
 
 
 def test_a_plan_beats_even_layouts_with_any_shaker(case):
-    """Six channels each: two points far apart, all axes; the best of nine shakers is given."""
     best = measures(case.plan(case.offered, case.shakers))
     two = case.even(2)
     even = [measures(case.plan(two, case.shakers.some([k]))) for k in range(9)]
@@ -209,35 +201,26 @@ def test_a_plan_beats_even_layouts_with_any_shaker(case):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_a_plan_beats_random_layouts(case, seed):
-    """Twelve layouts from the same candidates: each is worse, half of them by twice and more."""
     best = measures(case.plan(case.offered, case.shakers))
     rng = np.random.default_rng(seed)
-    layouts = [
-        measures(case.plan(case.offered.some(rng.permutation(24)[:N_SENSORS]),
-                           case.shakers.some([rng.integers(9)])))
-        for _ in range(12)
-    ]  # fmt: skip
+    layouts = []
+    for _ in range(12):
+        sensors = case.offered.some(rng.permutation(24)[:N_SENSORS])
+        layouts.append(measures(case.plan(sensors, case.shakers.some([rng.integers(9)]))))
     assert (np.median(layouts, axis=0) > 2.0 * best).all()
     assert (np.min(layouts, axis=0) > 1.05 * best).all()
-
-
-def updates(case, plan, lines, n):
-    """Updates by noisy tests with the channels of a plan, at factors of one."""
-    channels = plan.sensors, plan.inputs
-    exact = exact_responses(model_of(case.family, channels, case.fixed), {}, lines, 0.01)
-    rng = np.random.default_rng(7)
-    for _ in range(n):
-        H = noisy(exact, np.sqrt(2) * NOISE, rng)
-        coherence = 1 / (1 + 2 * 100 * NOISE**2)
-        test = Responses(lines, H, *channels, coherence, 100)
-        yield rom.update(case.family, test, fixed=case.fixed)
 
 
 @pytest.mark.parametrize("case", few(1, ["cantilever", "free plate"]), indirect=True)
 def test_updates_scatter_as_the_plan_foretells(case):
     """d^T C^-1 d over all draws is chi-square of three times their number, in all directions."""
     plan = case.plan(case.offered, case.shakers, floor=0.0, noise=NOISE)
-    found = list(updates(case, plan, case.lines, DRAWS))
+    channels, found, rng = (plan.sensors, plan.inputs), [], np.random.default_rng(7)
+    exact = exact_responses(model_of(case.family, channels, case.fixed), {}, case.lines, 0.01)
+    for _ in range(DRAWS):
+        H, coherence = noisy(exact, np.sqrt(2) * NOISE, rng), 1 / (1 + 2 * 100 * NOISE**2)
+        test = Responses(case.lines, H, *channels, coherence, 100)
+        found.append(rom.update(case.family, test, fixed=case.fixed))
     d = np.log([[u.factors[name] for name in FACTORS] for u in found])
     C = plan.covariance[:3, :3]
     along = np.linalg.eigh(C)[1]
@@ -245,23 +228,20 @@ def test_updates_scatter_as_the_plan_foretells(case):
     low, high = chi2.ppf([0.001, 0.999], DRAWS)
     assert ((size.sum(axis=0) > low) & (size.sum(axis=0) < high)).all(), size.mean(axis=0)
     for name in FACTORS:
-        assert_allclose(np.mean([u.deviations[name] for u in found]), plan.deviations[name],
-                        rtol=0.05)  # fmt: skip
+        mean = np.mean([u.deviations[name] for u in found])
+        assert_allclose(mean, plan.deviations[name], rtol=0.05)
     assert not plan.unseen and not any(u.unseen for u in found)
 
 
 @pytest.mark.parametrize("case", ["cantilever"], indirect=True)
 def test_a_test_made_after_a_written_plan_is_read_and_updates(case, tmp_path):
-    """The universal file gives the nodes, the table of the plan the directions."""
     plan = case.plan(case.offered, case.shakers, floor=0.0, noise=NOISE)
     (tmp_path / "plan.uff").write_text(plan.uff())
     rows = [line.split(",") for line in plan.csv().splitlines()[1:]]
     d = np.array([row[5:] for row in rows], dtype=float)
     axis = np.abs(d).argmax(axis=1)
-    dofs = [
-        f"{k}{'-+'[int(x[a] > 0)]}{'XYZ'[a]}"
-        for k, (a, x) in enumerate(zip(axis, d, strict=True), 1)
-    ]
+    signed = enumerate(zip(axis, d, strict=True), 1)
+    dofs = [f"{k}{'-+'[int(x[a] > 0)]}{'XYZ'[a]}" for k, (a, x) in signed]
     model = model_of(case.family, (plan.sensors, plan.inputs), case.fixed)
     H = np.ascontiguousarray(exact_responses(model, {}, case.lines, 0.01)[:, :, 0])
     names = [f"{dof}/{dofs[-1]} {part} [m/N]" for dof in dofs[:-1] for part in ("real", "imag")]
@@ -269,9 +249,8 @@ def test_a_test_made_after_a_written_plan_is_read_and_updates(case, tmp_path):
     text = [",".join(["Frequency [Hz]", *names])]
     text += [",".join(f"{x:.12g}" for x in row) for row in values]
     (tmp_path / "test.csv").write_text("\n".join(text))
-    test = rom.io.read_responses(
-        tmp_path / "test.csv", averages=100, coherence=0.95, points=tmp_path / "plan.uff"
-    )
+    read = {"averages": 100, "coherence": 0.95, "points": tmp_path / "plan.uff"}
+    test = rom.io.read_responses(tmp_path / "test.csv", **read)
     for read, planned in ((test.sensors, plan.sensors), (test.inputs, plan.inputs)):
         assert_allclose(read.points, planned.points, atol=1e-5)
         assert_allclose(read.directions, planned.directions)

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import quad_vec
-from scipy.linalg import eigh, expm, solve_discrete_are
+from scipy.linalg import expm, solve_discrete_are
 from scipy.stats import chi2
 
 import rom
-from cases.components.updating import refuse
+from cases.components.updating import fed, refuse
 from cases.mbs.fmu_instance import Instance, fmpy
-from cases.solid import STEEL, block
+from cases.solid import STEEL, block, reduced
 from rom.body.recovery import StressRecovery
 from rom.body.surface import strain_rows
 from rom.components.updating.observers.operation import discrete, stress_rows
@@ -26,22 +26,14 @@ FEW = (
     Sensors(Channels([[0.5, 0, 0]], [[0, 0, 1]]), "displacement", 1e-6),
     Sensors(Channels([[1.0, 0.1, 0], [0.75, 0, 0]], [[0, 0, 1]] * 2), "acceleration", 0.5),
 )
+MODEL = block(cells=(8, 2, 2))
 GAUGE = [[0.125, 0.05, 0.08], [0.25, 0.05, 0.08]]
 WANTED = (Sensors(Channels(GAUGE[:1], [[1, 0, 0]]), "stress"), Sensors(TIP, "displacement"))
 
 
 @pytest.fixture(scope="module")
-def model():
-    return block(cells=(8, 2, 2))
-
-
-@pytest.fixture(scope="module")
-def body(model):
-    body = rom.reduce(
-        model, method=rom.CraigBampton(4), certify=False,
-        interfaces={"root": "rbe2", "tip": "rbe2"}, reference="root",
-        damping=rom.ModalDamping(0.02),
-    )  # fmt: skip
+def body():
+    body = reduced(4, MODEL, reference="root", damping=rom.ModalDamping(0.02))
     # strain between two points of the surface, along x, stands for the stress of a gauge
     surface = body.surface
     a, b = (int(np.linalg.norm(surface.points - x, axis=1).argmin()) for x in GAUGE)
@@ -60,19 +52,8 @@ def made(body, sensors=FEW, forces=TIP, wanted=WANTED, **options):
     return tracker(body, sensors, forces, wanted, **options)
 
 
-def modes_of(model):
-    """Frequencies (m,) of the full model with its root held, and shapes (n_dof, m)."""
-    held = model.interfaces["root"].dofs
-    kept = np.setdiff1d(np.arange(model.n_dofs), held)
-    lam, V = eigh(model.K.toarray()[np.ix_(kept, kept)], model.M.toarray()[np.ix_(kept, kept)])
-    shapes = np.zeros((model.n_dofs, len(kept)))
-    shapes[kept] = V
-    return np.sqrt(lam), shapes
-
-
-def walked(t, rng, seconds=None):
-    """A filter and one record of what it assumes: states (n_t, n) and samples (n_t, n_y)."""
-    n_t = 400 if seconds is None else int(seconds / t.dt)
+def walked(t, rng, n_t=400):
+    """One record of what a filter assumes: states (n_t, n) and samples (n_t, n_y)."""
     root = np.linalg.cholesky(t.Q + 1e-14 * np.diag(np.diag(t.Q)) + 1e-300 * np.eye(len(t.Q)))
     x = np.sqrt(np.diag(t.P)) * rng.standard_normal(len(t.P))
     states = []
@@ -95,20 +76,16 @@ def test_noise_of_a_step_is_its_integral():
 
 
 def test_the_filter_settles_where_the_riccati_equation_says(filter_):
+    """And by another program, of a rough system and of the body in coordinates of equal size."""
     t = filter_
-    samples = np.zeros((3000, len(t.C)))
-    found = t.run(samples)
+    found = t.run(np.zeros((3000, len(t.C))))
     o = t.observer()
     P = t.A @ found.covariance @ t.A.T + t.Q  # before the next sample
     gain = P @ t.C.T @ np.linalg.inv(t.C @ P @ t.C.T + np.diag(t.R))
     assert_allclose(o.W @ gain, o.W @ o.G, rtol=1e-5, atol=1e-7 * np.abs(o.W @ o.G).max())
     size = np.sqrt(np.einsum("ij,ij->i", o.W @ P, o.W))
     assert_allclose(size, o.deviations, rtol=1e-6)
-
-
-def test_the_steady_state_is_that_of_the_riccati_equation(filter_):
-    """Of a rough system, and of the body in coordinates of equal size, by another program."""
-    rng, t = np.random.default_rng(8), filter_
+    rng = np.random.default_rng(8)
     A, B = 0.4 * rng.normal(size=(5, 5)), rng.normal(size=(5, 3))
     C, R = rng.normal(size=(2, 5)), np.array([0.3, 2.0])
     found = steady(A, C, B @ B.T, R)
@@ -121,7 +98,6 @@ def test_the_steady_state_is_that_of_the_riccati_equation(filter_):
 
 
 def test_errors_and_innovations_are_as_large_as_the_filter_says(filter_):
-    """Normalised squared errors of what is wanted, and of the samples, over 60 records."""
     t, rng = filter_, np.random.default_rng(2)
     error, surprise = [], []
     for _ in range(60):
@@ -135,12 +111,12 @@ def test_errors_and_innovations_are_as_large_as_the_filter_says(filter_):
         assert chi2.ppf(1e-3, 60) < total < chi2.ppf(1 - 1e-3, 60)
 
 
-def test_force_and_stress_of_the_full_model_are_found(model, body):
-    """A force on the tip that rises and stays; its sensors are noisy dofs of the full model."""
-    omega, shapes = modes_of(model)
-    where = {tuple(np.round(x, 9)): 3 * k for k, x in enumerate(model.points)}
+def test_force_and_stress_of_the_full_model_are_found(body):
+    modes = rom.modes(MODEL, MODEL.n_dofs - MODEL.interfaces["root"].dofs.size, fixed=("root",))
+    omega, shapes = modes.omega, modes.shapes
+    where = {tuple(np.round(x, 9)): 3 * k for k, x in enumerate(MODEL.points)}
     n_t, F = 600, 50.0
-    load = np.zeros(model.n_dofs)
+    load = np.zeros(MODEL.n_dofs)
     load[where[1.0, 0.0, 0.0] + 2] = F
     g, wd = shapes.T @ load, omega * np.sqrt(1 - 0.02**2)
     times = DT * np.arange(n_t)[:, None]
@@ -175,13 +151,8 @@ def test_the_fmu_says_what_python_says(filter_, tmp_path):
     _, y = walked(filter_, np.random.default_rng(1))
     expected = o.run(y[:100])
     one = Instance(path, tmp_path).begin()
-    names = [name for name, _ in o.outputs]
-    found = []
-    for k, sample in enumerate(y[:100]):
-        for (name, _), z in zip(o.inputs, sample, strict=True):
-            one.set(f"sensor.{name}", z)
-        one.fmu.doStep(k * DT, DT)
-        found.append(one.get(*(f"estimate.{name}" for name in names)))
+    sensors, names = ([name for name, _ in side] for side in (o.inputs, o.outputs))
+    found = fed(one, sensors, y[:100], [f"estimate.{name}" for name in names], DT)
     scale = np.abs(expected).max(axis=0)
     assert_allclose(found / scale, expected / scale, rtol=0, atol=1e-10)
     assert_allclose(one.get(*(f"deviation.{name}" for name in names)), o.deviations, rtol=1e-15)
@@ -190,7 +161,6 @@ def test_the_fmu_says_what_python_says(filter_, tmp_path):
 
 
 def test_a_missing_sample_is_left_out(filter_):
-    """A record with one sensor away for a while: bounds grow, and are those of the others alone."""
     t = filter_
     _, y = walked(t, np.random.default_rng(7))
     gone = y.copy()
@@ -200,7 +170,7 @@ def test_a_missing_sample_is_left_out(filter_):
     assert (t.run(gone).deviations[-1] > t.run(y).deviations[-1]).all()
 
 
-def test_stress_turns_with_its_direction(body):
+def test_stress_turns_with_its_direction_and_modes_left_out_follow_the_accelerations(body):
     """Normal stress along d is d sigma d; shear counts twice."""
     rng = np.random.default_rng(3)
     s = rng.normal(size=(6, body.n_modes))
@@ -211,31 +181,21 @@ def test_stress_turns_with_its_direction(body):
     tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     row, _ = stress_rows(odd, Channels(GAUGE[:1], [5 * d]), "sensor")
     assert_allclose(row[0] @ q, d @ tensor @ d)
-
-
-def test_modes_left_out_follow_the_accelerations(body):
-    """As the recovery itself says, of frame and elastic accelerations."""
     rng, r = np.random.default_rng(6), body.n_modes
     own = StressRecovery(np.array(GAUGE[:1]), rng.normal(size=(6, r)), rng.normal(size=(6, 12 + r)))
-    static, inertial = stress_rows(
-        replace(body, stress=own), Channels(GAUGE[:1], [[0, 1, 0]]), "sensor"
-    )
+    at = Channels(GAUGE[:1], [[0, 1, 0]])
+    static, inertial = stress_rows(replace(body, stress=own), at, "sensor")
     q, a = rng.normal(size=r), rng.normal(size=6 + r)
     expected = own.field(q, own.accelerations(a[:3], a[3:6], np.zeros(3), a[6:]))[0, 1]
     assert_allclose(static[0] @ q + inertial[0] @ a, expected)
 
 
-def pulled(body, F):
-    """(r,) elastic coordinates under a force along x on the tip, its root held."""
-    omega, V = body.modes(fixed=("root",))
-    load = F * body.marker("tip").translation[0] @ V[6:]
-    return V[6:] @ (load / omega**2)
-
-
-def test_strain_gauges_read_hooke_and_poisson(body):
+def test_strain_gauges_read_hooke_and_poisson_and_the_gradient_of_their_triangle(body):
     """F / EA along a bar in tension, -nu of it across, and (1 - nu) / 2 under 45 degrees."""
     F, area = 1e4, 0.1 * 0.08
-    q = pulled(body, F)
+    omega, V = body.modes(fixed=("root",))
+    load = F * body.marker("tip").translation[0] @ V[6:]
+    q = V[6:] @ (load / omega**2)  # under a force along x on the tip
     axes = [[1, 0, 0], [0, 1, 0], [1, 1, 0], [2, 0, 0.1]]
     found = strain_rows(body, [[0.52, 0.03, 0.08]] * 4, axes, "sensor") @ q
     nu = STEEL.nu
@@ -243,10 +203,6 @@ def test_strain_gauges_read_hooke_and_poisson(body):
     assert_allclose(found, expected, rtol=2e-3)
     side = strain_rows(body, [[0.52, 0.1, 0.03]], [[0, 0, 1]], "sensor") @ q
     assert_allclose(side, [-nu * F / STEEL.E / area], rtol=5e-3)
-
-
-def test_a_gauge_reads_the_gradient_of_its_triangle(body):
-    """Of any linear motion d G d, on an edge of the body too."""
     G = np.random.default_rng(5).normal(size=(3, 3))
     points = body.surface.points
     linear = replace(body, surface=replace(body.surface, shape=(points @ G.T).reshape(-1, 1)))

@@ -24,9 +24,6 @@ def test_scores_are_those_of_one_more_column_in_least_squares():
     change, covariance = -np.linalg.lstsq(J, r, rcond=None)[0], np.linalg.inv(J.T @ J)
     assert list(found) == ["c"]
     assert_allclose(found["c"], change[2] / np.sqrt(covariance[2, 2]), rtol=1e-10)
-
-
-def test_a_parameter_that_others_replace_has_no_score():
     J = np.array([[1.0, 2.0], [2.0, 4.0], [3.0, 6.0]])
     assert scores(J.T @ J, J.T @ np.ones(3), np.array([0]), ("a", "b")) == {}
 
@@ -38,23 +35,19 @@ def test_a_direction_is_seen_from_half_its_range_on(width, named):
     assert [list(direction) for direction in found] == [["a"]] * named
 
 
-def test_each_row_is_over_its_own_expectation():
+def test_each_row_is_over_its_own_expectation_and_the_worst_sensor_is_so_by_its_deviations():
     """Ten values of twelve count: 20 numbers less 3; bands and sensors by theirs."""
     weight = np.ones(SHAPE)
     weight[5] = 0.0
     squares = 2.0 * weight
     squares[3, 1] += 5.0
-    report = verdict(
-        Sums(np.eye(3), np.zeros(3), squares, 0 * np.eye(3)), data_of(weight), 3, {}, []
-    )
+    sums = Sums(np.eye(3), np.zeros(3), squares, 0 * np.eye(3))
+    report = verdict(sums, data_of(weight), 3, {}, [])
     values = [row.value for row in report.rows]
     assert_allclose(values, [25 / 17, 15 / 10, 9 / 4])
     assert [row.quantity.split(",")[0] for row in report.rows[1:]] == ["worst sensor", "worst band"]
     assert "worst sensor, 1" in report.rows[1].quantity and "4 to 4 Hz" in report.rows[2].quantity
-
-
-def test_the_worst_sensor_is_so_by_its_deviations():
-    """Of two numbers 12 are 5 deviations too much, of ten 24 are 3.1: 14 more, but less rare."""
+    # of two numbers 12 are 5 deviations too much, of ten 24 are 3.1: 14 more, but less rare
     weight = np.ones(SHAPE)
     weight[1:, 0] = 0.0
     weight[5] = 0.0
@@ -63,16 +56,13 @@ def test_the_worst_sensor_is_so_by_its_deviations():
     assert "worst sensor, 0" in report.rows[1].quantity
 
 
-def test_the_limit_is_that_of_all_trials_together():
+def test_limits_are_those_of_all_trials_and_allow_for_what_is_not_known_of_variances():
     """0.001 of a right model; 0.0005 for each of two sensors. Chi-square of two: -2 ln P / 2."""
     weight = np.zeros(SHAPE)
     weight[0] = 1.0
     report = verdict(Sums(np.eye(1), np.zeros(1), 2 * weight), data_of(weight), 0, {}, [])
     assert report.rows[1].limit == f"<= {-np.log(0.0005):g}"
-
-
-def test_limits_allow_for_what_is_not_known_of_variances():
-    """Half the freedom: chi-square of two. A scale that varies by a half: F of two and four."""
+    # half the freedom: chi-square of two; a scale that varies by a half: F of two and four
     half = chi_row("x", 1.0, 4.0, 1, known=0.5)
     assert half.limit == f"<= {-np.log(0.001):g}"
     scaled = chi_row("x", 1.0, 2.0, 1, scale=0.5)

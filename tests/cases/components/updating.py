@@ -9,17 +9,15 @@ from cases.solid import STEEL, composite
 from rom.components.updating.family_model import Parts, family_model
 from rom.components.updating.frf_data import estimators, noisy
 from rom.components.updating.normal_equations import responses_at
+from rom.components.updating.observers.operation import discrete
 from rom.errors import ConfigError
 from rom.updating import Channels, JointSpring, Responses
 
 BEAM = (1.0, 0.1, 0.08)
 KINDS = {"root": "rbe2", "tip": "rbe2"}
 BOLTS = JointSpring(("frame", "tip"), ("arm", "root"), (4e8, 4e8, 4e8, 2e5, 1e5, 1e5), 0.1, 10.0)
-PARAMETERS = {
-    "E_inner": rom.YoungsModulus("inner", 0.4, 2.5),
-    "E_outer": rom.YoungsModulus("outer", 0.4, 2.5),
-    "rho_outer": rom.Density("outer", 0.5, 2.0),
-}
+PARAMETERS = {f"E_{name}": rom.YoungsModulus(name, 0.4, 2.5) for name in ("inner", "outer")}
+PARAMETERS |= {"rho_outer": rom.Density("outer", 0.5, 2.0)}
 
 
 def refuse(*rows, error=ConfigError):
@@ -29,7 +27,6 @@ def refuse(*rows, error=ConfigError):
 
 
 def crossed(points, bodies=None):
-    """Channels along y and along z at each point."""
     axes = np.tile([[0, 1, 0], [0, 0, 1]], (len(points), 1))
     return Channels(np.repeat(points, 2, axis=0), axes, bodies)
 
@@ -48,35 +45,23 @@ def assert_alike(one, other, names, atol):
 
 
 def family_of(parameters, cells, n_modes, regions=("inner", "outer"), *, size=BEAM, **options):
-    """Family of a block whose length its regions share, uncertified.
+    """Family of a block whose length its regions share along x, uncertified.
 
-    Args:
-        parameters: {name: parameter}.
-        cells: (3,) numbers of bricks.
-        n_modes: of the fixed interfaces.
-        regions: names, along x.
-        size: of the block [m].
-        options: ``origin`` of the block [m], and more as of `rom.reduce_parametric`.
+    Options are its ``origin`` [m], and those of `rom.reduce_parametric`.
     """
     origin = options.pop("origin", (0.0, 0.0, 0.0))
-    parts = dict.fromkeys(regions, STEEL)
-    model = composite(
-        parts, lambda c: regions[len(regions) * c[0] // cells[0]], size, cells, origin
-    )
-    options = {"interfaces": KINDS, "certify": False} | options
-    method = rom.CraigBampton(n_modes)
-    return rom.reduce_parametric(model, parameters=parameters, method=method, **options)
+    parts, n = dict.fromkeys(regions, STEEL), len(regions)
+    model = composite(parts, lambda c: regions[n * c[0] // cells[0]], size, cells, origin)
+    options = {"interfaces": KINDS, "certify": False, "method": rom.CraigBampton(n_modes)} | options
+    return rom.reduce_parametric(model, parameters=parameters, **options)
 
 
 def halves(n_modes=12):
-    """Families of the two halves of a beam, "frame" before "arm", each with its modulus."""
-    return {
-        name: family_of(
-            {"E": rom.YoungsModulus(name, 0.3, 3.0)}, (4, 1, 1), n_modes, (name,),
-            size=(0.5, 0.1, 0.08), origin=(x, 0, 0),
-        )
-        for name, x in (("frame", 0.0), ("arm", 0.5))
-    }  # fmt: skip
+    made = {}
+    for name, x in (("frame", 0.0), ("arm", 0.5)):
+        modulus, place = {"E": rom.YoungsModulus(name, 0.3, 3.0)}, {"origin": (x, 0, 0)}
+        made[name] = family_of(modulus, (4, 1, 1), n_modes, (name,), size=(0.5, 0.1, 0.08), **place)
+    return made
 
 
 def model_of(family, channels, fixed, attached=None, candidates=None):
@@ -99,6 +84,53 @@ def noisy_test(family, true, channels, lines, *, level, averages, seed=0, **mode
     H = noisy(H, level, np.random.default_rng(seed)) if level else H
     c = 1 / (1 + averages * level**2) if level else 0.999  # level^2 / 2 for each part
     return Responses(lines, H, *channels, c, averages)
+
+
+def fed(one, sensors, samples, wanted, dt, first=0):
+    """What the FMU of a filter answers after each sample of its sensors."""
+    rows = []
+    for k, sample in enumerate(samples, first):
+        for name, value in zip(sensors, sample, strict=True):
+            one.set(f"sensor.{name}", value)
+        one.fmu.doStep(k * dt, dt)
+        rows.append(one.get(*wanted))
+    return np.array(rows)
+
+
+def walked(t, rng, n_t, every=50):
+    """A record of what a filter assumes: logarithms of factors, values, and samples.
+
+    Parameters walk every so many steps, as far as they do in that time.
+    """
+    o, first = t.operation, np.array([d.first for d in t.drifts.values()])
+    walk = np.array([d.walk for d in t.drifts.values()])
+    P = t.assumed.before(o)
+    x = np.sqrt(np.diag(P)) * rng.standard_normal(len(P))
+    p = first * rng.standard_normal(len(first))
+    factors, values, clean = [], [], []
+    for k in range(n_t):
+        if k % every == 0:
+            p = p + (k > 0) * walk * np.sqrt(every * t.assumed.dt) * rng.standard_normal(len(p))
+            at, step, root = stepped(t, p)
+        factors.append(p)
+        values.append(at.W @ x)
+        clean.append(at.C @ x)
+        x = step @ x + root @ rng.standard_normal(len(x))
+    clean = np.array(clean)
+    y = clean + np.sqrt(t.R) * rng.standard_normal(clean.shape)
+    return np.array(factors), np.array(values), y
+
+
+def stepped(t, p):
+    """The equations, transition and root of the noise of a step at logarithms p of factors.
+
+    The symmetric root of a matrix that is nearly singular is the same on any machine.
+    """
+    at = t.operation.at(p)
+    step, Q = discrete(at.A, t.assumed.white(t.operation), t.assumed.dt)
+    scale = np.sqrt(np.diag(Q))
+    lam, V = np.linalg.eigh(Q / np.outer(scale, scale))
+    return at, step, scale[:, None] * (V * np.sqrt(np.maximum(lam, 0.0))) @ V.T
 
 
 def gauss(rng, shape):

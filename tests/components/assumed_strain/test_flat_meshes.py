@@ -7,21 +7,12 @@ from scipy.linalg import eigh
 
 from cases.paths import ROOT
 from cases.refusals import refuses
-from rom.components.assumed_strain import (
-    Actions,
-    Metal,
-    Tool,
-    Traction,
-    mass,
-    outer_sides,
-    quasi_static,
-    sheet,
-)
+from rom.components import assumed_strain as sheets
+from rom.components.assumed_strain import Metal, sheet
 from rom.components.assumed_strain.space import bending
 from rom.errors import ConfigError, MeshError, TagError, UnsafeFileError
 from rom.fe.mesh import read_triangles
 
-pytest.importorskip("gmsh", reason="needs gmsh")
 pytestmark = pytest.mark.fenicsx
 BILLET = ROOT / "meshes" / "billet.geo"
 RING = """SetFactory("OpenCASCADE");
@@ -41,18 +32,18 @@ Mesh.CharacteristicLengthMax = 0.1;
 
 @pytest.fixture
 def drawn(tmp_path):
-    def write(text):
+    def meshed(text):
         (tmp_path / "drawn.geo").write_text(text)
-        return tmp_path / "drawn.geo"
+        return read_triangles(tmp_path / "drawn.geo")
 
-    return write
+    return meshed
 
 
 def test_a_billet_has_its_area_and_its_curves():
     mesh = read_triangles(BILLET, parameters={"lc": 0.6, "radius": 2.0}, scale=1e-3)
     body = sheet(mesh.points, mesh.triangles)
     assert body.area.sum() == pytest.approx((100 - 4 + np.pi) * 1e-6, rel=1e-3)
-    outer = {tuple(side) for side in outer_sides(body).tolist()}
+    outer = {tuple(side) for side in sheets.outer_sides(body).tolist()}
     assert set(mesh.curves) == {"middle", "side", "top", "axis"}
     assert {tuple(s) for sides in mesh.curves.values() for s in sides.tolist()} == outer
     assert_allclose(mesh.points[mesh.nodes("top"), 1], 0.01)
@@ -87,27 +78,24 @@ $EndElements
 @pytest.mark.parametrize(("first", "second"), [
     ("1 2 3", "1 3 4"), ("1 3 2", "1 4 3"), ("1 2 3", "4 3 1")])  # fmt: skip
 def test_triangles_that_go_clockwise_are_turned(tmp_path, low, first, second):
-    """Whatever a file says: areas above zero, and sides with the solid on the left."""
     (tmp_path / "four.msh").write_text(FOUR.format(low=low, first=first, second=second))
     mesh = read_triangles(tmp_path / "four.msh")
     body = sheet(mesh.points, mesh.triangles)
     assert_allclose(body.area, 3.0)
     side = np.diff(mesh.points[mesh.curves["low"][0]], axis=0)[0]
     assert_allclose(side, [3.0, 0.0])
-    assert_allclose(outer_sides(body)[:, 0].sum(), 0 + 1 + 2 + 3)
+    assert_allclose(sheets.outer_sides(body)[:, 0].sum(), 0 + 1 + 2 + 3)
 
 
 def test_a_bored_ring_under_pressure_is_that_of_lame(drawn):
     """Plane strain; the bore grows by (1 + nu) p a / E ((1 - 2 nu) a^2 + b^2) / (b^2 - a^2)."""
-    mesh = read_triangles(drawn(RING))
+    mesh = drawn(RING)
     body = sheet(mesh.points, mesh.triangles, state="plane strain")
-    right = np.abs(mesh.points - [1.0, 0.0]).sum(axis=1).argmin()
-    held = [2 * right + 1]
-    bore, p = mesh.curves["bore"], 1e-4
-    top = np.abs(mesh.points - [0, 2.0]).sum(axis=1).argmin()
-    held += [2 * top, 2 * np.abs(mesh.points - [0, -2.0]).sum(axis=1).argmin()]
-    course = quasi_static(body, Metal(1.0, 0.3), Actions(held, tractions=[Traction(bore, p)]),
-                          [0, 1])  # fmt: skip
+    places = [1.0, 0.0], [0, 2.0], [0, -2.0]
+    right, top, low = (np.abs(mesh.points - x).sum(axis=1).argmin() for x in places)
+    held, bore, p = [2 * right + 1, 2 * top, 2 * low], mesh.curves["bore"], 1e-4
+    pressed = sheets.Actions(held, tractions=[sheets.Traction(bore, p)])
+    course = sheets.quasi_static(body, Metal(1.0, 0.3), pressed, [0, 1])
     nodes = mesh.nodes("bore")
     grown = np.linalg.norm(course.x[-1, nodes], axis=1) - np.linalg.norm(mesh.points[nodes], axis=1)
     assert grown.mean() == pytest.approx(1.3 * p * (0.4 + 4) / 3, rel=0.02)
@@ -115,9 +103,9 @@ def test_a_bored_ring_under_pressure_is_that_of_lame(drawn):
 
 def test_a_free_disc_bends_as_in_the_book(drawn):
     """Leissa: lambda^2 = 5.358 twice, 9.003 and 12.44 twice, for nu = 0.3; round edge of chords."""
-    mesh = read_triangles(drawn(DISC))
+    mesh = drawn(DISC)
     body, metal = sheet(mesh.points, mesh.triangles, thickness=0.01), Metal(1.0, 0.3, 1.0)
-    K, M = bending(body, metal).toarray(), mass(body, metal)[::2, ::2].toarray()
+    K, M = bending(body, metal).toarray(), sheets.mass(body, metal)[::2, ::2].toarray()
     found = np.sqrt(np.abs(eigh(K, M, eigvals_only=True)[3:8]))
     unit = np.sqrt(0.01**2 / 12 / (1 - 0.3**2))
     assert_allclose(found / unit, [5.358, 5.358, 9.003, 12.44, 12.44], rtol=0.01)
@@ -131,9 +119,9 @@ def test_a_billet_from_gmsh_is_upset_with_friction():
     way = ((0, 1), ((0, 0), (0, -2.0)))
     pressures = {}
     for friction in (0.0, 0.2):
-        platen = Tool("platen", [(-1, 10), (40, 10), (40, 20), (-1, 20)], friction, way)
-        course = quasi_static(body, Metal(200e3, 0.3, 1.0, 500.0), Actions(held, tools=[platen]),
-                              np.linspace(0, 1, 21))  # fmt: skip
+        platen = sheets.Tool("platen", [(-1, 10), (40, 10), (40, 20), (-1, 20)], friction, way)
+        actions, metal = sheets.Actions(held, tools=[platen]), Metal(200e3, 0.3, 1.0, 500.0)
+        course = sheets.quasi_static(body, metal, actions, np.linspace(0, 1, 21))
         x = course.x[-1]
         wide = x[x[:, 1] > 8 - 1e-3, 0].max()
         pressures[friction] = -course.tool_forces[-1, 0, 1] / wide / (2 / np.sqrt(3) * 500)
@@ -150,11 +138,10 @@ def test_what_is_no_section_is_named(drawn, tmp_path):
         (tmp_path / name).write_text("ISO")
         refuses(error, words, read_triangles, tmp_path / name)
     refuses(ConfigError, "depth", read_triangles, BILLET, parameters={"depth": 1.0})
-    with pytest.raises(MeshError, match="no triangles: the geometry has no plane surface"):
-        read_triangles(drawn("Point(1) = {0, 0, 0};\nPoint(2) = {1, 0, 0};\nLine(1) = {1, 2};\n"))
+    line = "Point(1) = {0, 0, 0};\nPoint(2) = {1, 0, 0};\nLine(1) = {1, 2};\n"
+    refuses(MeshError, "no triangles: the geometry has no plane surface", drawn, line)
     square = 'SetFactory("OpenCASCADE");\nRectangle(1) = {0, 0, %s, 1, 1};\n%s\n'
-    refuses(MeshError, r"by 0\.3 m", lambda: read_triangles(drawn(square % ("0.3", ""))))
-    with pytest.raises(MeshError, match="Quadrilateral 4: triangles"):
-        read_triangles(drawn(square % ("0", "Recombine Surface {1};")))
-    with pytest.raises(TagError, match=r"no curve 'edge'; there are \[\]"):
-        read_triangles(drawn(square % ("0", ""))).nodes("edge")
+    refuses(MeshError, r"by 0\.3 m", drawn, square % ("0.3", ""))
+    quads = square % ("0", "Recombine Surface {1};")
+    refuses(MeshError, "Quadrilateral 4: triangles", drawn, quads)
+    refuses(TagError, r"no curve 'edge'; there are", drawn(square % ("0", "")).nodes, "edge")

@@ -9,16 +9,7 @@ import pytest
 from cases.refusals import refused
 from cases.sheets import distorted
 from rom.components import assumed_strain as sheets
-from rom.components.assumed_strain import (
-    Actions,
-    Drive,
-    Load,
-    Metal,
-    Tool,
-    Traction,
-    rectangle,
-    sheet,
-)
+from rom.components.assumed_strain import Actions, Drive, Load, Metal, Tool, Traction, sheet
 from rom.components.assumed_strain.actions import prepared
 from rom.errors import ConfigError, MaterialError, RomError
 
@@ -43,7 +34,7 @@ SOLID = {"body": BODY, "metal": METAL}
 CALLS = {  # a call that works, and its arguments
     "sheet": (sheet, {"points": X, "triangles": T, "element": "F3", "state": "plane stress",
                       "thickness": 1.0}),
-    "rectangle": (rectangle, {"n": (2, 2), "corners": [(0, 0), (1, 0), (1, 1), (0, 1)],
+    "rectangle": (sheets.rectangle, {"n": (2, 2), "corners": [(0, 0), (1, 0), (1, 1), (0, 1)],
                               "diagonal": "/"}),
     "disc": (sheets.disc, {"center": (0, 0), "radius": 1.0, "n": 8}),
     "outer_sides": (sheets.outer_sides, {"body": BODY}),
@@ -112,7 +103,6 @@ TRIED = {  # what is tried: names by which a message may call it, and a call wit
 
 @pytest.mark.parametrize("tried", TRIED)
 def test_what_fits_nowhere_is_refused_by_its_name_and_odd_values_do_no_harm(tried):
-    """No foreign exception, no warning of NumPy, no crash of compiled loops."""
     names, act = TRIED[tried]
     for what in NEVER.keys() - ({"dictionary"} if tried == "in_space.interfaces" else ()):
         words = outcome(lambda v=NEVER[what]: act(v))
@@ -143,13 +133,10 @@ test_the_culprit_and_its_cure = refused(
 )  # fmt: skip
 
 
-def test_a_sheet_whose_nodes_are_all_driven_rests():
+def test_all_nodes_driven_an_infinite_friction_and_a_metal_that_never_yields_are_allowed():
     moved = Actions(drives=[Drive(range(18), ((0, 1), (0, 0.1)))])
     course = sheets.quasi_static(BODY, METAL, moved, [0, 1])
     assert np.allclose(course.x[-1], X + 0.1)
     assert np.abs(course.reactions).max() < 1e-9
-
-
-def test_an_infinite_friction_and_a_metal_that_never_yields_are_allowed():
     prepared(BODY, replace(WITH_TOOL, tools=[Tool("pad", PAD, np.inf)]))
     assert Metal(1.0, 0.3, 1.0, np.inf).yield_stress == np.inf

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
-from scipy.linalg import eigh
 from scipy.optimize import fsolve
 
 import rom
@@ -43,22 +42,17 @@ def test_forces_and_tangent_are_derivatives_of_the_energy():
     assert_allclose(linearised(one, shape, load)[1], by_shape, atol=1e-8)
 
 
-def test_reference_has_no_stress_whatever_its_corners():
+def test_reference_has_no_stress_and_a_rigid_motion_changes_nothing():
     one = crooked(np.random.default_rng(1))
     assert_allclose(linearised(one, reference(one))[0], 0, atol=1e-14)
     assert cosserat.elastic_energy(one, reference(one)) < 1e-28
-
-
-def test_a_rigid_motion_changes_nothing():
-    """Energy and forces in section axes are the same, and forces balance as a whole."""
     rng = np.random.default_rng(2)
     one = crooked(rng)
     shape = moved(reference(one), 0.3 * rng.normal(size=6 * one.h.size + 9))
     turn, away = rotation.exp([1.0, -2.0, 0.5]), [3.0, -1.0, 2.0]
     A = rotation.matrix(turn)
-    carried = cosserat.Shape(
-        shape.x @ A.T + away, np.array([rotation.multiply(turn, p) for p in shape.p])
-    )
+    carried_p = np.array([rotation.multiply(turn, p) for p in shape.p])
+    carried = cosserat.Shape(shape.x @ A.T + away, carried_p)
     r, _ = linearised(one, shape)
     there, _ = linearised(one, carried)
     size = np.append(r, np.zeros(3)).reshape(-1, 6)
@@ -84,22 +78,18 @@ def test_elastica(alpha, deflection, shortening, angle):
     assert_allclose(np.arctan2(shape.frame(-1)[0, 2], shape.frame(-1)[2, 2]), angle, rtol=2e-4)
 
 
-def rolled_up(n):
-    one = straight(10.0, n, stretch=STIFF, bend=100.0)
-    shape = equilibrium(one, loads(one, tip_moment=(0, 20 * np.pi, 0)))
-    a, k = cosserat.strain(one, shape)
-    assert_allclose(a, 0, atol=1e-9)
-    angle = np.arcsin(2 * np.pi / 10 * one.l)  # where M = B k cos(angle / 2)
-    assert_allclose(k[:, 1], 2 * np.sin(angle / 2) / one.l, rtol=1e-8)
-    return np.linalg.norm(shape.x[-1])
-
-
 def test_moment_rolls_a_beam_up_into_a_circle():
-    """The end meets the start with second order, plates at half segments included."""
-    error = np.array([rolled_up(n) for n in (20, 40, 80)])
+    error = []
+    for n in (20, 40, 80):
+        one = straight(10.0, n, stretch=STIFF, bend=100.0)
+        shape = equilibrium(one, loads(one, tip_moment=(0, 20 * np.pi, 0)))
+        a, k = cosserat.strain(one, shape)
+        assert_allclose(a, 0, atol=1e-9)
+        angle = np.arcsin(2 * np.pi / 10 * one.l)  # where M = B k cos(angle / 2)
+        assert_allclose(k[:, 1], 2 * np.sin(angle / 2) / one.l, rtol=1e-8)
+        error.append(np.linalg.norm(shape.x[-1]))
     assert_allclose(error, [0.170, 0.0415, 0.0103], rtol=5e-3)
-    order = np.log2(error[:-1] / error[1:])
-    assert ((order > 1.9) & (order < 2.1)).all()
+    assert_allclose(np.log2(error[:2]) - np.log2(error[1:]), 2.0, atol=0.1)
 
 
 def bend_of_45_degrees(n, J, k):
@@ -153,23 +143,19 @@ def shooting(turn, curvature, length, rigidities, force):
     return end(moment, n)[:3]
 
 
-def test_bend_is_the_solution_of_the_differential_equations():
+def test_bend_converges_with_second_order_to_the_solution_of_the_differential_equations():
     """A boundary value problem solved by shooting has no segments to be wrong about."""
     one = bend_of_45_degrees(80, 1 / 6, 5 / 6)
     stiff = (*one.stretch[0], *one.bend[0])
     tip = shooting(one.p[0], [0, 0.01, 0], 25 * np.pi, stiff, (0, 0, 600))
     assert_allclose(tip, (47.1501, 15.6847, 53.4755), rtol=2e-6)
     assert_allclose(equilibrium(one, loads(one, tip=(0, 0, 600))).x[-1], tip, rtol=3e-4)
-
-
-def test_bend_converges_with_second_order():
-    tip = []
+    ends = []
     for n in (10, 20, 40):
         one = bend_of_45_degrees(n, 1 / 6, 5 / 6)
-        tip.append(equilibrium(one, loads(one, tip=(0, 0, 600))).x[-1])
-    error = np.linalg.norm(np.array(tip) - (47.1501, 15.6847, 53.4755), axis=1)
-    order = np.log2(error[:-1] / error[1:])
-    assert ((order > 1.9) & (order < 2.1)).all(), order
+        ends.append(equilibrium(one, loads(one, tip=(0, 0, 600))).x[-1])
+    error = np.linalg.norm(np.array(ends) - (47.1501, 15.6847, 53.4755), axis=1)
+    assert_allclose(np.log2(error[:-1] / error[1:]), 2.0, atol=0.1)
 
 
 def test_twisted_beam():
@@ -202,7 +188,6 @@ PRINCETON = {  # flapwise and edgewise displacement [mm], twist [deg] by a shoot
 
 
 def princeton(force, angle, **section):
-    """The beam, and the force on its tip."""
     b, t, E = 12.3777e-3, 3.2024e-3, 71.7e9
     G, soft, stiff = E / 2.62, b * t**3 / 12, t * b**3 / 12
     one = straight(0.508, 80, stretch=[G * b * t, G * b * t, E * b * t],
@@ -212,7 +197,6 @@ def princeton(force, angle, **section):
 
 
 def check_princeton(force, angle, tip, A):
-    """Compare place and axes of the tip with the table."""
     twist = np.degrees(np.arctan2(A[0, 1], A[1, 1]))
     flap, edge, turned = np.array(PRINCETON[force])[:, ANGLES.index(angle)]
     assert_allclose(1e3 * tip[:2], (flap, -edge), rtol=2e-3, atol=1e-6)
@@ -232,7 +216,6 @@ def test_princeton_beam(force, angle):
     ("force", "angle"), few(2, [(13.345, 45), (13.345, 75), *product(PRINCETON, ANGLES)])
 )
 def test_princeton_beam_in_a_mechanism(force, angle):
-    """In one step of its load."""
     one, load = princeton(force, angle, mass=0.1, inertia=1e-5)
     mech = rom.Mechanism(gravity=(0, 0, 0))
     beam = mech.add_nonlinear("beam", cosserat.body(one))
@@ -252,10 +235,8 @@ def test_a_spinning_rim_grows_until_its_tension_holds_it(speed):
         return R * out, np.column_stack([out, np.cross(tangent, out), tangent])
 
     section = {"stretch": EA, "bend": 1e-4 * EA, "mass": mass, "inertia": 1e-4}
-    mech = rom.Mechanism(gravity=(0, 0, 0))
-    rim = mech.add_nonlinear(
-        "rim", cosserat.body(along(place, np.linspace(0, 2 * np.pi, n + 1), **section))
-    )
+    mech, ring = rom.Mechanism(gravity=(0, 0, 0)), np.linspace(0, 2 * np.pi, n + 1)
+    rim = mech.add_nonlinear("rim", cosserat.body(along(place, ring, **section)))
     hub = mech.add_rigid("hub", mass=1, inertia=(1, 1, 1), at=(0, 0, 0),
                          markers={"axle": (0, 0, 0), "spoke": (R, 0, 0)})  # fmt: skip
     mech.revolute("axle", mech.ground.marker((0, 0, 0)), hub.marker("axle"), axis=(0, 0, 1))
@@ -291,15 +272,14 @@ def test_buckling_load_of_a_column():
         load = loads(one, tip=(0, 0, -P))
         shape = equilibrium(one, load)
         free = cosserat.clamped(one)
-        return eigh(linearised(one, shape, load)[1][np.ix_(free, free)], eigvals_only=True,
-                    subset_by_index=(0, 0))[0]  # fmt: skip
+        return np.linalg.eigvalsh(linearised(one, shape, load)[1][np.ix_(free, free)])[0]
 
     # P (1 + P / GA - P / EA) = P_E, the length shortens by P / EA
     P = max(np.roots([1 / GA - 1 / EA, 1.0, -(np.pi**2) / 4]))
     assert lowest(0.999 * P) > 0 > lowest(1.001 * P)
 
 
-def test_what_is_no_rod_is_named():
+def test_what_is_no_rod_or_cannot_be_cut_or_found_is_named_and_the_last_shape_is_kept():
     section = {"stretch": 1.0, "bend": 1.0}
     turned = np.tile([1.0, 0, 0, 0], (4, 1))
     refuses(ModelError, "segment 1", rod, [[0, 0, 0], [0, 0, 1], [0, 0, 1]], turned, **section)
@@ -312,9 +292,11 @@ def test_what_is_no_rod_is_named():
     refuses(ModelError, "N segments have", rod, [[0, 0, 0], [0, 0, 1]], turned, **section)
     one = straight(1.0, 4, **section)
     refuses(ConfigError, "needed are", equilibrium, one, (np.zeros((4, 3)), np.zeros((6, 3))))
-
-
-def test_without_equilibrium_the_last_shape_is_kept():
+    one = straight(1.0, 4, stretch=1e4, bend=1.0)
+    assert [piece.h.size for piece in cut(one, 3)] == [1, 2, 1]
+    refuses(ConfigError, "5 pieces of a rod of 4 segments", cut, one, 5)
+    load = np.outer([0, 0, 0, 0, 1.0], [30.0, 0, -60.0])
+    refuses(SolverError, "2 linear pieces found no equilibrium", bend_in_pieces, one, 2, load)
     one = straight(1.0, 10, stretch=10.0, bend=1.0)
     free = np.ones_like(cosserat.clamped(one))
     with pytest.raises(SolverError, match="no equilibrium beyond 0 % of the load") as error:
@@ -347,13 +329,4 @@ def test_more_linear_bodies_come_closer_to_the_rod():
     assert (np.diff(error) < 0).all()
     assert abs(tip[0, 2] - one.x[-1, 2]) < 0.02  # no shortening at all
     assert error[3] < 0.02 * np.linalg.norm(exact - one.x[-1])
-    order = np.log2(error[2:-1] / error[3:])
-    assert ((order > 1.7) & (order < 2.3)).all(), order
-
-
-def test_what_cannot_be_cut_or_found_is_named():
-    one = straight(1.0, 4, stretch=1e4, bend=1.0)
-    assert [piece.h.size for piece in cut(one, 3)] == [1, 2, 1]
-    refuses(ConfigError, "5 pieces of a rod of 4 segments", cut, one, 5)
-    load = np.outer([0, 0, 0, 0, 1.0], [30.0, 0, -60.0])
-    refuses(SolverError, "2 linear pieces found no equilibrium", bend_in_pieces, one, 2, load)
+    assert_allclose(np.log2(error[2:-1] / error[3:]), 2.0, atol=0.3)

@@ -5,13 +5,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 from cases.refusals import refuses
+from rom.components import cosserat
 from rom.components.cosserat import clamped, equilibrium, linearised, loads, reference
-from rom.components.cosserat.helical_spring import (
-    HelicalSpring,
-    plate_compliance,
-    spring_rod,
-    wire_rod,
-)
+from rom.components.cosserat.helical_spring import HelicalSpring, plate_compliance, spring_rod
 from rom.errors import ModelError
 
 MM = 1e-3
@@ -21,11 +17,14 @@ def spring(wire, diameter, coils, length):
     return HelicalSpring(wire * MM, diameter * MM, coils, length * MM)
 
 
-def test_rigidities_of_the_bench_spring():
+def test_rigidities_stress_and_clearance_of_the_bench_spring():
     one = spring(1, 10, 6, 15)
-    assert_allclose([one.axial, one.bending, one.shear, one.torsion],
-                    [24.0385, 6.79348e-4, 62.5, 7.8125e-4], rtol=2e-6)  # fmt: skip
+    rigidities = [one.axial, one.bending, one.shear, one.torsion]
+    assert_allclose(rigidities, [24.0385, 6.79348e-4, 62.5, 7.8125e-4], rtol=2e-6)
     assert_allclose([one.stiffness, one.bending / one.length], [1602.56, 0.0452899], rtol=4e-6)
+    shear, bending = one.wire_stress(10.0, 0.01)
+    assert_allclose([shear, bending], [42 / 37 * 0.8 / np.pi * 1e9, 0.32 / np.pi * 1e9], rtol=1e-12)
+    assert_allclose(one.clearance(14 * MM, -0.5), (14 - 2.75 - 6) * MM)
 
 
 WIRE = {  # wire, diameter, coils, length [mm]: stiffness, bending, sideways, twist over the wire's
@@ -43,7 +42,7 @@ def test_closed_forms_are_those_of_the_wire(size):
     The first ratio is one of stiffnesses, the others are of compliances.
     """
     one = spring(*size)
-    wire = plate_compliance(wire_rod(one), (0, 0, one.length)).diagonal()
+    wire = plate_compliance(cosserat.wire_rod(one), (0, 0, one.length)).diagonal()
     ratio = one.compliance().diagonal() / wire
     axial, bending, sideways, twist = WIRE[size]
     expected = [sideways, sideways, 1 / axial, bending, bending, twist]
@@ -51,12 +50,15 @@ def test_closed_forms_are_those_of_the_wire(size):
     assert_allclose(ratio[:5], 1.0, atol=0.0105)
 
 
-def test_a_short_rod_has_the_compliance_of_the_spring():
+def test_a_short_rod_has_the_compliance_of_the_spring_and_shortens_in_proportion():
     one = spring(1, 10, 6, 15)
     C = one.compliance()
     size = np.sqrt(np.outer(C.diagonal(), C.diagonal()))
     ours = plate_compliance(spring_rod(one, 64), (0, 0, one.length))
     assert_allclose(ours / size, C / size, atol=2e-4)
+    rod = spring_rod(one, 8)
+    shape = equilibrium(rod, loads(rod, tip=(0, 0, -10.0)))
+    assert_allclose(reference(rod).x[-1, 2] - shape.x[-1, 2], 10 / one.stiffness, rtol=1e-9)
 
 
 def guided(one, share, n):
@@ -94,21 +96,6 @@ def test_buckling():
     assert_allclose(short.critical_compression(1.0), 0.8125, rtol=0.1)
 
 
-def test_stress_and_clearance():
-    one = spring(1, 10, 6, 15)
-    shear, bending = one.wire_stress(10.0, 0.01)
-    assert_allclose([shear, bending], [42 / 37 * 0.8 / np.pi * 1e9, 0.32 / np.pi * 1e9], rtol=1e-12)
-    assert_allclose(one.clearance(14 * MM, -0.5), (14 - 2.75 - 6) * MM)
-
-
 def test_impossible_springs_are_named():
     refuses(ModelError, r"must be below diameter = 0\.01", spring, 10, 10, 1, 15)
     refuses(ModelError, r"free length 0\.006 m is not above the solid length", spring, 1, 10, 6, 6)
-
-
-def test_a_load_that_closes_the_spring_shortens_it_in_proportion():
-    """Axial rigidity per length is constant, whatever the compression."""
-    one = spring(1, 10, 6, 15)
-    rod = spring_rod(one, 8)
-    shape = equilibrium(rod, loads(rod, tip=(0, 0, -10.0)))
-    assert_allclose(reference(rod).x[-1, 2] - shape.x[-1, 2], 10 / one.stiffness, rtol=1e-9)

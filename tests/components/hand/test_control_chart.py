@@ -18,18 +18,22 @@ def ray(angle, effort, n=100):
     return np.full(n, size * np.cos(a)), np.full(n, size * np.sin(a))
 
 
+def followed(*rays):
+    return Chart().follow(*(np.concatenate(part) for part in zip(*rays, strict=True)), DT)
+
+
 def test_the_square_is_covered_once():
     x, y = np.meshgrid(np.linspace(0, 1, 201), np.linspace(0, 1, 201))
     groups = Chart().group(x, y)
     assert set(np.unique(groups)) == {NO_GROUP, 0, 1, 2, 3, 4}
     assert ((groups == NO_GROUP) == (np.maximum(x, y) < 0.12)).all()
-    borders = np.degrees(np.arctan2(y, x))
-    moving = groups != NO_GROUP
-    assert (groups == np.clip(borders // 18.0000001, 0, 4))[moving].mean() > 0.99
+    expected = np.clip(np.degrees(np.arctan2(y, x)) // 18.0000001, 0, 4)
+    assert (groups == expected)[groups != NO_GROUP].mean() > 0.99
 
 
 @pytest.mark.parametrize("group", range(5))
 def test_every_group_is_reached_and_drawn(group):
+    assert np.linalg.matrix_rank(COUPLINGS) == 4 and len(GROUPS) == 5
     commands = Chart().follow(*ray(18 * group + 9 if group != 2 else 38, 0.46), DT)
     assert commands.groups[-1] == group
     assert_allclose(commands.pulls[-1, group], 7e-3)
@@ -45,7 +49,6 @@ def test_pull_follows_effort_no_faster_than_allowed():
 
 
 def test_noise_on_a_border_does_not_chatter():
-    """Plus and minus one degree about the border of two groups."""
     rng = np.random.default_rng(5)
     angle = np.radians(36 + rng.uniform(-1, 1, 2000))
     commands = Chart().follow(0.5 * np.cos(angle), 0.5 * np.sin(angle), DT)
@@ -54,26 +57,21 @@ def test_noise_on_a_border_does_not_chatter():
 
 def test_a_group_is_left_only_after_a_while():
     first, short, long = ray(9, 0.5, 50), ray(60, 0.7, 14), ray(60, 0.7, 30)
-    brief = Chart().follow(*(np.concatenate(p) for p in zip(first, short, first, strict=True)), DT)
+    brief = followed(first, short, first)
     assert (brief.groups == 0).all()
     assert_allclose(brief.pulls[63], brief.pulls[49])  # nobody moves in doubt
-    lasting = Chart().follow(*(np.concatenate(p) for p in zip(first, long, strict=True)), DT)
+    lasting = followed(first, long)
     assert lasting.groups[-1] == 3
     assert_allclose(lasting.pulls[-1, 0], lasting.pulls[49, 0])  # the first group holds
 
 
 def test_weak_signals_hold_and_both_muscles_switch_to_opening():
-    parts = ray(9, 0.8, 60), ray(9, 0.05, 20), ray(45, 0.9, 40), ray(9, 0.05, 5), ray(9, 0.5, 60)
-    commands = Chart().follow(*(np.concatenate(p) for p in zip(*parts, strict=True)), DT)
+    parts = (9, 0.8, 60), (9, 0.05, 20), (45, 0.9, 40), (9, 0.05, 5), (9, 0.5, 60)
+    commands = followed(*(ray(*part) for part in parts))
     assert not commands.opening[79] and commands.opening[-1]
     assert np.diff(commands.opening.astype(int)).sum() == 1
     assert_allclose(commands.pulls[79, 0], 14e-3)
     assert commands.pulls[-1, 0] == 0.0
-
-
-def test_five_inputs_move_all_fingers_independently():
-    """The groups span four fingers' worth of pulls."""
-    assert np.linalg.matrix_rank(COUPLINGS) == 4 and len(GROUPS) == 5
 
 
 def test_envelope_of_noise_is_its_strength():

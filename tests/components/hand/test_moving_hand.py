@@ -8,18 +8,11 @@ from numpy.testing import assert_allclose
 import rom
 from cases.refusals import refuses
 from rom import rotation
+from rom.components import hand as hands
 from rom.components.cosserat.bodies import POSE_SIZE
 from rom.components.cosserat.coils import add_bending, bend_of
 from rom.components.hand.compliant_hand import LENGTHS, Finger, close, hand
-from rom.components.hand.moving_hand import (
-    SEATS,
-    Build,
-    Drive,
-    Seat,
-    deflections,
-    moving_hand,
-    one_finger,
-)
+from rom.components.hand.moving_hand import Build, Drive, Seat, moving_hand, one_finger
 from rom.components.hand.winches import motor_force, shaft, shaft_moment
 from rom.errors import ConfigError, ModelError, SolverError
 
@@ -45,28 +38,30 @@ def at_rest(mech):
     return rom.snapshot(mech, rom.equilibrium(mech))
 
 
-def cable_length(solution, name="finger"):
-    """(n_t,) of the cable along its path."""
+def cable_steps(solution, name):
+    """(n, 3) from station to station of a cable in the end."""
     stations = solution.mechanism.tendons[f"{name} cable"].stations
-    x = [solution.position(one.marker.body, one.marker) for one in stations]
-    return np.linalg.norm(np.diff(x, axis=0), axis=2).sum(axis=0)
+    return np.diff([solution.position(s.marker.body, s.marker)[-1] for s in stations], axis=0)
 
 
-def angle_of(solution, name, k):
-    """Between the plates of a spring [rad]."""
-    last = len(solution.mechanism.nonlinear[f"{name} spring {k}"].parts) - 1
-    a, b = (solution.axes(f"{name} spring {k}", at)[-1] for at in (0, last))
-    return np.arccos(0.5 * (np.trace(a.T @ b) - 1.0))
+def angles_of(solution, name):
+    """(3,) between the plates of each spring [rad]."""
+    found = []
+    for spring in (f"{name} spring {k}" for k in (1, 2, 3)):
+        last = len(solution.mechanism.nonlinear[spring].parts) - 1
+        a, b = (solution.axes(spring, at)[-1] for at in (0, last))
+        found.append(np.arccos(0.5 * (np.trace(a.T @ b) - 1.0)))
+    return np.array(found)
 
 
 @pytest.mark.parametrize("tension", INDEX)
 def test_a_finger_in_a_mechanism_has_the_postures_of_the_boundary_value_problem(tension):
     angle, x, z, pull = INDEX[tension]
     found = at_rest(one_finger(Finger(n=16), tension))
-    assert_allclose([np.degrees(angle_of(found, "finger", k)) for k in (1, 2, 3)], 3 * [angle],
-                    rtol=3e-4)  # fmt: skip
+    assert_allclose(np.degrees(angles_of(found, "finger")), angle, rtol=3e-4)
     assert_allclose(tip_of(found) / MM, [x, 0, z], rtol=5e-4, atol=1e-9)
-    assert_allclose(54 * MM - cable_length(found)[-1], pull * MM, rtol=5e-4)
+    length = np.linalg.norm(cable_steps(found, "finger"), axis=1).sum()
+    assert_allclose(54 * MM - length, pull * MM, rtol=5e-4)
 
 
 @pytest.mark.parametrize(("stiffener", "load"), [(1.0, (0.03, 0.01, 0.0)), (12.0, (0.0, 0.1, 0.0))])
@@ -75,8 +70,7 @@ def test_a_finger_in_a_mechanism_gives_way_as_by_itself(stiffener, load):
     alone = close(finger, tension=1.5, load=load)
     found = at_rest(one_finger(finger, 1.5, load))
     assert_allclose(tip_of(found), alone.tip, atol=1e-6 * LENGTHS["index"])
-    angles = [angle_of(found, "finger", k) for k in (1, 2, 3)]
-    assert_allclose(angles, alone.angles, rtol=1e-6)
+    assert_allclose(angles_of(found, "finger"), alone.angles, rtol=1e-6)
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
@@ -84,8 +78,8 @@ def test_loads_on_the_tip_and_deflections_in_three_directions(axis):
     forces, finger = [-0.05, 0.05], Finger(n=4, stiffener=10.0)
     start, e = close(finger, tension=1.0), np.eye(3)[axis]
     alone = [close(finger, tension=1.0, load=f * e, start=start).tip - start.tip for f in forces]
-    assert_allclose(deflections(finger, e, forces, tension=1.0), alone, atol=1e-8)
-    soft = deflections(Finger(n=4), e, forces, tension=1.0)
+    assert_allclose(hands.deflections(finger, e, forces, tension=1.0), alone, atol=1e-8)
+    soft = hands.deflections(Finger(n=4), e, forces, tension=1.0)
     gain = np.abs(soft[1, axis]) / np.abs(alone[1][axis])
     assert gain > 8.0 if axis == 1 else abs(gain - 1.0) < 1e-3
 
@@ -116,7 +110,6 @@ def bent(poses, K):
 
 
 def test_the_axis_of_a_bend_turns_with_its_plates_as_differences_say():
-    """Turns of either plate in its own axes."""
     rng, h = np.random.default_rng(4), 1e-6
     p = [rotation.exp(phi) for phi in rng.normal(size=(2, 3))]
 
@@ -135,7 +128,6 @@ def test_the_axis_of_a_bend_turns_with_its_plates_as_differences_say():
 
 
 def test_the_work_of_a_winch_goes_into_springs_losses_and_friction():
-    """The balance of the energies, and the friction of the cable alone as what springs keep not."""
     mu, lost = 0.3, []
     for friction in (0.0, mu):
         drive = Drive(pull=lambda t: 9 * MM * np.sin(np.pi / 2 * min(t / 0.3, 1.0)) ** 2, EA=2e3)
@@ -145,18 +137,6 @@ def test_the_work_of_a_winch_goes_into_springs_losses_and_friction():
         lost.append(sol.energy.damping[-1])
     # where the cable turns by psi at each of five inner holes it loses 1 - exp(-mu psi) of its pull
     assert 0.05 * sol.energy.drives[-1] < lost[1] - lost[0] < mu * 2.0 * sol.energy.drives[-1]
-
-
-def test_a_winch_draws_in_what_the_finger_gives():
-    finger = Finger(n=4)
-    alone = close(finger, pull=8 * MM)
-    found = at_rest(driven(finger, Drive(pull=8 * MM, EA=1e5)))
-    pulled = motor_force(found, "index")[0]
-    stretch = pulled / 1e5 * (54 - 8) * MM
-    at = close(finger, pull=8 * MM - stretch)
-    assert_allclose(pulled, at.tension, rtol=1e-6)
-    assert_allclose(tip_of(found, "index"), at.tip, atol=1e-6 * LENGTHS["index"])
-    assert stretch < 1e-3 * MM + 1e-5 and at.tension < alone.tension
 
 
 def test_a_seat_turns_a_finger_and_nothing_else():
@@ -179,9 +159,8 @@ def test_a_conduit_that_bends_takes_its_share_of_the_force():
     mech = driven(Finger(n=3, friction=mu), drive)
     sol = rom.simulate(mech, t_end=0.01, dt=1e-4, rho_inf=0.5)
     force = np.linalg.norm(sol.element("index cable").force[-1], axis=1)
-    stations = sol.mechanism.tendons["index cable"].stations
-    x = np.array([sol.position(one.marker.body, one.marker)[-1] for one in stations])
-    e = np.diff(x, axis=0) / np.linalg.norm(np.diff(x, axis=0), axis=1)[:, None]
+    steps = cable_steps(sol, "index")
+    e = steps / np.linalg.norm(steps, axis=1)[:, None]
     turned = np.arccos(np.clip((e[1:] * e[:-1]).sum(axis=1), -1, 1))
     assert np.pi / 2 - 0.15 < turned[:8].sum() < np.pi / 2
     assert_allclose(force[0], 0.4, rtol=1e-12)
@@ -189,52 +168,50 @@ def test_a_conduit_that_bends_takes_its_share_of_the_force():
 
 
 def test_a_joint_that_is_drawn_alone_bends_alone():
-    """As a finger of that joint only; rigid bodies before and behind it."""
     found = at_rest(driven(Finger(n=16), Drive(tension=1.0), "index joint 2"))
-    angles = [angle_of(found, "index", k) for k in (1, 2, 3)]
+    angles = angles_of(found, "index")
     assert_allclose(np.degrees(angles), [0, 14.2067, 0], rtol=3e-4, atol=1e-6)
     plate = found.position("index phalanx 2", "proximal")[-1]
     along = np.array([np.sin(angles[1]), 0, np.cos(angles[1])])
     assert_allclose(tip_of(found, "index"), plate + (12 + 8 + 10) * MM * along, atol=1e-8)
 
 
-@pytest.mark.parametrize("sleeve", [0.0, 0.3])
-def test_the_cable_in_a_sleeve_gives_way_like_a_spring_before_the_finger(sleeve):
-    """Work of the winch = energy of springs and cable; stretch = tension times length over EA."""
-    finger, EA, pull = Finger(n=4), 2e2, 4 * MM
+@pytest.mark.parametrize(("sleeve", "EA", "pull"), [(0.0, 2e2, 4), (0.3, 2e2, 4), (0.0, 1e5, 8)])
+def test_a_winch_draws_in_what_cable_and_finger_give(sleeve, EA, pull):
+    """The cable in a sleeve is a spring before the finger: tension times length over EA."""
+    finger, pull = Finger(n=4), pull * MM
     found = at_rest(driven(finger, Drive(pull=pull, EA=EA, sleeve=sleeve)))
     pulled, length = motor_force(found, "index")[0], 54 * MM
     stretch = pulled / EA * (length - pull) * (length + sleeve) / length
     held = close(finger, pull=pull - stretch)
     assert_allclose(pulled, held.tension, rtol=1e-6)
+    assert_allclose(tip_of(found, "index"), held.tip, atol=1e-6 * LENGTHS["index"])
+    assert held.tension < close(finger, pull=pull).tension
 
 
 def test_five_fingers_close_in_time():
-    """Each as its tension says, where it sits; the energy of the cables goes where it is booked."""
     fingers = hand(n=2)
     drives = {name: Drive(tension=lambda t: 1.2 * min(t / 0.2, 1.0)) for name in fingers}
     mech = moving_hand(fingers, drives=drives, build=Build(loss=0.02))
     sol = rom.simulate(mech, t_end=0.8, dt=5e-4, rho_inf=0.5)
     for name in fingers:
-        alone, seat = close(fingers[name], tension=1.2).tip, SEATS[name]
+        alone, seat = close(fingers[name], tension=1.2).tip, hands.SEATS[name]
         assert_allclose(tip_of(sol, name), seat.at + seat.axes @ alone, atol=1e-6)
     assert np.abs(sol.energy.balance).max() < 1e-5 * sol.energy.forces[-1]
 
 
 def test_one_shaft_draws_five_cables():
-    """The moment of its motor is that of five fingers by themselves, and its work their energy."""
     fingers = hand(n=2)
     radii = {"thumb": 3 * MM, "index": 4 * MM, "middle": 5 * MM, "ring": 4.5 * MM, "little": 2 * MM}
-    drives = shaft(lambda t: 1.5 * np.sin(np.pi / 2 * min(t / 0.5, 1.0)) ** 2, radii,
-                   drive=Drive(EA=1e5))  # fmt: skip
+    turn = lambda t: 1.5 * np.sin(np.pi / 2 * min(t / 0.5, 1.0)) ** 2  # noqa: E731
+    drives = shaft(turn, radii, drive=Drive(EA=1e5))
     mech = moving_hand(fingers, drives=drives, build=Build(loss=0.02))
     sol = rom.simulate(mech, t_end=1.0, dt=1e-3, rho_inf=0.5)
     alone = {name: close(fingers[name], pull=1.5 * r) for name, r in radii.items()}
     moment = sum(r * alone[name].tension for name, r in radii.items())
     found = shaft_moment(sol, radii)
     assert_allclose(found[-1], moment, rtol=1e-3)  # the cables stretch by a few hundredths of a mm
-    angle = np.array([1.5 * np.sin(np.pi / 2 * min(t / 0.5, 1.0)) ** 2 for t in sol.t])
-    work = np.sum(0.5 * (found[1:] + found[:-1]) * np.diff(angle))
+    work = np.sum(0.5 * (found[1:] + found[:-1]) * np.diff([turn(t) for t in sol.t]))
     assert_allclose(work, sol.energy.drives[-1], rtol=1e-4)
     kept = sol.energy.strain[-1] + sol.energy.damping[-1] + sol.energy.kinetic[-1]
     assert_allclose(kept, sol.energy.drives[-1], rtol=1e-5)

@@ -8,16 +8,12 @@ import rom
 from benchmarks.models import bar
 from cases.paths import ROOT
 from cases.refusals import refuses
+from cases.solid import reduced
 from rom import rotation
+from rom.components import hand
 from rom.components.cosserat.helical_spring import HelicalSpring
 from rom.components.hand.compliant_hand import HAND_SPRING, INDEX_LENGTHS, Finger, rest
-from rom.components.hand.solid_finger import (
-    heavy_spring,
-    link_compliance,
-    parts_of_compliance,
-    solid_finger,
-    tip_compliance,
-)
+from rom.components.hand.solid_finger import parts_of_compliance, solid_finger, tip_compliance
 from rom.errors import InterfaceError, ModelError
 
 ENDS = ("root", "tip")
@@ -28,12 +24,9 @@ SPRINGS = (HAND_SPRING, HelicalSpring(0.8e-3, 8e-3, 4, 9e-3), HAND_SPRING)
 
 
 def bars(material, lengths=INDEX_LENGTHS, kind="rbe2", cells=(2, 1, 1)):
-    kinds = dict.fromkeys(ENDS, kind)
-    return [
-        rom.reduce(bar((length, SIDE, 0.8 * SIDE), cells, material),
-                   method=rom.CraigBampton(2), interfaces=kinds, certify=False)
-        for length in lengths
-    ]  # fmt: skip
+    kinds = {"interfaces": dict.fromkeys(ENDS, kind)}
+    sizes = ((length, SIDE, 0.8 * SIDE) for length in lengths)
+    return [reduced(2, bar(size, cells, material), **kinds) for size in sizes]
 
 
 def finger(solids, springs=SPRINGS, **more):
@@ -48,7 +41,6 @@ def scaled(C, D):
 
 
 def test_compliance_is_the_sum_of_springs_and_phalanges():
-    """Phalanges of rubber: both count, and are moved to the tip."""
     solids = bars(SOFT)
     C = tip_compliance(*finger(solids))
     joints, links = parts_of_compliance(solids, SPRINGS, ends=ENDS, orientation=UPWARD)
@@ -61,7 +53,7 @@ def test_compliance_of_one_link_is_that_of_a_beam():
     """Bending, shear and tension in closed form, for plates that leave the bar free to widen."""
     L, b, h = INDEX_LENGTHS[0], SIDE, 0.8 * SIDE
     E, G = 2e6, 2e6 / 2.6
-    C = link_compliance(bars(SOFT, INDEX_LENGTHS[:1], "rbe3", (6, 2, 2))[0], ENDS)
+    C = hand.link_compliance(bars(SOFT, INDEX_LENGTHS[:1], "rbe3", (6, 2, 2))[0], ENDS)
     bends = np.array([h * b**3, b * h**3]) / 12
     exact = [L / (E * b * h), *(L**3 / (3 * E * bends) + L / (5 / 6 * G * b * h))]
     assert_allclose(np.diag(C)[:3], exact, rtol=5e-3)
@@ -76,21 +68,18 @@ def test_stiff_phalanges_make_the_rigid_finger():
     assert_allclose(*scaled(C, rest(Finger()).tip_compliance()), atol=1e-4)
 
 
-def test_springs_weigh_as_much_as_their_wire():
+def test_springs_weigh_as_much_as_their_wire_and_stretch_under_their_weight():
     """Steel wire of 0.7 mm, 5 coils of 7 mm: 0.332 g; a thin tube turns as its radius says."""
-    rod = heavy_spring(HAND_SPRING)
+    rod = hand.heavy_spring(HAND_SPRING)
     wire = 7850 * np.pi / 4 * 0.7e-3**2 * 5 * np.hypot(np.pi * 7e-3, 8e-3 / 5)
     assert_allclose(rod.mass.sum(), wire, rtol=1e-12)
     assert_allclose(rod.inertia.sum(axis=0), wire * 3.5e-3**2 * np.array([0.5, 0.5, 1]))
-
-
-def test_hanging_finger_stretches_under_its_weight():
-    """Each spring carries what hangs below it and half of its own weight."""
+    # each spring carries what hangs below it and half of its own weight
     solids = bars(rom.Material(E=200e9, nu=0.3, rho=1000.0))
     mech, _ = finger(solids, (HAND_SPRING,) * 3, gravity=(0, 0, 0.5))
     state = rom.equilibrium(mech)
     packed = rom.linearize(mech, state).packed
-    own, below, drop = heavy_spring(HAND_SPRING).mass.sum(), 0.0, 0.0
+    own, below, drop = hand.heavy_spring(HAND_SPRING).mass.sum(), 0.0, 0.0
     for solid in reversed(solids):
         below += solid.mass
         drop += 0.5 * (below + own / 2) / HAND_SPRING.stiffness
@@ -111,42 +100,33 @@ def test_what_does_not_fit_is_named():
 @pytest.mark.fenicsx
 def test_bones_of_polyamide_add_less_than_a_hundredth():
     """Solids of 18, 12 and 10 mm; PA12 is our choice. In every direction springs are the finger."""
-    pytest.importorskip("gmsh", reason="gmsh is not installed")
     polyamide = rom.Material(E=1.7e9, nu=0.4, rho=1010.0)
     geometry = ROOT / "meshes" / "phalanx.geo"
     kinds = {"proximal": "rbe2", "distal": "rbe2", "pad": rom.Polynomial(1)}
     solids = []
     for L in INDEX_LENGTHS:
         model = rom.fe.model(geometry, material=polyamide, parameters={"L": L}, order=2)
-        solids.append(
-            rom.reduce(model, method=rom.CraigBampton(4), interfaces=kinds, certify=False)
-        )
+        solids.append(reduced(4, model, interfaces=kinds))
     D, R, d = 0.014, 0.00125, 0.0015
     a = D / 2 - R
     rim = np.pi * (a**2 * R + a * np.pi * R**2 / 2 + 2 * R**3 / 3)
-    between = (
-        np.pi * (D**2 * (np.array(INDEX_LENGTHS) - 2 * R) - d**2 * np.array(INDEX_LENGTHS)) / 4
-    )
+    lengths = np.array(INDEX_LENGTHS)
+    between = np.pi * (D**2 * (lengths - 2 * R) - d**2 * lengths) / 4
     assert_allclose([solid.mass for solid in solids], 1010 * (between + 2 * rim), rtol=1.5e-3)
     mech = solid_finger(solids, (HAND_SPRING,) * 3)
-    tip = mech.part("phalanx 3").marker("distal")
+    tip, pad = (mech.part("phalanx 3").marker(name) for name in ("distal", "pad"))
     C = tip_compliance(mech, tip)
     joints, links = parts_of_compliance(solids, (HAND_SPRING,) * 3)
     assert_allclose(*scaled(C, joints + links), atol=1e-6)
     share = np.diag(C - joints) / np.diag(C)
     assert_allclose(share, np.diag(links) / np.diag(C), rtol=1e-3)
     assert 5e-5 < share.min() and share.max() < 1.5e-4
-    across, along = beams(polyamide, np.pi * (D**2 - d**2) / 4, np.pi * (D**4 - d**4) / 64)
+    # of three links that bend and stretch while springs do not
+    near = np.cumsum([0.0, *(lengths[::-1] + HAND_SPRING.length)])[:-1]
+    cubes = ((near + lengths[::-1]) ** 3 - near**3).sum()
+    across = cubes / (3 * polyamide.E * np.pi * (D**4 - d**4) / 64)
+    along = lengths.sum() / (polyamide.E * np.pi * (D**2 - d**2) / 4)
     assert_allclose(np.diag(links)[:3], [across, across, along], rtol=0.15)
-    pad = mech.part("phalanx 3").marker("pad")
     move = np.eye(6)
     move[:3, 3:] = -rotation.skew(mech.design_point(pad) - mech.design_point(tip))
     assert_allclose(*scaled(tip_compliance(mech, pad), move @ joints @ move.T), atol=1e-3)
-
-
-def beams(material, area, bends):
-    """Tip of three links that bend and stretch while springs do not: across and along [m/N]."""
-    away = np.cumsum([0.0, *(link + HAND_SPRING.length for link in INDEX_LENGTHS[::-1])])
-    near, far = away[:-1], away[:-1] + INDEX_LENGTHS[::-1]
-    across = ((far**3 - near**3) / (3 * material.E * bends)).sum()
-    return across, sum(INDEX_LENGTHS) / (material.E * area)

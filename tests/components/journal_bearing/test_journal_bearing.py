@@ -7,26 +7,13 @@ from scipy.integrate import quad, solve_ivp
 
 from cases.components import bearings
 from cases.components.bearings import RUN, bearing
-from cases.refusals import refused, refuses
+from cases.refusals import refused
 from rom.components import journal_bearing
-from rom.components.journal_bearing import (
-    Groove,
-    JournalBearing,
-    coefficients,
-    equilibrium,
-    film,
-    iso_vg,
-    short_attitude,
-    short_coefficients,
-    short_eccentricity,
-    short_force,
-    stability,
-    warm_bearing,
-)
+from rom.components.journal_bearing import Groove, JournalBearing, coefficients, equilibrium, film
+from rom.components.journal_bearing.closed_forms import short_coefficients, short_force
 from rom.errors import ConfigError, ModelError, SolverError
 
 
-@pytest.mark.once
 @pytest.mark.parametrize("row", bearings.RAIMONDI_BOYD, ids=lambda r: f"{r[0]}-{r[1]}")
 def test_a_full_bearing_has_the_numbers_of_raimondi_and_boyd(row):
     slender, e, S, attitude, friction, flow, side, peak = row
@@ -72,8 +59,6 @@ def test_a_two_lobed_bearing_has_the_coefficients_of_lund_and_thomsen(row):
     agree([*K.ravel(), C[0, 0], C[0, 1], C[1, 1]], row[3:])
 
 
-# --- closed forms ---
-
 # eccentricity, S (L/D)^2, attitude [deg], Kxx Kxy Kyx Kyy, Cxx, Cxy, Cyy, whirl ratio, threshold
 SHORT = [bearings.numbers(line) for line in """
 .1 .989979 82.708 1.3284 10.3811 -9.7577 2.5308 20.4872 2.5325 19.7905 .5029 2.7413
@@ -84,17 +69,22 @@ SHORT = [bearings.numbers(line) for line in """
 """.strip().splitlines()]  # fmt: skip
 
 
+def short_rest(e):
+    attitude = journal_bearing.short_attitude(e)
+    return e * np.array([np.cos(attitude), np.sin(attitude)])
+
+
 @pytest.mark.parametrize("row", SHORT, ids=lambda r: f"{r[0]}")
 def test_short_bearings_have_their_closed_form_by_quadrature_too(row):
     e, S, attitude, *rest = row
     assert_allclose(journal_bearing.short_sommerfeld(e), S, atol=6e-7)
-    assert_allclose(np.degrees(short_attitude(e)), attitude, atol=6e-4)
-    assert short_eccentricity(S) == pytest.approx(e, rel=3e-5)
+    assert_allclose(np.degrees(journal_bearing.short_attitude(e)), attitude, atol=6e-4)
+    assert journal_bearing.short_eccentricity(S) == pytest.approx(e, rel=3e-5)
     K, C = short_coefficients(e)
     assert_allclose([*K.ravel(), C[0, 0], C[0, 1], C[1, 1]], rest[:7], atol=6e-5)
-    s = stability(K, C, 1.0)
+    s = journal_bearing.stability(K, C, 1.0)
     assert_allclose([s.whirl_ratio, np.sqrt(s.critical_mass)], rest[7:], atol=6e-5)
-    x = e * np.array([np.cos(short_attitude(e)), np.sin(short_attitude(e))])
+    x = short_rest(e)
     W, h, still = -short_force(x, (0, 0)), 1e-5, np.zeros(2)
     assert_allclose(W, [1 / (4 * np.pi * S), 0.0], atol=2e-4 * W[0])
     for k, d in enumerate(h * np.eye(2)):
@@ -107,9 +97,9 @@ def test_short_bearings_have_their_closed_form_by_quadrature_too(row):
 def test_the_short_bearing_of_friswell():
     """100 mm, 30 mm long, 0.1 mm of clearance, 525 N at 1500 rpm: numbers of ROSS."""
     S = 0.1 * 25 * 0.03 * 0.1 / 525 * 500**2 * 0.3**2
-    e = short_eccentricity(S)
+    e = journal_bearing.short_eccentricity(S)
     assert e == pytest.approx(0.266298, abs=1e-6)
-    assert short_eccentricity(S * 2000 / 1500) == pytest.approx(0.212571, abs=1e-6)
+    assert journal_bearing.short_eccentricity(S * 2000 / 1500) == pytest.approx(0.212571, abs=1e-6)
     K, C = (a[::-1, ::-1] * [[1, -1], [-1, 1]] * 525 / 1e-4 for a in short_coefficients(e))
     assert_allclose(K / 1e6, [[12.80796, 16.393593], [-25.060393, 8.815303]], rtol=1e-6)
     assert_allclose(C[0] * 1e-3 / (50 * np.pi), [232.89693, -81.924371], rtol=1e-6)
@@ -139,8 +129,6 @@ def test_the_film_of_a_long_bearing_is_sommerfelds():
         assert 1 / (np.pi * np.hypot(*journal_bearing.long_force(e))) == pytest.approx(S, rel=2e-5)
 
 
-# --- the film itself ---
-
 STATE = np.array([0.4e-4, 0.3e-4, 1e-4, -2e-4])
 RATE = np.array([5e-4, 2e-4, -0.3e-2, 0.4e-2])
 
@@ -151,16 +139,14 @@ def test_stiffness_and_damping_are_the_derivatives_of_the_force(law):
     f = film(b, STATE, RATE, **RUN)
     for k, d in enumerate(1e-6 * np.diag(b.scale)):
         K = film(b, STATE - d, RATE, **RUN).force - film(b, STATE + d, RATE, **RUN).force
-        assert_allclose(
-            f.stiffness[:, k], K / (2 * d[k]), atol=1e-6 * np.abs(f.stiffness[:, k]).max()
-        )
+        size = np.abs(f.stiffness[:, k]).max()
+        assert_allclose(f.stiffness[:, k], K / (2 * d[k]), atol=1e-6 * size)
         d = 100 * d
         C = film(b, STATE, RATE - d, **RUN).force - film(b, STATE, RATE + d, **RUN).force
         assert_allclose(f.damping[:, k], C / (2 * d[k]), atol=1e-6 * np.abs(f.damping[:, k]).max())
 
 
 def test_pressure_and_void_complement_each_other():
-    """Independent of the cells that a solution starts from."""
     b = bearing(1.0, [Groove(1.2, 0.3)], (60, 8), False, cavitation="jfo")
     f = film(b, STATE, RATE, **RUN)
     assert f.P.min() >= 0 and 0 <= f.fill.min() < 0.8 and f.fill.max() <= 1 + 1e-12
@@ -169,7 +155,7 @@ def test_pressure_and_void_complement_each_other():
     assert_allclose(film(b, STATE, RATE, **RUN, warm=start).P, f.P, atol=1e-12)
 
 
-def test_oil_is_conserved_around_the_bearing():
+def test_oil_is_conserved_and_both_laws_agree_when_it_comes_in_at_the_largest_gap():
     b = bearing(1.0, [Groove(np.pi)], cavitation="jfo")
     f = film(b, [0.5e-4, 0.0], **RUN)
     into, out = f.flow_around[[90, 89]]
@@ -177,34 +163,27 @@ def test_oil_is_conserved_around_the_bearing():
     void = ~np.any(f.active, axis=1) & (np.arange(180) != 90)
     assert void.sum() > 40
     assert_allclose(f.flow_around[void], out, rtol=1e-10)
-
-
-def test_both_laws_agree_when_oil_comes_in_at_the_largest_gap():
-    both = [
-        film(bearing(1.0, [Groove(np.pi)], cavitation=law), [0.6e-4, 0.0], **RUN)
-        for law in ("reynolds", "jfo")
-    ]
-    assert_allclose(both[0].P, both[1].P, atol=1e-12)
-    assert both[0].fill.min() == 1 and both[1].fill.min() < 0.9
+    laws = (bearing(1.0, [Groove(np.pi)], cavitation=law) for law in ("reynolds", "jfo"))
+    one, other = (film(b, [0.6e-4, 0.0], **RUN) for b in laws)
+    assert_allclose(one.P, other.P, atol=1e-12)
+    assert one.fill.min() == 1 and other.fill.min() < 0.9
 
 
 def test_power_is_lost_in_shear_and_in_flow():
-    """Friction times speed less work on the journal, cell by cell."""
     b = bearing(0.8, [Groove(-2.0)], (90, 12), False, cavitation="jfo")
     f = film(b, STATE, RATE, **RUN)
     h, p, mu = f.thickness, f.pressure, f.viscosity
     cell = b.radius * 2 * np.pi / 90 * b.length / 12
     shear = np.sum(mu * (f.speed * b.radius) ** 2 * f.fill / h) * cell
-    ahead = film(b, STATE, RATE, **RUN).bearing.grid
-    theta, z = 2 * np.pi * (np.arange(90) + 0.5) / 90, ahead.Z * b.length
-    m = STATE
+    grid, (x, y, a, c) = f.bearing.grid, STATE
+    theta, z = 2 * np.pi * (np.arange(90) + 0.5) / 90, grid.Z * b.length
 
     def gap(theta, z):
-        return b.clearance - (m[0] + z * m[3]) * np.cos(theta) - (m[1] - z * m[2]) * np.sin(theta)
+        return b.clearance - (x + z * c) * np.cos(theta) - (y - z * a) * np.sin(theta)
 
     around = np.diff(np.vstack([p, p[:1]]), axis=0) / (b.radius * 2 * np.pi / 90)
     flow = np.sum(gap(theta[:, None], z) ** 3 * around**2) / (12 * mu) * cell
-    faces, dz = ahead.Z_face * b.length, b.length / 12
+    faces, dz = grid.Z_face * b.length, b.length / 12
     along = np.diff(np.hstack([np.zeros((90, 1)), p, np.zeros((90, 1))]), axis=1) / dz
     share = np.array([2.0, *[1.0] * 11, 2.0])  # the drop to the ends takes half a cell
     nodes = 2 * np.pi * np.arange(90) / 90
@@ -226,9 +205,6 @@ def test_the_force_converges_with_the_square_of_the_cells():
     cells = [(60, 5), (120, 10), (240, 20)]
     F = [film(bearing(1.0, [Groove(np.pi)], c), [0.5e-4, 0], **RUN).force[1] for c in cells]
     assert 1.7 < np.log2((F[0] - F[1]) / (F[1] - F[2])) < 2.3
-
-
-# --- inlets, statics, whirl ---
 
 
 @pytest.mark.parametrize("row", bearings.INLETS, ids=lambda r: f"{r[0]}-{r[1]}")
@@ -261,20 +237,22 @@ def test_the_bearings_of_a_pinion_let_it_travel(row):
     assert f.stiffness[0, 0] == pytest.approx(row[5], rel=0.02)
 
 
+def short_critical_mass(e):
+    return journal_bearing.stability(*short_coefficients(e), 1.0).critical_mass
+
+
 def test_short_bearings_whirl_least_willingly_up_to_a_speed():
-    """The lowest threshold, and the eccentricity beyond which nothing whirls."""
     e = np.linspace(0.40, 0.52, 121)
-    speed = [np.sqrt(stability(*short_coefficients(x), 1.0).critical_mass) for x in e]
+    speed = np.sqrt([short_critical_mass(x) for x in e])
     assert min(speed) == pytest.approx(2.53171, abs=1e-5)
     assert e[np.argmin(speed)] == pytest.approx(0.4570, abs=1e-3)
-    masses = [stability(*short_coefficients(x), 1.0).critical_mass for x in (0.756, 0.7561)]
-    assert np.isfinite(masses[0]) and np.isinf(masses[1])
+    assert np.isfinite(short_critical_mass(0.756)) and np.isinf(short_critical_mass(0.7561))
 
 
 @pytest.mark.parametrize(("speed", "grows"), [(2.50, False), (2.55, True)])
 def test_a_rotor_in_short_bearings_whirls_beyond_the_threshold(speed, grows):
     e = 0.457
-    rest = e * np.array([np.cos(short_attitude(e)), np.sin(short_attitude(e))])
+    rest = short_rest(e)
     W = short_force(rest, (0, 0))
 
     def motion(_, s):
@@ -287,27 +265,23 @@ def test_a_rotor_in_short_bearings_whirls_beyond_the_threshold(speed, grows):
     assert (late > 1.02 * early) == grows
     turned = np.unwrap(np.arctan2(*(s.y[:2] - rest[:, None])[::-1]))[s.t > 150]
     whirl = (turned[-1] - turned[0]) / np.ptp(s.t[s.t > 150])
-    expected = stability(*short_coefficients(e), 1.0).whirl_ratio
+    expected = journal_bearing.stability(*short_coefficients(e), 1.0).whirl_ratio
     assert whirl == pytest.approx(expected, abs=0.01) == pytest.approx(0.5, abs=0.03)
-
-
-# --- oil and heat ---
 
 
 @pytest.mark.parametrize(("grade", "A", "B", "nu"), [
     (32, 9.5308, 3.7466, 15.19), (46, 9.4180, 3.6844, 20.62), (68, 9.3097, 3.6244, 28.66),
 ])  # fmt: skip
 def test_oil_thins_by_walthers_law(grade, A, B, nu):
-    oil = iso_vg(grade)
+    oil = journal_bearing.iso_vg(grade)
     assert_allclose(oil.law(), (A, B), atol=6e-5)
     assert_allclose(oil.viscosity([40, 60]), np.array([grade, nu]) * 870e-6, rtol=4e-4)
 
 
 def test_the_heat_that_leaves_is_the_heat_that_is_made():
-    b, oil = bearing(1.0, [Groove(np.pi)], (120, 8)), iso_vg(46)
-    w = journal_bearing.warm_equilibrium(
-        b, (3000.0, 0.0), oil, speed=300.0, inlet=40.0, carried=1.0
-    )
+    b, oil = bearing(1.0, [Groove(np.pi)], (120, 8)), journal_bearing.iso_vg(46)
+    given = {"speed": 300.0, "inlet": 40.0, "carried": 1.0}
+    w = journal_bearing.warm_equilibrium(b, (3000.0, 0.0), oil, **given)
     assert w.film.viscosity == pytest.approx(float(oil.viscosity(w.temperature)), rel=1e-6)
     assert 40 < w.temperature == pytest.approx(40 + w.rise / 2, abs=1e-5)
     assert oil.density * oil.heat * w.film.side_flow * w.rise == pytest.approx(w.power, rel=1e-9)
@@ -322,22 +296,16 @@ def test_raimondi_and_boyds_rise_of_temperature():
 
 
 def test_heat_closes_and_opens_the_clearance():
-    b = bearing()
-    assert warm_bearing(b, bush=20, shaft=20).clearance == pytest.approx(b.clearance)
-    assert warm_bearing(b, bush=0, shaft=20).clearance == pytest.approx(1e-4 - 0.05 * 11.7e-6 * 20)
-    refuses(ModelError, "the shaft seizes", warm_bearing, b, bush=0, shaft=200)
+    b, warm = bearing(), journal_bearing.warm_bearing
+    assert warm(b, bush=20, shaft=20).clearance == pytest.approx(b.clearance)
+    assert warm(b, bush=0, shaft=20).clearance == pytest.approx(1e-4 - 0.05 * 11.7e-6 * 20)
 
 
-# --- what cannot be ---
-
-
-def test_a_groove_in_the_loaded_arc_leaves_no_film():
-    b = bearing(0.5, [Groove(np.radians(20), np.radians(20))], cavitation="jfo")
-    words = "no film carries .* N with oil from grooves at 20 deg"
-    refuses(SolverError, words, equilibrium, b, bearings.load(b, 0.05), **RUN)
-
+DRY = bearing(0.5, [Groove(np.radians(20), np.radians(20))], cavitation="jfo")  # where it bears
 
 test_what_cannot_be_is_said = refused(
+    (lambda: equilibrium(DRY, bearings.load(DRY, 0.05), **RUN), SolverError, "grooves at 20 deg"),
+    (lambda: journal_bearing.warm_bearing(bearing(), bush=0, shaft=200), "the shaft seizes"),
     (lambda: JournalBearing(0.1, 0.1, 0.1), "a film is thin"),
     (lambda: bearing(cavitation="jfo"), "without a groove has no oil"),
     (lambda: bearing(cells=(8, 8)), "too few"),
@@ -346,9 +314,9 @@ test_what_cannot_be_is_said = refused(
     (lambda: film(bearing(), [0, 0], speed=-1.0, viscosity=0.1), "from its other end"),
     (lambda: equilibrium(bearing(), [0, 0], **RUN), "presses the journal nowhere"),
     (lambda: journal_bearing.short_sommerfeld(1.2), "must lie between 0 and 1"),
-    (lambda: short_eccentricity(0.0), "sommerfeld = "),
-    (lambda: stability(np.eye(2), -np.eye(2), 1.0), "feeds the whirl"),
+    (lambda: journal_bearing.short_eccentricity(0.0), "sommerfeld = "),
+    (lambda: journal_bearing.stability(np.eye(2), -np.eye(2), 1.0), "feeds the whirl"),
     (lambda: journal_bearing.Oil(5.0, 40.0), "hot oil is thinner"),
-    (lambda: iso_vg(10), "ISO VG 10"),
+    (lambda: journal_bearing.iso_vg(10), "ISO VG 10"),
     error=(ConfigError, ModelError),
 )

@@ -12,22 +12,10 @@ import rom
 from cases.mbs import linkages
 from cases.mbs.linkages import five_bar_of_the_core, two_link_of_the_core
 from cases.refusals import refused, refuses
-from rom.components.linkages import (
-    CrossSlides,
-    Driven,
-    FiveBar,
-    PolarArm,
-    SlideArm,
-    SlideFiveBar,
-    TwoLink,
-    angle_grid,
-    closed_loci,
-    index_map,
-    isotropic_set,
-    rigid_link,
-    rod,
-    tool_isotropy,
-)
+from rom.components.linkages import Driven, FiveBar, TwoLink, isotropic_set, rigid_link, rod
+from rom.components.linkages.dynamic_isotropy import angle_grid, closed_loci, index_map
+from rom.components.linkages.isotropic_sets import tool_isotropy
+from rom.components.linkages.prismatic_linkages import CrossSlides, PolarArm, SlideArm, SlideFiveBar
 from rom.errors import ConfigError, ModelError
 
 RAILS = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
@@ -38,20 +26,9 @@ ARM = PolarArm(guide=0.05, slide=2.0, spin=0.01)
 FIVE = FiveBar(0.7, (rod(2.0, 0.3),) * 2, (rod(1.0, 0.8),) * 2, payload=0.5)
 
 
-# --- inertias against moving points ---
-
-
-def energy_of_points(posture, masses, q, rate):
-    """Kinetic energy of points (k, 2) that a posture places."""
-    h = 1e-6
-    v = (posture(*(q + h * rate)) - posture(*(q - h * rate))) / (2 * h)
-    return 0.5 * masses @ np.square(v).sum(axis=1)
-
-
-def along(a, b, mass, k=2):
+def along(a, b):
     """Gauss points of a rod: two carry its exact kinetic energy."""
-    s = 0.5 + np.array([-1, 1]) / np.sqrt(12)
-    return a + s[:, None] * (b - a), np.full(k, mass / k)
+    return a + (0.5 + np.array([[-1], [1]]) / np.sqrt(12)) * (b - a)
 
 
 def points_of_arm(q1, q2):
@@ -63,22 +40,16 @@ def points_of_arm(q1, q2):
 def points_of_slide_arm(q1, q2):
     o = np.array([q1, 0.0])
     e = o + 0.4 * np.array([np.cos(q2), np.sin(q2)])
-    return np.vstack([o, along(o, e, 0.9)[0], e])
+    return np.vstack([o, along(o, e), e])
 
 
-def glide_points(five):
-    def points(q1, q2):
-        left, right = five._elbows(np.array(q1), np.array(q2))
-        tip = five.tip(q1, q2)
-        rods = [along(p, tip, MU)[0] for p in (left, right)]
-        return np.vstack([left, right, *rods, tip])
-
-    return points
+def points_of_glide(q1, q2):
+    ends, tip = TILTED._elbows(np.array(q1), np.array(q2)), TILTED.tip(q1, q2)
+    return np.vstack([*ends, *(along(end, tip) for end in ends), tip])
 
 
-TILTED = SlideFiveBar(
-    ((0, 0, 0.4), (0.8, 0.1, 2.0)), (1.3, 0.7), (rod(MU, REACH), rod(MU, 0.5)), PAYLOAD, -1
-)
+RODS = rod(MU, REACH), rod(MU, 0.5)
+TILTED = SlideFiveBar(((0, 0, 0.4), (0.8, 0.1, 2.0)), (1.3, 0.7), RODS, PAYLOAD, -1)
 CASES = {
     "PP": (
         CrossSlides((3.0, 2.0), 1.1, (0.0, 0.0)),
@@ -87,32 +58,28 @@ CASES = {
     ),
     "RP": (replace(ARM, offset=0.03), points_of_arm, [1.0, 1.0, 1.0]),
     "PR": (SlideArm(1.5, rod(0.9, 0.4), 0.3), points_of_slide_arm, [1.5, 0.45, 0.45, 0.3]),
-    "PRRRP": (TILTED, glide_points(TILTED), [1.3, 0.7, *[MU / 2] * 4, PAYLOAD]),
+    "PRRRP": (TILTED, points_of_glide, [1.3, 0.7, *[MU / 2] * 4, PAYLOAD]),
 }
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_inertia_of_linkages_with_slides_is_that_of_moving_points(name):
     linkage, posture, masses = CASES[name]
-    rng = np.random.default_rng(2)
+    rng, h = np.random.default_rng(2), 1e-6
     for q in rng.uniform(0.1, 0.4, (5, 2)):
         A, rate = linkage.inertia(*q), rng.normal(size=2)
-        expected = energy_of_points(posture, np.array(masses), q, rate)
+        v = (posture(*(q + h * rate)) - posture(*(q - h * rate))) / (2 * h)
+        expected = 0.5 * np.array(masses) @ np.square(v).sum(axis=1)
         assert 0.5 * rate @ A @ rate == pytest.approx(expected, rel=1e-7)
 
 
-def test_the_tool_of_the_polar_arm_lies_beside_its_guide():
+def test_the_tool_of_the_polar_arm_lies_beside_its_guide_and_rotors_add_to_their_coordinate():
     middle = points_of_arm(0.7, 0.4)[1:].mean(axis=0)
     assert_allclose(replace(ARM, offset=0.03).tip(0.7, 0.4), middle, atol=1e-15)
 
-
-def test_rotors_of_slides_add_to_their_own_coordinate():
     A = CrossSlides((1.0, 2.0), motors=(0.5, 0.25)).inertia(0.0, np.zeros(3))
     assert_allclose(A, np.tile(np.diag([3.5, 2.25]), (3, 1, 1)), atol=1e-15)
     assert replace(ARM, motor=0.7).inertia(0.0, 0.2)[1, 1] == pytest.approx(2.7)
-
-
-# --- classes ---
 
 
 def test_two_slides_are_isotropic_everywhere_or_nowhere():
@@ -162,15 +129,17 @@ def test_a_slide_with_an_arm_is_isotropic_on_lines_or_everywhere():
     assert isotropic_set(balanced.inertia, span, lengths=(1.0, L), n=20).kind == "everywhere"
 
 
+# cot^2 of the couplers' slope = (4/3 mu + M) / (2/3 mu + M); 45 degrees without their mass
+COT = np.sqrt((4 / 3 * MU + PAYLOAD) / (2 / 3 * MU + PAYLOAD))
+SPREAD = 2 * REACH * COT / np.hypot(1, COT)
+
+
 def test_equal_sides_on_one_rail_are_isotropic_at_one_spread():
-    """cot^2 of the couplers' slope = (4/3 mu + M) / (2/3 mu + M); 45 degrees without their mass."""
-    cot = np.sqrt((4 / 3 * MU + PAYLOAD) / (2 / 3 * MU + PAYLOAD))
-    spread = 2 * REACH * cot / np.hypot(1, cot)
     for mass in (0.0, 1.3, 20.0):  # whatever both slides weigh
         glide = replace(GLIDE, slides=(mass, mass))
         found = isotropic_set(glide.inertia, SPAN, n=60, assembles=GLIDE.assembles)
         assert found.kind == "curves"
-        assert_allclose(found.q[:, 1] - found.q[:, 0], spread, rtol=1e-8)
+        assert_allclose(found.q[:, 1] - found.q[:, 0], SPREAD, rtol=1e-8)
     unequal = replace(GLIDE, slides=(1.3, 1.0))
     assert isotropic_set(unequal.inertia, SPAN, n=60, assembles=GLIDE.assembles).kind == "none"
 
@@ -217,19 +186,7 @@ def test_a_double_point_is_no_curve():
     assert_allclose(found.q, 0.0, atol=1e-4)
 
 
-# --- the figure that compares ---
-
-
-def test_slides_have_the_tool_isotropy_of_their_masses():
-    """2 sqrt(m2 (m1 + m2)) / (m1 + 2 m2) in any coordinates of the plane, on any rectangle."""
-    m1, m2 = 3.0, 2.0
-    found = tool_isotropy(CrossSlides((m1, m2)).inertia, CrossSlides((m1, m2)).tip,
-                          ((0, 0.5), (-1, 2)), n=10)  # fmt: skip
-    assert found.mean == pytest.approx(2 * np.sqrt(m2 * (m1 + m2)) / (m1 + 2 * m2), rel=1e-9)
-    assert found.area == pytest.approx(1.5, rel=1e-9)
-
-
-def test_the_polar_arm_has_the_tool_isotropy_of_its_closed_form():
+def test_slides_and_the_polar_arm_have_the_tool_isotropy_of_their_closed_forms():
     """The tool feels m along and m + J / s^2 across; integrated over s ds by w = 2 m s^2 + J."""
     m, J, (s1, s2) = 2.0, 0.06, (0.1, 0.6)
 
@@ -243,6 +200,12 @@ def test_the_polar_arm_has_the_tool_isotropy_of_its_closed_form():
     found = tool_isotropy(ARM.inertia, ARM.tip, (None, (s1, s2)), n=300)
     assert found.mean == pytest.approx(expected, rel=1e-5)
     assert found.area == pytest.approx(np.pi * (s2**2 - s1**2), rel=1e-9)
+    # of slides in any coordinates of the plane, on any rectangle
+    m1, m2 = 3.0, 2.0
+    slides = CrossSlides((m1, m2))
+    found = tool_isotropy(slides.inertia, slides.tip, ((0, 0.5), (-1, 2)), n=10)
+    assert found.mean == pytest.approx(2 * np.sqrt(m2 * (m1 + m2)) / (m1 + 2 * m2), rel=1e-9)
+    assert found.area == pytest.approx(1.5, rel=1e-9)
 
 
 def test_a_tool_without_a_machine_is_isotropic():
@@ -271,11 +234,7 @@ def test_units_gears_and_coordinates_do_not_matter():
     assert geared.mean == pytest.approx(plain.mean, rel=1e-8)
 
 
-# --- mechanisms of the multibody core ---
-
-
 def polar_of_the_core():
-    """ARM as bodies and joints: a guide on a pin, a slide on it, displaced by 0.3 m."""
     mech = rom.Mechanism(gravity=(0, 0, 0))
     guide = mech.add_rigid("guide", mass=1.0, inertia=(0.05,) * 3, at=(0, 0, 0))
     slide = mech.add_rigid("slide", mass=2.0, inertia=(0.01,) * 3, at=(0.3, 0, 0))
@@ -328,18 +287,17 @@ def test_a_slide_with_an_arm_of_the_core_is_isotropic_where_the_arm_lies_along_t
     found = isotropic_set(core.inertia, span, lengths=(1.0, L), n=6)
     assert found.kind == "curves"
     assert_allclose(found.q[:, 1], -0.3, atol=1e-7)
-    other = isotropic_set(core.inertia, span, lengths=(1.0, 1.2 * L), n=6)
-    assert other.kind == "none"
+    assert isotropic_set(core.inertia, span, lengths=(1.0, 1.2 * L), n=6).kind == "none"
 
 
 def test_two_links_of_the_core_are_isotropic_where_the_elbow_has_its_closed_form():
     """Motor on the elbow, a = 2 c: cos q2 = -c / b; the shoulder does not matter."""
-    m1, l1, m2, l2 = 3.375, 0.3, 1.0, 0.45
+    l1, m2, l2 = 0.3, 1.0, 0.45
     c, b = m2 * l2**2 / 3, m2 * l1 * l2 / 2
     m1 = (2 * c - m2 * l1**2) * 3 / l1**2
     core = Driven(two_link_of_the_core((m1, l1), (m2, l2), (0.2, 2.8)), ("shoulder", "elbow"))
-    assert_allclose(core.inertia(0.4, 0.1), TwoLink(rod(m1, l1), rod(m2, l2), relative=True)
-                    .inertia(0.6, 2.9), rtol=1e-7)  # fmt: skip
+    formula = TwoLink(rod(m1, l1), rod(m2, l2), relative=True)
+    assert_allclose(core.inertia(0.4, 0.1), formula.inertia(0.6, 2.9), rtol=1e-7)
     bend = np.arccos(-c / b) - 2.8
     found = isotropic_set(core.inertia, ((-0.2, 0.2), (bend - 0.11, bend + 0.17)), n=6)
     assert found.kind == "curves" and not found.winding.any()
@@ -348,22 +306,18 @@ def test_two_links_of_the_core_are_isotropic_where_the_elbow_has_its_closed_form
 
 
 def test_two_slides_of_the_core_are_isotropic_at_one_spread():
-    cot = np.sqrt((4 / 3 * MU + PAYLOAD) / (2 / 3 * MU + PAYLOAD))
-    spread = 2 * REACH * cot / np.hypot(1, cot)
-    core = Driven(
-        linkages.rail_of_the_core(1.3, (MU, REACH), PAYLOAD, 0.9), ("left", "right"), tool="tool"
-    )
+    rail = linkages.rail_of_the_core(1.3, (MU, REACH), PAYLOAD, 0.9)
+    core = Driven(rail, ("left", "right"), tool="tool")
     assert_allclose(core.inertia(0.1, 0.05), GLIDE.inertia(0.1, 0.95), rtol=1e-7)
     assert_allclose(core.tip(0.1, 0.05), GLIDE.tip(0.1, 0.95), atol=1e-9)
     span = ((-0.05, 0.05), (-0.1, 0.1))
     found = isotropic_set(core.inertia, span, n=6, assembles=core.assembles)
     assert found.kind == "curves"
-    assert_allclose(0.9 + found.q[:, 1] - found.q[:, 0], spread, atol=1e-7)
+    assert_allclose(0.9 + found.q[:, 1] - found.q[:, 0], SPREAD, atol=1e-7)
     assert core.assembles([0.0, 0.0], [0.0, 0.4]).tolist() == [True, False]  # 1.3 m apart
 
 
 def test_a_five_bar_of_the_core_has_a_point_of_the_table():
-    """Of the eight, the one at 135.7231 and 44.2769 degrees: rank two, winding -1."""
     start = np.array([2.3, 0.8])
     mech = five_bar_of_the_core(start, [(2.0, 0.3)] * 2, [(1.0, 0.8)] * 2, FIVE.posture(*start))
     core = Driven(mech, ("left", "right"), tool="ball")
@@ -394,9 +348,6 @@ def test_mechanisms_of_more_than_two_motions_are_refused():
     assert not core.assembles(0.1, 0.2)
 
 
-# --- maps and loci within strokes ---
-
-
 def index_of_the_rail(spread):
     """Energies of the mean and of the difference of both speeds, by hand."""
     cot2 = spread**2 / (4 * REACH**2 - spread**2)
@@ -412,10 +363,8 @@ def test_loci_of_two_slides_run_from_limit_to_limit():
     q = np.stack(angle_grid(60, stroke))
     assert_allclose([q[0, 0, 0], q[0, -1, 0], q[1, 0, 0], q[1, 0, -1]], [0, 0.3, 0.75, 1.15])
     assert_allclose(index, index_of_the_rail(q[1] - q[0]), rtol=1e-10)
-    best = 2 * REACH * np.sqrt((4 / 3 * MU + PAYLOAD) / (2 * MU + 2 * PAYLOAD))
-    level = 0.995
-    expected = [brentq(lambda s: index_of_the_rail(s) - level, *ends)
-                for ends in ((0.3, best), (best, 1.19))]  # fmt: skip
+    level, between = 0.995, ((0.3, SPREAD), (SPREAD, 1.19))
+    expected = [brentq(lambda s: index_of_the_rail(s) - level, *ends) for ends in between]
     curves = closed_loci(index, level, stroke)
     assert len(curves) == 2
     spreads = [curve[:, 1] - curve[:, 0] for curve in curves]
@@ -423,13 +372,11 @@ def test_loci_of_two_slides_run_from_limit_to_limit():
     for curve, spread in zip(curves, spreads, strict=True):
         assert np.ptp(spread) < 5e-4
         for end in curve[[0, -1]]:
-            at = [np.isclose(end[k], stroke[k], atol=1e-12).any() for k in (0, 1)]
-            assert any(at)
+            assert any(np.isclose(end[k], stroke[k], atol=1e-12).any() for k in (0, 1))
         assert np.abs(np.diff(curve, axis=0)).max() <= 0.4 / 59 * (1 + 1e-9)
 
 
 def test_loci_of_a_polar_arm_close_around_a_turn_of_its_guide():
-    """One coordinate turns, the other has a stroke, and a length makes both displacements."""
     L, stroke, level = 0.3, (None, (0.05, 0.6)), 0.97
     index = index_map(ARM.inertia, stroke, lengths=(L, 1.0), n=80)
     ratio = ((2 - level**2 + s * 2 * np.sqrt(1 - level**2)) / level**2 for s in (1, -1))
@@ -443,7 +390,6 @@ def test_loci_of_a_polar_arm_close_around_a_turn_of_its_guide():
 
 
 def test_loci_within_a_window_are_those_of_the_torus():
-    """Around a point of the five-bar: closed in a wide window, cut where a narrow one ends."""
     centre, level = np.radians([225.573, 314.427]), 0.99
     whole = closed_loci(index_map(FIVE.inertia, n=720), level)
     near = min(whole, key=lambda c: np.abs(c.mean(axis=0) - centre).max())
@@ -462,9 +408,6 @@ def test_loci_within_a_window_are_those_of_the_torus():
     assert not any(np.array_equal(c[0], c[-1]) for c in halves)
 
 
-# --- what cannot be ---
-
-
 NOWHERE = ((0, 0.1), (1.3, 1.5))
 
 
@@ -476,10 +419,6 @@ def core_of(*drives, **tool):
     return Driven(polar_of_the_core(), drives, **tool)
 
 
-def flat(a, s):
-    return ARM.tip(0 * a, s)
-
-
 test_what_is_no_linkage_is_refused = refused(
     (lambda: CrossSlides((1.0, 1.0), angle=np.pi), ModelError, "parallel"),
     (lambda: replace(GLIDE, side=0), ModelError, "needed is 1 or -1"),
@@ -487,7 +426,11 @@ test_what_is_no_linkage_is_refused = refused(
     (lambda: glided(isotropic_set, n=10), ModelError, "none of 10 by 10"),
     (lambda: glided(tool_isotropy, GLIDE.tip), ModelError, "reaches nothing"),
     (lambda: isotropic_set(ARM.inertia, (None, (1, 1))), ConfigError, "low < high"),
-    (lambda: tool_isotropy(ARM.inertia, flat, (None, (0.1, 1))), ModelError, "along a line"),
+    (
+        lambda: tool_isotropy(ARM.inertia, lambda a, s: ARM.tip(0 * a, s), (None, (0.1, 1))),
+        ModelError,
+        "along a line",
+    ),
     (lambda: core_of("turn", "feed", tool="x"), ConfigError, "none of"),
     (lambda: core_of("turn", "feed").tip(0, 0), ConfigError, "no tool"),
     (lambda: core_of("turn", "x"), ConfigError, "x"),

@@ -11,16 +11,9 @@ from cases.mbs.linkages import five_bar_of_the_core, rail_of_the_core
 from cases.mbs.mechanisms import simulate_quietly
 from cases.refusals import refuses
 from cases.solid import STEEL, block, reduced
+from rom.components import linkages
+from rom.components.linkages import Driven, FiveBar, TwoLink, mechanism_inertia, rod
 from rom.components.linkages.dynamic_isotropy import christoffel, index_map
-from rom.components.linkages.two_dof_linkages import (
-    Driven,
-    FiveBar,
-    TwoLink,
-    mechanism_inertia,
-    reduced_link,
-    rigid_link,
-    rod,
-)
 from rom.errors import ConfigError, ModelError
 from rom.mbs.mechanism import Mechanism
 
@@ -34,23 +27,14 @@ def bar():
     return reduced(4, block(size=(0.3, 0.02, 0.02), cells=(6, 2, 2), origin=(0.1, -0.03, 0.0)))
 
 
-def two_link_closed_form(l1, lc1, m1, I1, lc2, m2, I2, q1, q2):  # noqa: PLR0913
-    """Inertia of the two-link chain in absolute angles."""
-    b = m2 * l1 * lc2 * np.cos(q1 - q2)
-    return np.array([[I1 + m1 * lc1**2 + m2 * l1**2, b], [b, I2 + m2 * lc2**2]])
-
-
-def test_two_link_chain_has_its_textbook_inertia():
-    A = TWO.inertia(0.4, 1.3)
-    exact = two_link_closed_form(0.5, 0.25, 1.0, 0.25 / 12, 0.2, 2.0, 0.32 / 12, 0.4, 1.3)
-    assert_allclose(A, exact, rtol=1e-14)
+def test_two_link_chain_has_its_textbook_inertia_also_with_a_mass_centre_aside():
+    """In absolute angles; uniform links turn about their ends by a third of m l^2."""
+    A, b = TWO.inertia(0.4, 1.3), 2.0 * 0.5 * 0.2 * np.cos(0.4 - 1.3)
+    assert_allclose(A, [[0.5**2 / 3 + 2.0 * 0.5**2, b], [b, 2.0 * 0.4**2 / 3]], rtol=1e-14)
     assert_allclose(np.diag(A), [0.583333, 0.106667], atol=1e-6)
-
-
-def test_a_mass_centre_aside_of_the_axis_couples_by_cosine_and_sine():
-    """Velocity of the centre: l1 e1' + (x e2' - y e2), primes for a quarter turn ahead."""
+    # velocity of the centre: l1 e1' + (x e2' - y e2), primes for a quarter turn ahead
     m, l1, x, y, J = 2.0, 0.5, 0.15, 0.08, 0.03
-    chain = TwoLink(rod(1.0, l1), rigid_link(m, 0.4, (x, y), J))
+    chain = TwoLink(rod(1.0, l1), linkages.rigid_link(m, 0.4, (x, y), J))
     A, turn = chain.inertia(0.4, 1.3), 1.3 - 0.4
     assert_allclose(A[0, 1], m * l1 * (x * np.cos(turn) - y * np.sin(turn)), rtol=1e-13)
     assert_allclose(np.diag(A), [l1**2 / 3 + m * l1**2, J + m * (x**2 + y**2)], rtol=1e-13)
@@ -71,18 +55,16 @@ def test_kinetic_energy_of_the_five_bar_from_moving_points():
     assert (np.linalg.eigvalsh(A) > 0).all()
 
 
+def five_of_the_core(q):
+    return five_bar_of_the_core(q, [(2.0, 0.3)] * 2, [(1.0, 0.8)] * 2, FIVE.posture(*q))
+
+
 def test_closed_form_equals_the_mass_matrix_of_the_multibody_core():
     for q in np.random.default_rng(3).uniform(0, 2 * np.pi, (4, 2)):
-        mech = five_bar_of_the_core(q, [(2.0, 0.3)] * 2, [(1.0, 0.8)] * 2, FIVE.posture(*q))
-        core = mechanism_inertia(mech, ("left", "right"))
+        core = mechanism_inertia(five_of_the_core(q), ("left", "right"))
         assert_allclose(core, FIVE.inertia(*q), rtol=1e-7, atol=1e-9)
-
-
-def test_the_core_moves_to_other_angles():
-    """Angles count from where the bodies were added."""
-    q, turn = np.array([1.0, 2.0]), np.array([0.3, -0.2])
-    mech = five_bar_of_the_core(q, [(2.0, 0.3)] * 2, [(1.0, 0.8)] * 2, FIVE.posture(*q))
-    core = mechanism_inertia(mech, ("left", "right"), angles=turn)
+    turn = np.array([0.3, -0.2])  # from where the bodies were added
+    core = mechanism_inertia(five_of_the_core(q), ("left", "right"), angles=turn)
     assert_allclose(core, FIVE.inertia(*(q + turn)), rtol=1e-7)
 
 
@@ -96,15 +78,14 @@ def test_cranks_that_turn_far_keep_the_tip_on_its_side(base, cranks, couplers, s
     sizes = [[(1.0, length) for length in pair] for pair in (cranks, couplers)]
     five = FiveBar(base, *(tuple(rod(*size) for size in pair) for pair in sizes), payload=0.5)
     start, end = np.array(start), np.add(start, turn)
-    core = Driven(five_bar_of_the_core(start, *sizes, five.posture(*start)), ("left", "right"),
-                  tool="ball")  # fmt: skip
+    mech = five_bar_of_the_core(start, *sizes, five.posture(*start))
+    core = Driven(mech, ("left", "right"), tool="ball")
     assert np.linalg.norm(five.tip(*end) - replace(five, side=-1).tip(*end)) > 0.8
     assert_allclose(core.tip(*turn), five.tip(*end), atol=1e-8)
     assert_allclose(core.inertia(*turn), five.inertia(*end), rtol=1e-6)
 
 
 def test_slides_of_a_small_mechanism_travel_many_of_its_sizes():
-    """Couplers of 4 mm on a rail of 200 mm: lengths count in sizes of the mechanism."""
     core = Driven(rail_of_the_core(1.3, (0.9, 4e-3), 0.4, 5e-3), ("left", "right"), tool="tool")
     travel = 0.2
     there = core.tip([0.0, travel], [1e-3, travel + 1e-3])
@@ -116,20 +97,18 @@ def test_slides_of_a_small_mechanism_travel_many_of_its_sizes():
 
 @pytest.mark.parametrize("elastic", ["held", "free"])
 def test_flexible_links_agree_with_the_core(bar, elastic):
-    """Rigid cranks of 0.3 m with reduced blocks as couplers, and the other way round."""
-    link = reduced_link(bar, "root", "tip")
+    link = linkages.reduced_link(bar, "root", "tip")
     for q in ([1.2, 1.6], [0.3, 1.2]):
         five = FiveBar(0.5, (rod(0.4, 0.25), link), (link, rod(0.5, 0.35)), payload=0.5)
-        mech = five_bar_of_the_core(
-            q, [(0.4, 0.25), bar], [bar, (0.5, 0.35)], five.posture(*q)
-        )  # fmt: skip
+        cranks, couplers = [(0.4, 0.25), bar], [bar, (0.5, 0.35)]
+        mech = five_bar_of_the_core(q, cranks, couplers, five.posture(*q))
         core = mechanism_inertia(mech, ("left", "right"), elastic=elastic)
         # the core measures the angle of a flexible crank on its root marker
         assert_allclose(five.inertia(*q, elastic=elastic), core, rtol=1e-6, atol=1e-9)
 
 
-def test_free_links_feel_lighter_whatever_the_direction(bar):
-    link = reduced_link(bar, "root", "tip")
+def test_free_links_feel_lighter_whatever_the_direction_and_their_frame(bar):
+    link = linkages.reduced_link(bar, "root", "tip")
     chain = TwoLink(link, link, payload=0.3)
     held, free = (chain.inertia(0.3, 1.4, elastic=e) for e in ("held", "free"))
     assert (np.linalg.eigvalsh(held - free) > 0).all() and (np.linalg.eigvalsh(free) > 0).all()
@@ -137,6 +116,9 @@ def test_free_links_feel_lighter_whatever_the_direction(bar):
     J = steel.M[2, 2] + steel.M[0, 0] * 0.02**2 / 12
     assert link.M[2, 2] == pytest.approx(J, rel=1e-9)
     assert link.length == pytest.approx(0.3)
+    other = linkages.reduced_link(bar.with_reference(("root", "tip")), "root", "tip")
+    fives = (FiveBar(0.2, (rod(0.4, 0.25),) * 2, (one,) * 2) for one in (link, other))
+    assert_allclose(*(five.inertia(1.0, 2.2, elastic="free") for five in fives), rtol=1e-10)
 
 
 def apparent_inertia(L, mu, EI, w):
@@ -153,14 +135,13 @@ def apparent_inertia(L, mu, EI, w):
 
 
 def test_inertia_at_a_frequency_is_that_of_a_beam_and_converges_with_its_modes():
-    """Without bound on the frequency each mode takes more away; at a frequency they converge."""
     L, side, w = 0.5, 0.02, 2 * np.pi * 40.0
     mu, EI = STEEL.rho * side**2, STEEL.E * side**4 / 12
     found, free = [], []
     model = block((L, side, side), (120, 1, 1), replace(STEEL, nu=0.0))
     for n in (1, 4, 12):
         body = reduced(n, model)
-        arm = TwoLink(rod(1.0, 0.3), reduced_link(body, "root", "tip"))
+        arm = TwoLink(rod(1.0, 0.3), linkages.reduced_link(body, "root", "tip"))
         found.append(arm.inertia(0.0, 1.0, elastic=w)[1, 1])
         free.append(arm.inertia(0.0, 1.0, elastic="free")[1, 1])
         assert_allclose(arm.inertia(0.0, 1.0, elastic=1e-3 * w), arm.inertia(0.0, 1.0), rtol=1e-5)
@@ -174,7 +155,7 @@ def test_inertia_at_a_frequency_is_that_of_a_beam_and_converges_with_its_modes()
 
 def test_above_the_first_frequency_on_held_drives_there_is_no_inertia(bar):
     """A link that swings against its motor has less than none, which no index may hide."""
-    arm = TwoLink(rod(1.0, 0.3), reduced_link(bar, "root", "tip"))
+    arm = TwoLink(rod(1.0, 0.3), linkages.reduced_link(bar, "root", "tip"))
     first = bar.frequencies(1, fixed=("root",))[0]
     below, above = (2 * np.pi * share * first for share in (0.9, 1.1))
     index_map(lambda a, b: arm.inertia(a, b, elastic=below), n=4)
@@ -182,37 +163,18 @@ def test_above_the_first_frequency_on_held_drives_there_is_no_inertia(bar):
         index_map(lambda a, b: arm.inertia(a, b, elastic=above), n=4)
 
 
-def test_the_frame_of_a_flexible_coupler_is_a_matter_of_taste(bar):
-    link = reduced_link(bar, "root", "tip")
-    other = reduced_link(bar.with_reference(("root", "tip")), "root", "tip")
-    values = [
-        FiveBar(0.2, (rod(0.4, 0.25),) * 2, (one,) * 2).inertia(1.0, 2.2, elastic="free")
-        for one in (link, other)
-    ]
-    assert_allclose(*values, rtol=1e-10)
-
-
 def test_inertia_and_christoffel_symbols_reproduce_the_free_motion_of_the_core():
-    """Two equations of motion against fifty-odd with constraints, integrated by other means."""
     q0, rate = np.array([1.0, 2.2]), np.array([3.0, -2.0])
-    mech = five_bar_of_the_core(q0, [(2.0, 0.3)] * 2, [(1.0, 0.8)] * 2, FIVE.posture(*q0))
+    mech = five_of_the_core(q0)
     mech.drives.clear()
     step = 1e-7
-    for name, pair in {"crank 0": (0, 1), "crank 1": (4, 3)}.items():
-        P = [FIVE.posture(*(q0 + s * step * rate))[list(pair)].mean(axis=0) for s in (1, -1)]
-        part = mech.parts[name]
-        spin = rate[0 if name == "crank 0" else 1]
-        v = np.r_[(P[0] - P[1]) / (2 * step), 0.0]
-        mech.parts[name] = replace(part, velocity=v, omega=np.array([0, 0, spin]))
-    for name, pair in {"coupler 0": (1, 2), "coupler 1": (3, 2)}.items():
+    ends = {"crank 0": (0, 1), "crank 1": (4, 3), "coupler 0": (1, 2), "coupler 1": (3, 2)}
+    for name, pair in (ends | {"ball": (2, 2)}).items():
         P = [FIVE.posture(*(q0 + s * step * rate))[list(pair)] for s in (1, -1)]
         arm = [np.arctan2(*(p[1] - p[0])[::-1]) for p in P]
         v = np.r_[(P[0] - P[1]).mean(axis=0) / (2 * step), 0.0]
         spin = np.array([0, 0, (arm[0] - arm[1]) / (2 * step)])
         mech.parts[name] = replace(mech.parts[name], velocity=v, omega=spin)
-    P = [FIVE.posture(*(q0 + s * step * rate))[2] for s in (1, -1)]
-    v = np.r_[(P[0] - P[1]) / (2 * step), 0.0]
-    mech.parts["ball"] = replace(mech.parts["ball"], velocity=v)
     sol = simulate_quietly(mech, t_end=0.2, dt=0.01, method="dop853", rtol=1e-8, atol=1e-10)
 
     def rhs(t, y):

@@ -16,7 +16,6 @@ from rom.errors import ConfigError, ModelError
 from rom.fe.mesh import read_triangles
 
 pytestmark = pytest.mark.fenicsx
-pytest.importorskip("gmsh", reason="stones are drawn in gmsh")
 R, T, H = 5.0, 0.8, 4.0
 
 
@@ -26,7 +25,6 @@ def vault(**parameters):
 
 
 def test_stones_of_a_vault_are_the_surfaces_with_their_corners():
-    """16 voussoirs, five courses a side, the ground; curved sides become chords, sectors grow."""
     plain, fine = vault(), vault(chords=8.0)
     assert len(plain.stones) == 27 and plain.held == (0,)
     assert [len(s.outline) for s in plain.stones] == 27 * [4]
@@ -71,7 +69,6 @@ def test_a_buttress_tips_at_the_width_that_statics_says():
 
 
 def stones_of(*outlines):
-    """Squares of two triangles each."""
     first = 4 * np.arange(len(outlines))[:, None]
     T = np.hstack([first, first + 1, first + 2, first, first + 2, first + 3]).reshape(-1, 3)
     return np.vstack(outlines), T, {f"stone {k}": [2 * k, 2 * k + 1] for k in range(len(outlines))}
@@ -110,12 +107,10 @@ def test_drawings_that_are_no_masonry_are_named(drawing, held, words):
 
 @pytest.mark.parametrize("k", [1, 8])
 def test_a_voussoir_in_space_takes_the_place_of_a_drawn_one(k):
-    """Mass, centre, weight carried, and the crown load: a reduced solid against uniform strains."""
     drawing, rock = vault(), Rock()
-    solid = rom.fe.model(
-        ROOT / "meshes" / "voussoir.geo", material=rom.Material(rock.E, rock.nu, rock.rho),
-        parameters={"k": float(k), "n_across": 3.0, "n_along": 3.0, "n_deep": 1.0},
-    )  # fmt: skip
+    sizes = {"k": float(k), "n_across": 3.0, "n_along": 3.0, "n_deep": 1.0}
+    material, file = rom.Material(rock.E, rock.nu, rock.rho), ROOT / "meshes" / "voussoir.geo"
+    solid = rom.fe.model(file, material=material, parameters=sizes)
     assert solid.mass() == pytest.approx(drawing.stones[k].M[0, 0], rel=1e-9)
     joints = {"left": "rbe3", "right": "rbe3"}
     assert set(joints) < set(solid.interfaces)
@@ -123,11 +118,10 @@ def test_a_voussoir_in_space_takes_the_place_of_a_drawn_one(k):
     fine = reduced_stone(body, drawing.stones[k].outline)
     assert_allclose(fine.M[:3, :3], drawing.stones[k].M[:3, :3], rtol=1e-2, atol=1e-6)
     assert_allclose(fine.centre, drawing.stones[k].centre, atol=1e-9)
-    mixed = replace(drawing, stones=tuple(fine if i == k else s
-                                          for i, s in enumerate(drawing.stones)))  # fmt: skip
+    mixed = replace(drawing, stones=(*drawing.stones[:k], fine, *drawing.stones[k + 1 :]))
     load = PointLoad(8, (0.0, H + R + T / 2), (0.0, -20e3), ramp(0.5))
-    one, other = (simulate(m, t_end=2.0, dt=2e-3, damping=15.0, save_every=1000, actions=[load])
-                  for m in (drawing, mixed))  # fmt: skip
+    run = {"t_end": 2.0, "dt": 2e-3, "damping": 15.0, "save_every": 1000, "actions": [load]}
+    one, other = (simulate(model, **run) for model in (drawing, mixed))
     assert np.abs(other.v[-1]).max() < 1e-6
     left = (k - 1, k) if k > 1 else (1, 21)
     carried = [motion.joints()[left][1][1] for motion in (one, other)]

@@ -9,54 +9,41 @@ from numpy.testing import assert_allclose
 
 from cases.components.masonry import SOFT, G, box
 from cases.refusals import refuses
-from rom.components.masonry import (
-    Joint,
-    Masonry,
-    PointLoad,
-    Rock,
-    SupportMotion,
-    Table,
-    arch,
-    ramp,
-    read_joints,
-    simulate,
-    stands,
-    stone,
-)
+from rom.components import masonry
+from rom.components.masonry import Joint, Masonry, PointLoad, arch, simulate, stands, stone
 from rom.components.masonry.block_contact import contacts, drop_doubles
 from rom.errors import ConfigError, FileFormatError
 
 
-def pair(joint, *, upper=1.0, below=False, **options):
+def pair(joint, *, below=False, **options):
     """A held stone, and a free one on it or hanging below it; joints softer than stone."""
-    free = box(upper, 1.0, (0.0, -1.0 if below else 1.0))
+    free = box(at=(0.0, -1.0 if below else 1.0))
     stones = (stone(box(7.0, at=(-1.0, 0.0)), **SOFT), stone(free, **SOFT))
     return Masonry(stones, (0,), 0.1 * SOFT["E"], 0.9, joints=(joint,), **options)
 
 
-def pulled(model, force, at, t_end=2.0, history=None):
-    load = PointLoad(1, at, force, history or ramp(0.5))
-    return simulate(model, t_end=t_end, dt=5e-3, actions=[load], damping=6.0, save_every=10)
+def pulled(model, force, at):
+    load = PointLoad(1, at, force, masonry.ramp(0.5))
+    return simulate(model, t_end=2.0, dt=5e-3, actions=[load], damping=6.0, save_every=10)
 
 
 @pytest.mark.parametrize(("factor", "holds"), [(0.98, True), (1.02, False)])
 def test_a_stone_hangs_until_tension_is_reached(factor, holds):
     """Weight 2000 g of a stone of 1 m2; a pull in the middle adds what is missing."""
-    model = pair(Joint(0.6, 1e5, 5e4), below=True)
-    motion = pulled(model, (0.0, -(factor * 5e4 - 2000 * G)), (0.5, -1.0))
+    model, pull = pair(Joint(0.6, 1e5, 5e4), below=True), (0.0, 2000 * G - factor * 5e4)
+    motion = pulled(model, pull, (0.5, -1.0))
     assert bool(abs(motion.v[-1, 1, 1]) < 1e-6) is holds
     assert (motion.broken[-1] == 0) is np.bool_(holds)
-    assert stands(model, [PointLoad(1, (0.5, -1.0), (0.0, -(factor * 5e4 - 2000 * G)))]) is holds
+    assert stands(model, [PointLoad(1, (0.5, -1.0), pull)]) is holds
     if holds:
         ((_, force),) = motion.joints().values()
         assert_allclose(np.abs(force), [0, factor * 5e4], atol=10.0)
 
 
-def test_a_joint_twice_as_thick_holds_twice_as_much():
-    for thickness, holds in ((1.0, False), (2.0, True)):
-        model = pair(Joint(0.6, 1e5, 1.5e4), below=True, thickness=thickness)
-        motion = simulate(model, t_end=1.0, dt=5e-3, save_every=200)
-        assert (motion.broken[-1] == 0) is np.bool_(holds)
+@pytest.mark.parametrize(("thickness", "holds"), [(1.0, False), (2.0, True)])
+def test_a_joint_twice_as_thick_holds_twice_as_much(thickness, holds):
+    model = pair(Joint(0.6, 1e5, 1.5e4), below=True, thickness=thickness)
+    assert (simulate(model, t_end=1.0, dt=5e-3).broken[-1] == 0) is np.bool_(holds)
 
 
 @pytest.mark.parametrize(("factor", "holds"), [(0.98, True), (1.02, False)])
@@ -73,15 +60,15 @@ def test_cohesion_lost_leaves_friction():
     """After a blow that breaks the joint, half of what it bore moves it: a = F / m - mu g."""
     c, mu = 3e4, 0.5
     first, then = 1.1 * (c + mu * 2000 * G), 0.5 * (c + mu * 2000 * G)
-    history = Table([0.0, 0.1, 0.2, 0.3, 5.0], [0.0, first, first, then, then])
+    history = masonry.Table([0.0, 0.1, 0.2, 0.3, 5.0], [0.0, first, first, then, then])
     load = [PointLoad(1, (0.0, 1.5), (1.0, 0.0), history)]
     motion = simulate(pair(Joint(mu, c, 1e6)), t_end=0.5, dt=1e-3, actions=load)
     a = (motion.v[-1, 1, 0] - motion.v[-100, 1, 0]) / (motion.t[-1] - motion.t[-100])
     assert motion.broken[-1] == 2  # both corners of the stone
     assert a == pytest.approx(then / 2000 - mu * G, rel=0.02)
-    unbroken = Table([0.0, 0.3, 5.0], [0.0, then, then])
-    still = simulate(pair(Joint(mu, c, 1e6)), t_end=0.5, dt=1e-3,
-                     actions=[PointLoad(1, (0.0, 1.5), (1.0, 0.0), unbroken)])  # fmt: skip
+    unbroken = masonry.Table([0.0, 0.3, 5.0], [0.0, then, then])
+    load = [PointLoad(1, (0.0, 1.5), (1.0, 0.0), unbroken)]
+    still = simulate(pair(Joint(mu, c, 1e6)), t_end=0.5, dt=1e-3, actions=load)
     assert still.broken[-1] == 0 and abs(still.q[-1, 1, 0] - still.q[0, 1, 0]) < 1e-3
 
 
@@ -104,11 +91,10 @@ def test_of_two_corners_that_meet_the_glued_one_parts_the_stones():
 
 
 def test_a_joint_that_opened_does_not_glue_again():
-    """Lifted off and set down: what hung before falls when it is lifted the second time."""
-    history = Table([0.0, 0.2, 0.5, 0.8, 3.0], [0.0, 1.0, 1.0, 0.0, 0.0])
+    history = masonry.Table([0.0, 0.2, 0.5, 0.8, 3.0], [0.0, 1.0, 1.0, 0.0, 0.0])
     model = pair(Joint(0.6, 5e4, 3e4))
-    up, less = ([PointLoad(1, (0.5, 2.0), (0.0, factor * (2000 * G + 3e4)), history)]
-                for factor in (1.02, 0.9))  # fmt: skip
+    pulls = ((0.0, factor * (2000 * G + 3e4)) for factor in (1.02, 0.9))
+    up, less = ([PointLoad(1, (0.5, 2.0), pull, history)] for pull in pulls)
     motion = simulate(model, t_end=3.0, dt=2e-3, actions=up, damping=15.0)
     assert motion.broken[-1] > 0 and abs(motion.v[-1, 1, 1]) < 1e-3
     assert motion.q[:, 1, 1].max() > 1.6 and motion.q[-1, 1, 1] == pytest.approx(1.5, abs=1e-3)
@@ -116,7 +102,6 @@ def test_a_joint_that_opened_does_not_glue_again():
 
 
 def test_friction_of_one_joint_is_its_own():
-    """Two stones on a slope of friction: the one with the smoother joint slides."""
     ground = stone(np.array([[-1, -1], [5, -1], [5, 0], [-1, 0]]), **SOFT)
     stones = (ground, stone(box(), **SOFT), stone(box(at=(3.0, 0.0)), **SOFT))
     joints = (Joint(0.9), Joint(0.2, between=((2, 0),)))
@@ -150,7 +135,7 @@ friction = 0.7
 cohesion = "0.2 MPa"
 tension = 1e5
 """)
-    assert read_joints(path) == (Joint(0.6), Joint(0.7, 2e5, 1e5, ((0, 1),)))
+    assert masonry.read_joints(path) == (Joint(0.6), Joint(0.7, 2e5, 1e5, ((0, 1),)))
 
 
 @pytest.mark.parametrize(
@@ -170,13 +155,13 @@ tension = 1e5
 def test_files_that_are_no_joints_are_named(text, words, tmp_path):
     path = tmp_path / "joints.toml"
     path.write_text(text)
-    refuses(FileFormatError, words, read_joints, path)
+    refuses(FileFormatError, words, masonry.read_joints, path)
 
 
 def test_joints_that_cannot_be_are_named(tmp_path):
     path = tmp_path / "joints.toml"
     path.write_text("[[joint]]\nfriction = -0.6")
-    refuses(ConfigError, r"joint 1: friction = -0.6", read_joints, path)
+    refuses(ConfigError, r"joint 1: friction = -0.6", masonry.read_joints, path)
     for between in (((0, 5),), ((1, 1),)):
         with pytest.raises(ConfigError, match="use stones from 0 to 1"):
             simulate(pair(Joint(0.5, between=between)), t_end=0.1, dt=0.01)
@@ -191,7 +176,7 @@ def spread_arch(n, thickness, k, x):
     Hinges: outer edge of the crown, inner edges of the joints k stones below it on both sides. What
     is between them turns and comes down; what is below has moved out with its support.
     """
-    rock, model = Rock(friction=2.0), arch(n, 1.0, thickness)
+    rock, model = masonry.Rock(friction=2.0), arch(n, 1.0, thickness)
     angle = k * np.pi / n
     hinge = (1 - thickness / 2) * np.array([np.sin(angle), np.cos(angle)])
     arm = np.array([0.0, 1 + thickness / 2]) - hinge
@@ -217,10 +202,11 @@ def test_supports_of_an_arch_spread_until_it_falls():
         while high - low > 1e-4:
             x = (low + high) / 2
             low, high = (x, high) if stands(spread_arch(20, thickness, k, x)) else (low, x)
-        model = arch(20, 1.0, thickness, rock=Rock(friction=2.0))
+        model = arch(20, 1.0, thickness, rock=masonry.Rock(friction=2.0))
         for factor, stays in ((0.9, True), (1.15, False)):
-            spread = [SupportMotion((support,), (side * factor * low / 2, 0.0), history=ramp(3.0))
-                      for support, side in ((0, -1), (21, 1))]  # fmt: skip
+            ends = (0, -factor * low / 2), (21, factor * low / 2)
+            grow = masonry.ramp(3.0)
+            spread = [masonry.SupportMotion((k,), (x, 0.0), 0.0, grow) for k, x in ends]
             run = {"t_end": 4.5, "dt": 2e-3, "damping": 25.0, "save_every": 750}
             motion = simulate(model, actions=spread, **run)
             speed = np.abs(motion.v[-1, 1:-1]).max()

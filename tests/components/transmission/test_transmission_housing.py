@@ -47,15 +47,20 @@ def test_a_rigid_housing_is_as_none(rigid):
     assert_allclose(responses[1].error, responses[0].error, rtol=1e-4)
 
 
-def test_bushes_give_way_by_the_force_on_their_springs(soft):
-    """Films push the housing as hard as the journals, the other way."""
-    bushes = soft.q[soft.unit.parts[2]].reshape(4, 2)
-    mirror = np.array([1.0, -1.0])
+def test_bushes_give_way_and_journals_rest_in_them_as_in_rigid_ones(soft, rigid):
+    bushes, mirror = soft.q[soft.unit.parts[2]].reshape(4, 2), np.array([1.0, -1.0])
     for k, (u, f) in enumerate(zip(bushes, soft.forces.films, strict=True)):
         force = f.force[:2] * (mirror if k > 1 else 1.0)
         assert_allclose(u, -force / (8e7, 3e8)[k > 1], rtol=1e-7)
     given, taken, heat = soft.powers
     assert given - taken - heat == pytest.approx(tilting(soft), rel=0.03)
+    for a, b in zip(soft.forces.films, rigid.forces.films, strict=True):
+        assert_allclose(a.motion[:2], b.motion[:2], atol=2e-3 * a.bearing.clearance)
+    pushed = soft.unit.rows(0, 0)[:2] @ soft.q - rigid.unit.rows(0, 0)[:2] @ rigid.q
+    assert np.hypot(*pushed) > 1e-5
+    run = simulate(soft, periods=0.4, steps=100)
+    assert run.balance < 1e-6
+    assert np.ptp(run.q[:, soft.unit.parts[2]], axis=0).max() > 1e-9
 
 
 def test_films_and_housing_are_springs_in_series(soft):
@@ -73,42 +78,25 @@ def test_films_and_housing_are_springs_in_series(soft):
         assert np.abs(series).max() < 0.8 * np.abs(film).max()
 
 
-def test_journals_rest_in_soft_bushes_as_in_rigid_ones(soft, rigid):
-    """The films carry the same load; the shafts follow their bushes."""
-    for a, b in zip(soft.forces.films, rigid.forces.films, strict=True):
-        assert_allclose(a.motion[:2], b.motion[:2], atol=2e-3 * a.bearing.clearance)
-    pushed = soft.unit.rows(0, 0)[:2] @ soft.q - rigid.unit.rows(0, 0)[:2] @ rigid.q
-    assert np.hypot(*pushed) > 1e-5
-
-
-def test_work_is_balanced_with_a_housing_that_moves(soft):
-    run = simulate(soft, periods=0.4, steps=100)
-    assert run.balance < 1e-6
-    assert np.ptp(run.q[:, soft.unit.parts[2]], axis=0).max() > 1e-9
-
-
 def test_a_bearing_without_bush_is_named():
     house = springs(1e8)
-    lame = replace(house, bushes=({0: house.bushes[0][0]}, house.bushes[1]))
-    words = r"pinion has bearings at nodes \[0, 4\], the housing has"
-    refuses(ModelError, words, replace, unit(), housing=lame)
-    flat = replace(house, bushes=({k: np.zeros((2, 8)) for k in NODES}, house.bushes[1]))
-    refuses(ModelError, r"needs rows of shape \(6, 8\)", replace, unit(), housing=flat)
+    flat = {k: np.zeros((2, 8)) for k in NODES}
+    for bushes, words in (({0: house.bushes[0][0]}, r"at nodes \[0, 4\]"), (flat, r"\(6, 8\)")):
+        wrong = replace(house, bushes=(bushes, house.bushes[1]))
+        refuses(ModelError, words, replace, unit(), housing=wrong)
 
 
 def test_a_reduced_body_is_held_and_bends_as_a_cantilever():
-    """A bar along x that is clamped at one end carries all four bushes at the other."""
-    size = (0.4, 0.02, 0.03)
-    method, kinds = rom.CraigBampton(4), dict(KINDS)
-    body = rom.reduce(bar(size, (8, 1, 1)), method=method, interfaces=kinds, certify=False)
+    size, options = (0.4, 0.02, 0.03), {"interfaces": dict(KINDS), "certify": False}
+    body = rom.reduce(bar(size, (8, 1, 1)), method=rom.CraigBampton(4), **options)
     names = dict.fromkeys(NODES, "tip")
     axes = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
     made = partial(Housing.of_body, body, pinion=names, gear=names, fixed=("root",))
     house = made(axes=axes)
     B = house.bushes[1][4]
     soft = B @ np.linalg.solve(house.K, B.T)
-    slender = [size[0] ** 3 / (3 * STEEL.E * b * h**3 / 12) for b, h in
-               ((size[2], size[1]), (size[1], size[2]))]  # fmt: skip
+    sections = (size[2], size[1]), (size[1], size[2])
+    slender = [size[0] ** 3 / (3 * STEEL.E * b * h**3 / 12) for b, h in sections]
     assert_allclose(np.diag(soft)[:2], slender, rtol=0.03)  # the clamped end does not contract
     assert soft[2, 2] == pytest.approx(size[0] / (STEEL.E * size[1] * size[2]), rel=0.03)
     assert soft[0, 4] == pytest.approx(slender[0] * 1.5 / size[0], rel=0.03)  # u_x by phi_y

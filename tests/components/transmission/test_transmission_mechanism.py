@@ -17,6 +17,7 @@ from rom.errors import ModelError
 from rom.rotation import log
 
 HELIX = float(np.radians(12.5))
+STEPS = 60
 
 
 @cache
@@ -53,9 +54,7 @@ def oiled(beyond, **more):
 def test_shafts_rest_on_films_that_conserve_their_oil_wherever_it_comes_in(beyond, recwarn):
     """From the middle of the bushes, where films begin to fill; they are no unstable springs."""
     unit = oiled(beyond)
-    mech = as_mechanism(unit)
-    found = coordinates(unit, rom.equilibrium(mech))
-    wanted = rest(unit).q
+    found, wanted = coordinates(unit, rom.equilibrium(as_mechanism(unit))), rest(unit).q
     assert_allclose(found, wanted, atol=1e-7 * np.abs(wanted).max())
     assert not recwarn.list
 
@@ -100,12 +99,9 @@ def test_films_and_teeth_of_the_mechanism_say_what_they_bear():
 def test_it_whirls_and_vibrates_as_the_unit(more, rtol):
     """But for forces that turn with the line of centres, which the unit leaves out."""
     there, mech, state = both(**more)
-    wanted = whirl(there).values
-    found = rom.linearize(mech, state).eigenvalues
-    wanted = wanted[wanted.imag > 1e-6 * np.abs(wanted).max()]
-    found = found[found.imag > 1e-6 * np.abs(found).max()]
-    order = np.argsort(found.imag), np.argsort(wanted.imag)
-    assert_allclose(found[order[0]], wanted[order[1]], rtol=rtol)
+    both_values = rom.linearize(mech, state).eigenvalues, whirl(there).values
+    found, wanted = (x[x.imag > 1e-6 * np.abs(x).max()] for x in both_values)
+    assert_allclose(found[np.argsort(found.imag)], wanted[np.argsort(wanted.imag)], rtol=rtol)
 
 
 def test_it_runs_through_its_speeds_as_another_program():
@@ -134,9 +130,6 @@ def test_it_runs_through_its_speeds_as_another_program():
         assert_allclose(found.teeth, own_teeth, atol=1e-3 * own_teeth.max())
 
 
-STEPS = 60
-
-
 @pytest.fixture(scope="module")
 def lossy():
     """Shafts with so much damping that motion through time settles soon."""
@@ -148,7 +141,6 @@ def found(lossy):
     return steady(lossy, steps=STEPS)
 
 
-@pytest.mark.once
 @pytest.mark.long
 def test_it_is_where_motion_through_time_settles(lossy, found):
     """But for the little that its steps damp."""
@@ -156,15 +148,14 @@ def test_it_is_where_motion_through_time_settles(lossy, found):
     last, size = slice(-STEPS - 1, None), np.ptp(found.error)
     assert_allclose(run.error[last], found.error, atol=0.025 * size)
     assert_allclose(run.teeth[last], found.teeth, atol=0.05 * found.teeth.max())
-    first = np.abs(run.error[: STEPS + 1] - found.error).max()
-    assert first > 0.05 * size  # it has settled, it did not start there
+    assert np.abs(run.error[: STEPS + 1] - found.error).max() > 0.05 * size  # it did not start so
     assert found.error_rms == pytest.approx(np.std(run.error[last][1:]), rel=0.02)
     top = run.teeth[last].max() / run.teeth[last][1:].mean()
     assert found.load_factor == pytest.approx(top, rel=0.03)
 
 
 @pytest.mark.long
-def test_it_ends_as_it_began(found):
+def test_it_ends_as_it_began_and_is_the_motion_of_another_program(lossy, found):
     assert found.t[-1] == pytest.approx(found.unit.mesh_period)
     assert found.q.shape == (STEPS + 1, found.unit.load.size)
     assert_allclose(found.q[-1], found.q[0], atol=1e-6 * np.abs(found.q).max())
@@ -175,11 +166,7 @@ def test_it_ends_as_it_began(found):
     assert found.motion.runs < 40  # also on films of half a micrometre
     mean = 300.0 / found.unit.mesh.pair.rb[0]
     assert found.teeth[1:].mean() == pytest.approx(mean, rel=0.01)  # but for friction
-
-
-@pytest.mark.long
-def test_it_is_the_motion_of_another_program(lossy, found):
-    """With its derivatives; but for friction in them, and for how the methods damp a step."""
+    # with its derivatives; but for friction in them, and for how the methods damp a step
     q, teeth, multipliers = repeating(lossy, STEPS)
     assert_allclose(found.q, q, atol=1e-3 * np.abs(q).max())
     assert_allclose(found.teeth, teeth, atol=0.02 * teeth.max())
@@ -201,7 +188,6 @@ def test_multipliers_are_those_of_the_linearised_unit():
 
 @pytest.mark.long
 def test_beyond_the_threshold_the_motion_is_not_stable():
-    """The same unit whirls at rest, see `test_fast_and_lightly_loaded_journals_whirl`."""
     light = unit(torque=8.0, clearance=90e-6)
     for speed in (200.0, 2200.0):
         state = rest(replace(light, speed=speed))
@@ -209,17 +195,11 @@ def test_beyond_the_threshold_the_motion_is_not_stable():
 
 
 @pytest.mark.long
-def test_a_sweep_goes_on_from_speed_to_speed(lossy, found):
-    """From another speed to the same motion."""
+def test_a_sweep_and_one_step_more_find_the_same_motion(lossy, found):
     passed = sweep(lossy.unit, [144.0, 150.0], steps=STEPS)
     assert [s.unit.speed for s in passed] == [144.0, 150.0]
     assert_allclose(passed[1].teeth, found.teeth, rtol=1e-3)
     assert np.abs(passed[0].error - passed[1].error).max() > 1e-8
-
-
-@pytest.mark.long
-def test_one_step_more_finds_the_same_motion(found):
-    """From the motion itself."""
     again = steady(found, steps=STEPS + 1)
     assert again.t.size == STEPS + 2 and again.passes < found.passes
     assert again.error_rms == pytest.approx(found.error_rms, rel=0.02)

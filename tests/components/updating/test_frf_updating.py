@@ -6,24 +6,15 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 from scipy.linalg import eig, eigh
 
+from cases.components.updating import gauss
 from cases.files.decks import dataset
 from cases.refusals import refused, refuses
-from rom.components.updating import (
-    AtSensors,
-    Measurement,
-    ParametricModel,
-    common_basis,
-    damping_matrix,
-    modal,
-    parametric_basis,
-    response_function_method,
-    responses,
-    sensitivity,
-    update_by_input,
-    update_by_output,
-)
+from rom.components import updating
 from rom.components.updating import frf_data as data
+from rom.components.updating import response_function_method, responses, update_by_input
 from rom.components.updating.airframe import airframe, torsion_constant
+from rom.components.updating.methods import update_by_output
+from rom.components.updating.models import AtSensors, Measurement, ParametricModel, modal
 from rom.errors import ConfigError, ModelError
 from rom.io.fields.universal import assemble, read_universal
 
@@ -71,38 +62,30 @@ def frequencies(model, p, n=5):
     return np.sqrt(modal(model.at(p), []).lam[:n]) / (2 * np.pi)
 
 
-@pytest.mark.parametrize(
-    ("p", "expected"),
-    [
-        (TRUE, [3.774, 22.434, 61.462, 118.375, 192.074]),
-        (START, [3.481, 21.817, 61.089, 119.712, 197.904]),
-    ],
-)
-def test_the_beam_is_that_of_the_table(p, expected):
-    assert_allclose(frequencies(BEAM, p), expected, atol=5.1e-4)
-
-
-def test_the_uniform_beam_vibrates_as_euler_and_bernoulli_say():
+def test_the_beam_is_that_of_the_table_and_of_euler_and_bernoulli():
     """The table and the code could share a mistake; the closed form cannot."""
+    changed, uniform = frequencies(BEAM, TRUE), frequencies(BEAM, START)
+    assert_allclose(changed, [3.774, 22.434, 61.462, 118.375, 192.074], atol=5.1e-4)
+    assert_allclose(uniform, [3.481, 21.817, 61.089, 119.712, 197.904], atol=5.1e-4)
     unit = np.sqrt(2.1e11 * 0.006**2 / 12 / 7850) / 1.2**2 / (2 * np.pi)
     exact = np.array([1.875104069, 4.694091133, 7.854757438]) ** 2 * unit
-    assert_allclose(frequencies(BEAM, START, 3), exact, rtol=1e-5)
+    assert_allclose(uniform[:3], exact, rtol=1e-5)
 
 
 @pytest.mark.parametrize("model", [BEAM, AtSensors(BEAM)], ids=["full", "at sensors"])
 def test_responses_by_modes_equal_the_inverted_dynamic_stiffness(model):
-    """All modes synthesised: the damping matrix is that of the definition."""
     here = model.at(TRUE)
-    C = damping_matrix(here, ZETA)
+    C = updating.damping_matrix(here, ZETA)
     Z = here.K - OMEGA[:, None, None] ** 2 * here.M + 1j * OMEGA[:, None, None] * C
     direct = here.sensors @ np.linalg.inv(Z) @ here.sensors[list(INPUTS)].T
+    assert_allclose(EXACT[:, 7, 0], EXACT[:, 2, 1], rtol=1e-9)  # reciprocal
     assert_allclose(responses(model, TRUE, ZETA, OMEGA, INPUTS), direct, rtol=2e-8, atol=1e-10)
 
 
 def test_damping_gives_the_poles_their_decay():
     """Eigenvalues of the first-order equations: -zeta omega +- i omega sqrt(1 - zeta^2)."""
     here = AtSensors(BEAM).at(TRUE)
-    C, n = damping_matrix(here, ZETA), 8
+    C, n = updating.damping_matrix(here, ZETA), 8
     A = np.block([[np.zeros((n, n)), np.eye(n)], [-here.K, -C]])
     B = np.block([[np.eye(n), np.zeros((n, n))], [np.zeros((n, n)), here.M]])
     poles = eig(A, B, right=False)
@@ -114,9 +97,8 @@ def test_damping_gives_the_poles_their_decay():
 
 def test_a_shaken_oscillator_settles_to_its_response():
     """Time integration knows nothing of receptances."""
-    one = ParametricModel(
-        np.array([[400.0]]), np.array([[1.0]]), np.zeros((0, 1, 1)), np.zeros((0, 1, 1)), np.eye(1)
-    )
+    none = np.zeros((0, 1, 1))
+    one = ParametricModel(np.array([[400.0]]), np.array([[1.0]]), none, none, np.eye(1))
     w, zeta = 17.0, 0.1
     run = solve_ivp(
         lambda t, y: [y[1], np.cos(w * t) - 400 * y[0] - 2 * zeta * 20 * y[1]],
@@ -126,17 +108,14 @@ def test_a_shaken_oscillator_settles_to_its_response():
     assert_allclose(run.y[0], (H * np.exp(1j * w * run.t)).real, atol=2e-8)
 
 
-def test_responses_are_reciprocal():
-    assert_allclose(EXACT[:, 7, 0], EXACT[:, 2, 1], rtol=1e-9)
-
-
 @pytest.mark.parametrize("condensed", [False, True])
 def test_derivatives_agree_with_differences(condensed):
-    """With the modes also the damping changes; condensed mass changes with the stiffness."""
-    reduced = BEAM.in_basis(parametric_basis(BEAM, 6, [START]))  # no stiff modes, less round-off
+    reduced = BEAM.in_basis(
+        updating.parametric_basis(BEAM, 6, [START])
+    )  # no stiff modes, less round-off
     model = AtSensors(BEAM) if condensed else reduced
     x = np.concatenate([TRUE / 2, np.log(ZETA)])
-    dH = sensitivity(model, x[:9], np.exp(x[9:]), OMEGA, INPUTS)[1]
+    dH = updating.sensitivity(model, x[:9], np.exp(x[9:]), OMEGA, INPUTS)[1]
 
     def at(change):
         y = x + change
@@ -166,19 +145,17 @@ def test_a_universal_file_leads_to_the_parameters(tmp_path):
     assert np.all(np.array(errors(found)) < (1e-4, 1e-4, 1e-3))
 
 
-@pytest.mark.parametrize(
-    ("level", "limits"), [(0.05, (0.005, 0.004, 0.06)), (0.1, (0.01, 0.008, 0.12))]
-)
-def test_noise_moves_parameters_as_much_as_the_residual_says(level, limits):
+@pytest.mark.parametrize("level", [0.05, 0.1])
+def test_noise_moves_parameters_as_much_as_the_residual_says(level):
     """The table has .0016 to .0043 at 5 and 10 per cent for a draw of its own."""
     found = update_by_output(BEAM, measured(level), START, GUESS)
-    assert np.all(np.array(errors(found)) < limits)
+    assert np.all(np.array(errors(found)) < level / 0.05 * np.array([0.005, 0.004, 0.06]))
     wrong = np.concatenate([found.p - TRUE, np.log(found.zeta / ZETA)]) / found.deviation
     assert 0.4 < np.sqrt((wrong**2).mean()) < 1.8  # as many standard deviations as should be
     assert found.residual == pytest.approx(level / np.sqrt(2), rel=0.06)
 
 
-def test_static_condensation_floors_the_error_whatever_the_noise():
+def test_static_condensation_raises_frequencies_and_floors_the_error():
     """Table: .053, .054, .054 for stiffness and .022, .023, .023 for mass."""
     model = AtSensors(BEAM)
     for level in (0.0, 0.05, 0.10):
@@ -186,9 +163,6 @@ def test_static_condensation_floors_the_error_whatever_the_noise():
         assert found[0] == pytest.approx(0.0535, abs=0.004)
         assert found[1] == pytest.approx(0.0225, abs=0.005)
         assert found[2] < 0.01 + level  # damping: .009 without noise, else what the draw says
-
-
-def test_condensed_frequencies_are_too_high_by_what_is_known():
     ratio = frequencies(AtSensors(BEAM), TRUE) / frequencies(BEAM, TRUE) - 1
     assert_allclose(100 * ratio, [0, 0.017, 0.12, 0.48, 1.33], atol=0.006)
 
@@ -197,7 +171,7 @@ def test_fixed_interface_modes_lift_the_floor():
     """A Craig-Bampton basis for a range of parameters is as good as the full model."""
     rng = np.random.default_rng(4)
     samples = np.vstack([START, rng.uniform(-0.35, 0.35, (3, 9))])
-    T = parametric_basis(BEAM, 4, samples)
+    T = updating.parametric_basis(BEAM, 4, samples)
     found = errors(update_by_output(BEAM.in_basis(T), measured(), START, GUESS))
     assert T.shape[1] < 40
     assert found[0] < 1e-3 and found[1] < 1e-3
@@ -216,39 +190,38 @@ def test_a_verdict_says_whether_noise_alone_is_left(level):
     assert not by_input.ok
 
 
-@pytest.mark.parametrize("rank", [8, 5])
-def test_the_common_basis_works_from_as_many_columns_as_modes(rank):
+def test_the_common_basis_works_from_as_many_columns_as_modes():
     """Table: .065 and .061 for stiffness, .012 for mass, .037 and .035 for damping."""
-    found = errors(update_by_input(AtSensors(BEAM), measured(0.05), START, GUESS, rank=rank))
-    assert found[0] == pytest.approx(0.065, abs=0.015)
-    assert found[1] < 0.03 and found[2] < 0.08
+    for rank in (8, 5):
+        found = errors(update_by_input(AtSensors(BEAM), measured(0.05), START, GUESS, rank=rank))
+        assert found[0] == pytest.approx(0.065, abs=0.015)
+        assert found[1] < 0.03 and found[2] < 0.08
+    found = errors(update_by_input(AtSensors(BEAM), measured(0.05), START, GUESS, rank=4))
+    assert found[0] > 0.3 and found[1] > 0.2 and found[2] > 0.2
 
 
 def test_equations_converge_as_newton_does():
-    """Data of the condensed model itself: each step squares the error."""
     model = AtSensors(BEAM)
-    H = responses(model, TRUE, ZETA, OMEGA, INPUTS)
-    test = Measurement(OMEGA, H, INPUTS)
+    test = Measurement(OMEGA, responses(model, TRUE, ZETA, OMEGA, INPUTS), INPUTS)
     found = update_by_input(model, test, 0.9 * TRUE, ZETA, rank=8)
     error = np.abs(found.history - TRUE).max(axis=1)
     assert error[0] < 1e-3 and error[1] < 1e-6 and error[-1] < 1e-9
 
 
-def test_fewer_columns_than_modes_fail():
-    found = errors(update_by_input(AtSensors(BEAM), measured(0.05), START, GUESS, rank=4))
-    assert found[0] > 0.3 and found[1] > 0.2 and found[2] > 0.2
-
-
-def test_the_common_basis_holds_both_sets():
+def test_the_common_basis_holds_both_sets_and_criteria_forgive_a_factor():
     other = responses(BEAM, START, GUESS, OMEGA, INPUTS)
-    U = common_basis(EXACT, other, 6)
+    U = updating.common_basis(EXACT, other, 6)
     assert_allclose(U.T @ U, np.eye(6), atol=1e-12)
     for H in (EXACT, other):
         assert data.deviation(U @ (U.T @ H), H).max() < 0.06
+    assert_allclose(data.frac(EXACT, 3j * EXACT), 1.0)
+    assert_allclose(np.diag(data.fdac(EXACT, -2 * EXACT)), 1.0)
+    assert data.frac(EXACT, other).max() < 0.9
+    assert_allclose(data.deviation(1.5 * EXACT, EXACT), 0.5)
 
 
 def test_one_linear_solution_is_exact_when_everything_is_measured():
-    C = damping_matrix(BEAM.at(TRUE), ZETA)
+    C = updating.damping_matrix(BEAM.at(TRUE), ZETA)
     seen = ParametricModel(BEAM.K, BEAM.M, BEAM.dK, BEAM.dM, np.eye(48))
     inputs, w = (16, 46), OMEGA[:, None, None]
     H = responses(seen, TRUE, ZETA, OMEGA, inputs)
@@ -262,7 +235,7 @@ def test_one_linear_solution_is_exact_when_everything_is_measured():
 
 def test_eight_sensors_need_some_linear_solutions():
     """The first step is cut at 0.2 of 0.35; after it each step squares the error."""
-    C = damping_matrix(BEAM.at(TRUE), ZETA)
+    C = updating.damping_matrix(BEAM.at(TRUE), ZETA)
     found = response_function_method(BEAM, measured(weights=1 / np.abs(EXACT)), START, C, steps=5)
     error = np.abs(found.history - TRUE).max(axis=1)
     assert error[0] == pytest.approx(0.15, abs=1e-6)
@@ -275,7 +248,7 @@ def test_unmeasured_dofs_as_the_model_says_converge_slower_to_the_same():
     Equations relative to both responses. Table: .41, .27, .073 and 1e-4 in the steps 1, 2, 3, 5,
     with a scaling of which nothing is known; one step later all scalings have converged.
     """
-    C = damping_matrix(BEAM.at(TRUE), ZETA)
+    C = updating.damping_matrix(BEAM.at(TRUE), ZETA)
     s = BEAM.sensors.argmax(axis=1)
     w, p, error = OMEGA[:, None, None], START, []
     for _ in range(6):
@@ -297,59 +270,39 @@ def test_unmeasured_dofs_as_the_model_says_converge_slower_to_the_same():
 
 def test_noise_on_the_force_biases_one_estimator_and_on_the_response_the_other():
     """H1 -> H / (1 + n/s), H2 -> H (1 + n/s); the closed forms of the bias."""
-    rng = np.random.default_rng(2)
-    H, n = 2.0 - 1.0j, 40_000
-
-    def gauss(scale):
-        return scale * (rng.standard_normal((n, 1)) + 1j * rng.standard_normal((n, 1)))
-
-    f = gauss(1.0)
-    H1, H2, _, _ = data.estimators(H * f, f + gauss(0.5))
+    rng, H = np.random.default_rng(2), 2.0 - 1.0j
+    f, e, r = gauss(rng, (3, 40_000, 1))
+    H1, H2, _, _ = data.estimators(H * f, f + 0.5 * e)
     assert_allclose([H1, H2], [[H / 1.25], [H]], rtol=0.02)
-    H1, H2, Hv, coherence = data.estimators(H * f + gauss(0.5 * abs(H)), f + gauss(0.5))
+    H1, H2, Hv, coherence = data.estimators(H * f + 0.5 * abs(H) * r, f + 0.5 * e)
     assert_allclose([H1, H2, Hv], [[H / 1.25], [H * 1.25], [H]], rtol=0.03)
     assert_allclose(coherence, 1 / 1.25**2, rtol=0.02)
 
 
 def test_the_random_error_is_that_of_repeated_tests():
-    rng = np.random.default_rng(3)
-    n, trials = 16, 4000
-    f, e = (rng.standard_normal((2, n, trials)) * [[[1]], [[1]]] for _ in range(2))
-    f, e = f[0] + 1j * f[1], 0.5 * (e[0] + 1j * e[1])
-    H1 = data.estimators(f + e, f)[0]
-    assert np.abs(H1).std() == pytest.approx(data.random_error(1 / 1.25, n), rel=0.06)
+    f, e = gauss(np.random.default_rng(3), (2, 16, 4000))
+    H1 = data.estimators(f + 0.5 * e, f)[0]
+    assert np.abs(H1).std() == pytest.approx(data.random_error(1 / 1.25, 16), rel=0.06)
 
 
 def test_weights_help_when_lines_differ_in_noise():
-    """Every other line is bad; coherence tells. Same noise, with and without weights."""
     level = np.where(np.arange(180) % 2, 0.4, 0.02)[:, None, None]
     H = data.noisy(EXACT, level, np.random.default_rng(6))
     w = data.weights(1 / (1 + level**2), 8)
-    plain, weighted = (
-        update_by_output(BEAM, Measurement(OMEGA, H, INPUTS, x), START, GUESS) for x in (1.0, w)
-    )
+    tests = (Measurement(OMEGA, H, INPUTS, x) for x in (1.0, w))
+    plain, weighted = (update_by_output(BEAM, test, START, GUESS) for test in tests)
     assert errors(weighted)[0] < 0.25 * errors(plain)[0]
 
 
 def test_lines_beside_the_poles_forgive_wrong_damping():
     """Damping kept half too large: near the poles the stiffness would be blamed for it."""
-    C = damping_matrix(BEAM.at(TRUE), 1.5 * ZETA)
+    C = updating.damping_matrix(BEAM.at(TRUE), 1.5 * ZETA)
     poles, relative = 2 * np.pi * frequencies(BEAM, TRUE), 1 / np.abs(EXACT)
     w = data.beside_poles(OMEGA, poles, ZETA, 30.0)
     assert w.min() < 0.1 and w.max() == 1.0
-    plain, careful = (
-        response_function_method(BEAM, measured(weights=x), START, C, steps=12)
-        for x in (relative, w * relative)
-    )
+    tests = (measured(weights=x) for x in (relative, w * relative))
+    plain, careful = (response_function_method(BEAM, test, START, C, steps=12) for test in tests)
     assert np.abs(careful.p - TRUE).max() < 0.7 * np.abs(plain.p - TRUE).max()
-
-
-def test_criteria_say_one_for_equals_and_forgive_a_factor():
-    other = responses(BEAM, START, GUESS, OMEGA, INPUTS)
-    assert_allclose(data.frac(EXACT, 3j * EXACT), 1.0)
-    assert_allclose(np.diag(data.fdac(EXACT, -2 * EXACT)), 1.0)
-    assert data.frac(EXACT, other).max() < 0.9
-    assert_allclose(data.deviation(1.5 * EXACT, EXACT), 0.5)
 
 
 def airframe_frequencies(bed, hangers=()):
@@ -362,7 +315,7 @@ def airframe_frequencies(bed, hangers=()):
     return np.sqrt(np.abs(lam)) / (2 * np.pi)
 
 
-def test_the_aircraft_is_as_heavy_as_drawn_and_vibrates_like_its_peer():
+def test_the_aircraft_vibrates_like_its_peer_and_joints_lower_the_seventh_frequency_alone():
     """Another beam code, its drawing, coarse mesh, cords, and joints of 600 kN m/rad."""
     bed = airframe(0.3, joints=6e5)
     M = sum(bed.M.values())
@@ -370,23 +323,19 @@ def test_the_aircraft_is_as_heavy_as_drawn_and_vibrates_like_its_peer():
     assert along @ M @ along == pytest.approx(39.825, rel=1e-12)
     peer = [5.924, 16.844, 37.305, 38.122, 38.237, 44.735, 46.200, 57.349]
     assert_allclose(airframe_frequencies(bed, (0.0, -0.29))[6:], peer, rtol=7e-4)
-
-
-def test_joints_lower_the_seventh_frequency_and_hardly_any_other():
-    """Rigid ones against the elements of a program of its own, which ties nodes by a null space."""
+    # rigid ones against a program of its own, which ties nodes by a null space
     rigid = airframe_frequencies(airframe(0.3))[6:]
     exact = [5.829, 16.893, 37.817, 38.205, 38.297, 44.732, 53.891, 57.358]
     assert_allclose(rigid, exact, rtol=7e-4)
     stiff = airframe_frequencies(airframe(0.3, joints=1e9))[6:]
     assert_allclose(stiff, rigid, rtol=2e-4)
     assert np.all(stiff < rigid)
-    loose = airframe_frequencies(airframe(0.3, joints=6e5))[6:]
+    loose = airframe_frequencies(bed)[6:]
     drop = 1 - loose / rigid
     assert drop[6] == pytest.approx(0.143, abs=2e-3) and np.delete(drop, 6).max() < 0.015
 
 
 def test_the_joint_and_the_torsion_of_a_wing_are_found_from_noisy_responses():
-    """What updating is for on this structure; a basis of free modes serves for both parameters."""
     bed = airframe(0.2, joints=6e5)
     K, M = sum(bed.K.values()), sum(bed.M.values())
     dK = np.array([bed.K["wing", "joint"], bed.K["wing", "torsion"]])

@@ -22,6 +22,7 @@ from rom.mbs.equations.packing import pack
 from rom.mbs.kernels.work import workspace
 
 WIND = 11.4
+BLOWN = [(False, (WIND, 2.0, 0.0)), (True, (WIND, 2.0, 0.0)), (False, (1.0, 9.0, 4.0))]
 
 
 def a_blade(n=6, **options):
@@ -29,7 +30,6 @@ def a_blade(n=6, **options):
 
 
 def test_strips_cover_the_blade():
-    """Area and twist are those of the published elements, the blade that bends aside."""
     middles, length, chord, twist = strips(a_blade(96))
     assert_allclose(length.sum(), 61.5)
     assert_allclose(middles[[0, -1]], [1.5 + length[0] / 2, 63.0 - length[-1] / 2])
@@ -43,18 +43,17 @@ def forces(packed, W, v):
     return W.residual.copy()
 
 
-@pytest.fixture
-def resting():
-    """A blade in its shape without stress: what is left are forces of the wind."""
+def prepared(body, **pose):
+    """A blade without weight as its equations have it: packed, and work space."""
     mech = rom.Mechanism(gravity=(0, 0, 0))
-    mech.add_nonlinear("blade", a_blade())
+    mech.add_nonlinear("blade", body, **pose)
     packed = pack(mech, whole=True)
     return packed, workspace(packed.system, 0)
 
 
-def test_a_strip_has_lift_across_and_drag_along_the_air_that_reaches_it(resting):
+def test_a_strip_has_lift_across_and_drag_along_the_air_that_reaches_it():
     """Its force, taken back from the momentum that its ring of air loses; direction and power."""
-    packed, W = resting
+    packed, W = prepared(a_blade())  # without stress: what is left are forces of the wind
     v = np.zeros(packed.v.size)
     b = 5
     t = packed.system.bodies.v_at[b]
@@ -71,8 +70,8 @@ def test_a_strip_has_lift_across_and_drag_along_the_air_that_reaches_it(resting)
     def of(phi):
         lift, drag = (np.interp(phi - theta, one.angle, x) for x in (one.lift, one.drag))
         s, k = np.sin(phi), np.cos(phi)
-        F = (2 / np.pi) ** 2 * np.arccos(np.exp(-1.5 * (63 - r) / (r * s))) * np.arccos(
-            np.exp(-1.5 * (r - 1.5) / (1.5 * s)))  # fmt: skip
+        tip, root = np.exp(-1.5 * (63 - r) / (r * s)), np.exp(-1.5 * (r - 1.5) / (1.5 * s))
+        F = (2 / np.pi) ** 2 * np.arccos(tip) * np.arccos(root)
         solid = 3 * chord / (2 * np.pi * r * c)
         normal, driving = lift * k + drag * s, lift * s - drag * k
         return solid * normal / (4 * F * s**2), solid * driving / (4 * F * s * k), normal, driving
@@ -94,7 +93,6 @@ def test_a_strip_has_lift_across_and_drag_along_the_air_that_reaches_it(resting)
 @pytest.mark.parametrize("cone", [0.0, 0.3])
 @pytest.mark.parametrize(("tilt", "yaw"), [(0.0, 0.0), (0.35, 0.0), (0.0, -0.4), (-0.5, 0.7)])
 def test_strips_of_a_rod_have_the_loads_of_the_rotor_whose_wake_leans(tilt, yaw, cone):
-    """The same strips as a rotor, tilted, yawed and coned, at four azimuths: two programs."""
     speed, n = 1.1, 24
     wind = WIND * np.array([np.cos(yaw) * np.cos(tilt), np.sin(yaw), np.cos(yaw) * np.sin(tilt)])
     one, used = in_wind(cosserat.body(blade(n)), wind, cone=cone), np.arange(4, n - 1)
@@ -103,39 +101,25 @@ def test_strips_of_a_rod_have_the_loads_of_the_rotor_whose_wake_leans(tilt, yaw,
     for azimuth, row in zip(load.azimuth, load.strip, strict=True):
         A = rotation.matrix(rotation.exp([azimuth, 0.0, 0.0]))
         A = A @ rotation.matrix(rotation.exp([0.0, -cone, 0.0]))
-        mech = rom.Mechanism(gravity=(0, 0, 0))
-        mech.add_nonlinear("blade", one, orientation=A)
-        packed = pack(mech, whole=True)
+        packed, W = prepared(one, orientation=A)
         v = np.zeros(packed.v.size)
         places = rotor.radius[:, None] * A[:, 2]
         v.reshape(-1, 6)[used, :3] = np.cross([speed, 0.0, 0.0], places)
-        W = workspace(packed.system, 0)
         found = -forces(packed, W, v).reshape(-1, 6)[used, :3] @ A[:, :2]
         expected = rotor.length[:, None] * row[:, :2] * [1, -1]
         assert_allclose(found, expected, rtol=1e-6)
 
 
-def without_stiffness(n=6):
-    """A blade that does not bend back, so that forces are those of the wind."""
-    one = blade(n)
-    return one._replace(stretch=1e-14 * one.stretch, bend=1e-14 * one.bend)
-
-
-@pytest.mark.parametrize(
-    ("tower", "wind"),
-    [(False, (WIND, 2.0, 0.0)), (True, (WIND, 2.0, 0.0)), (False, (1.0, 9.0, 4.0))],
-)
+@pytest.mark.parametrize(("tower", "wind"), BLOWN)
 def test_tangents_of_the_wind_are_derivatives(tower, wind):
     """By rotations, by velocities, and by places if there is a tower, five metres behind.
 
     In the last wind, from 84 degrees aside, the wake lies in the plane of the rotor.
     """
-    mech = rom.Mechanism(gravity=(0, 0, 0))
-    down = rotation.exp([np.pi, 0, 0])
-    one = in_wind(cosserat.body(without_stiffness()), wind, tower=tower)
-    mech.add_nonlinear("blade", one, at=(-5, 1, 90), orientation=down)
-    packed = pack(mech, whole=True)
-    W = workspace(packed.system, 0)
+    one = blade(6)  # does not bend back, so that forces are those of the wind
+    one = one._replace(stretch=1e-14 * one.stretch, bend=1e-14 * one.bend)
+    one, down = in_wind(cosserat.body(one), wind, tower=tower), rotation.exp([np.pi, 0, 0])
+    packed, W = prepared(one, at=(-5, 1, 90), orientation=down)
     rng = np.random.default_rng(9)
     n = packed.v.size
     q = packed.q.copy()
@@ -165,17 +149,15 @@ def test_tangents_of_the_wind_are_derivatives(tower, wind):
 
 
 def stiff_blade(n, wind, pitch=0.0):
-    """A stiff blade on a driven hub, in a wind (3,)."""
     A, mech = rotation.matrix(rotation.exp([0.0, 0.0, -pitch])), rom.Mechanism(gravity=(0, 0, 0))
-    part = mech.add_nonlinear("blade", in_wind(stiff_body(n), wind, cone=0.0),
-                              orientation=A, omega=A.T @ [RATED_SPEED, 0.0, 0.0])  # fmt: skip
+    body, omega = in_wind(stiff_body(n), wind, cone=0.0), A.T @ [RATED_SPEED, 0.0, 0.0]
+    part = mech.add_nonlinear("blade", body, orientation=A, omega=omega)
     on_driven_hub(mech, part, RATED_SPEED)
     return mech
 
 
 @pytest.mark.parametrize(("wind", "pitch"), [(8.0, 0.0), (WIND, 0.0), (20.0, 17.47)])
 def test_a_stiff_rotor_in_a_mechanism_has_the_loads_of_its_strips(wind, pitch):
-    """Rods at the vertices beside seventeen published elements: one per cent apart."""
     pitch = np.radians(pitch)
     sol = rom.simulate(stiff_blade(24, (wind, 0.0, 0.0), pitch), t_end=2.0, dt=0.02, rho_inf=0.3)
     late = sol.t > 1.5
@@ -186,7 +168,6 @@ def test_a_stiff_rotor_in_a_mechanism_has_the_loads_of_its_strips(wind, pitch):
 
 
 def test_a_stiff_rotor_in_wind_from_aside_has_the_loads_of_each_azimuth():
-    """Torque and the moment that bends the root, over the last turn, beside `rotor_load`."""
     n, yaw, V = 8, 0.6, 9.0
     mech = stiff_blade(n, (V * np.cos(yaw), V * np.sin(yaw), 0.0))
     sol = rom.simulate(mech, t_end=8.0, dt=0.02, rho_inf=0.3)
@@ -195,8 +176,8 @@ def test_a_stiff_rotor_in_wind_from_aside_has_the_loads_of_each_azimuth():
     arm = load.strip[:, :, 0] @ (rotor.radius * rotor.length)
     late = sol.t > 8.0 - 2 * np.pi / RATED_SPEED
     azimuth = RATED_SPEED * sol.t[late] % (2 * np.pi)
-    turned, bent = (np.interp(azimuth, load.azimuth, x, period=2 * np.pi)
-                    for x in (load.blade_torque, arm))  # fmt: skip
+    turned = np.interp(azimuth, load.azimuth, load.blade_torque, period=2 * np.pi)
+    bent = np.interp(azimuth, load.azimuth, arm, period=2 * np.pi)
     assert_allclose(-sol.drive_load("speed")[late], turned, atol=0.01 * np.ptp(turned))
     _, across, up = sol.reaction("shaft")[late][:, 3:].T
     found = -across * np.cos(azimuth) - up * np.sin(azimuth)
@@ -205,10 +186,9 @@ def test_a_stiff_rotor_in_wind_from_aside_has_the_loads_of_each_azimuth():
 
 @pytest.mark.parametrize("wind", [8.0, 20.0])
 def test_the_whole_turbine_takes_the_steady_power_on_average(wind):
-    """Tilt, cone, pitch and tower as for a stiff rotor; blades swing about it and bend a little."""
     point = steady(wind, tower=True)
-    whole = turbine(12, tower_segments=0, gravity=0.0, wind=wind, pitch=point.pitch,
-                    speed=point.speed)  # fmt: skip
+    state = {"wind": wind, "pitch": point.pitch, "speed": point.speed}
+    whole = turbine(12, tower_segments=0, gravity=0.0, **state)
     whole.turn_by(lambda t: point.speed * t, lambda t: point.speed)
     sol = rom.simulate(whole.mechanism, t_end=12.0, dt=0.02, rho_inf=0.5)
     late = sol.t > 12.0 - 2 * np.pi / point.speed
@@ -218,7 +198,6 @@ def test_the_whole_turbine_takes_the_steady_power_on_average(wind):
 
 
 @pytest.mark.long
-@pytest.mark.once
 def test_the_wind_bends_the_blades_of_the_turbine_downwind():
     """Metres, as in published runs at 11.4 m/s, where the tip goes 5 to 6 m."""
     whole = turbine(16, tower_segments=8, wind=WIND, speed=RATED_SPEED)

@@ -16,8 +16,11 @@ from rom.components.wind.wake import late
 from rom.components.wind.wind_turbine import GEAR_RATIO, RATED_SPEED
 from rom.errors import ConfigError
 
+RPM = np.pi / 30
 LATE = getattr(late, "py_func", late)
 SPEED, PITCH = 1.0, np.radians(3.7)  # rad/s, rad
+# wind [m/s] and pitch [rad] before and after
+STEPS = [((8.7, 0.0), (8.7, PITCH)), ((7.0, 0.0), (9.0, 0.0)), ((9.0, 0.0), (4.5, 0.0))]
 
 
 def straight():
@@ -48,52 +51,52 @@ def answer(t, slow, fast):
 
 
 def after_a_step(before, then, dt, cone=0.0):
-    """Steady inductions [m/s] before and after a step of wind or pitch, and what `operate` finds.
-
-    ``before`` and ``then`` are wind [m/s] and pitch [rad]; the step is at 1 s.
-    """
+    """Steady inductions [m/s] before and after a step at 1 s, and what `operate` finds."""
     blades = blading(0.0, cone)
-    rows = [rotor_load(blades, wind, SPEED, pitch, n_azimuths=1).strip[0] for wind, pitch in (
-        before, then)]  # fmt: skip
+    states = before, then
+    rows = [rotor_load(blades, V, SPEED, pitch, n_azimuths=1).strip[0] for V, pitch in states]
     winds = np.cos(cone) * np.array([before[0], then[0]])
     axial = [wind - row[:, 2] for row, wind in zip(rows, winds, strict=True)]
     swirl = [row[:, 3] - SPEED * blades.radius for row in rows]
     start = round(1.0 / dt)
-    run = operate(lambda t: (before, then)[int(t >= 1.0 - 1e-9)][0], 25.0, dt=dt, blades=blades,
-                  held=lambda t: (SPEED, (before, then)[int(t >= 1.0 - 1e-9)][1]))  # fmt: skip
+    wind, pitch = (lambda t, k=k: states[int(t >= 1.0 - 1e-9)][k] for k in (0, 1))
+    run = operate(wind, 25.0, dt=dt, blades=blades, held=lambda t: (SPEED, pitch(t)))
     return blades, axial, swirl, run, start
 
 
-@pytest.mark.parametrize(
-    ("before", "then"),
-    [((8.7, 0.0), (8.7, PITCH)), ((7.0, 0.0), (9.0, 0.0)), ((9.0, 0.0), (4.5, 0.0))],
-)
+def remembered(blades, axial, t, V, a):
+    """Shares of a step that wakes of an induction have followed, axial inductions, and their size.
+
+    Both filters slow down with the induction, and towards the hub.
+    """
+    slow = 1.1 / (1 - 1.3 * a) * 63.0 / V
+    share = answer(t[:, None], slow, (0.39 - 0.26 * (blades.radius / 63.0) ** 2) * slow)
+    change = axial[1] - axial[0]
+    return share, axial[0] + change * share, np.abs(change).max()
+
+
+@pytest.mark.parametrize(("before", "then"), STEPS)
 def test_the_wake_of_each_strip_follows_a_step_as_the_closed_form_does(before, then):
     """Steady values and induction are constant after it; 1 / (1 - 1.3 a) is capped at a = 0.5."""
     dt, V = 0.01, then[0]
     blades, axial, swirl, run, start = after_a_step(before, then, dt)
     a = np.clip(axial[1] / V, 0.0, 0.5)
-    slow = 1.1 / (1 - 1.3 * a) * 63.0 / V
-    fast = (0.39 - 0.26 * (blades.radius / 63.0) ** 2) * slow
-    share = answer(run.t[start:, None] - run.t[start] + 0.5 * dt, slow, fast)
-    exact = axial[0] + (axial[1] - axial[0]) * share
-    size = np.abs(axial[1] - axial[0]).max()
+    share, exact, size = remembered(blades, axial, run.t[start:] - run.t[start] + dt / 2, V, a)
     assert_allclose(run.induced[start:], exact, atol=5e-4 * size)
     assert (a == 0.5).any() == (V == 4.5)  # the last case has strips beyond the cap
     # loads at one instant, from velocities of both filters and the profiles
-    at, half = start + round(3.0 / dt), 0.5 * 1.225
+    at = start + round(3.0 / dt)
     through = V - exact[at - start]
     across = SPEED * blades.radius + swirl[0] + (swirl[1] - swirl[0]) * share[at - start]
     phi = np.arctan2(through, across)
-    lift, drag = np.array([
-        [np.interp(p - twist - then[1], one.angle, x) for x in (one.lift, one.drag)]
-        for p, twist, one in zip(phi, blades.twist, blades.profile, strict=True)]).T  # fmt: skip
-    q = half * np.array(blades.chord) * (through**2 + across**2)
+    attack = zip(phi - blades.twist - then[1], blades.profile, strict=True)
+    coefficients = [[np.interp(a, one.angle, x) for x in (one.lift, one.drag)] for a, one in attack]
+    lift, drag = np.array(coefficients).T
+    q = 0.5 * 1.225 * np.array(blades.chord) * (through**2 + across**2)
     normal = q * (lift * np.cos(phi) + drag * np.sin(phi))
     driving = q * (lift * np.sin(phi) - drag * np.cos(phi))
     assert_allclose(run.thrust[at], 3 * normal @ blades.length, rtol=1.5e-4)
-    torque = 3 * driving @ (blades.radius * blades.length)
-    assert_allclose(run.torque[at], torque, rtol=3e-4)
+    assert_allclose(run.torque[at], 3 * driving @ (blades.radius * blades.length), rtol=3e-4)
 
 
 @pytest.mark.parametrize("cone", [0.0, 0.3])
@@ -106,11 +109,7 @@ def test_the_wake_of_a_rotor_that_drives_the_air_is_as_quick_as_without_inductio
     blades, axial, _, run, start = after_a_step((V, 0.0), (V, np.radians(12.0)), dt, cone)
     driving = axial[1] < -0.1 * V
     assert driving.sum() >= 4
-    slow = 1.1 * 63.0 / V
-    fast = (0.39 - 0.26 * (blades.radius / 63.0) ** 2) * slow
-    share = answer(run.t[start:, None] - run.t[start] + 0.5 * dt, slow, fast)
-    exact = axial[0] + (axial[1] - axial[0]) * share
-    size = np.abs(axial[1] - axial[0]).max()
+    _, exact, size = remembered(blades, axial, run.t[start:] - run.t[start] + dt / 2, V, 0.0)
     assert_allclose(run.induced[start:][:, driving], exact[:, driving], atol=5e-4 * size)
 
 
@@ -118,25 +117,20 @@ def test_the_wake_of_a_rotor_that_drives_the_air_is_as_quick_as_without_inductio
 def test_a_tilted_rotor_with_cone_has_the_loads_of_one_that_its_axial_wind_meets(dynamic):
     """Held, it meets the wind by the cosine of its tilt; cone by the sum over its strips."""
     tilt, cone, V, pitch = 0.3, 0.2, 8.0, 0.02
-    run = operate(lambda t: V, 2.0, dt=0.1, blades=blading(tilt, cone), dynamic=dynamic,
-                  held=lambda t: (SPEED, pitch))  # fmt: skip
+    how = {"blades": blading(tilt, cone), "dynamic": dynamic, "held": lambda t: (SPEED, pitch)}
+    run = operate(lambda t: V, 2.0, dt=0.1, **how)
     load = rotor_load(blading(0.0, cone), V * np.cos(tilt), SPEED, pitch)
     assert_allclose(run.thrust, load.thrust, rtol=1e-10)
     assert_allclose(run.torque, load.torque, rtol=1e-10)
     assert_allclose(run.induced[-1], V * np.cos(tilt) * np.cos(cone) * load.strip[0, :, 5])
 
 
-def pitched(dynamic, back=False):
-    at = (0.0, PITCH)[:: -1 if back else 1]
-    return operate(lambda t: 8.7, 90.0, blades=straight(), dynamic=dynamic,
-                   held=lambda t: (SPEED, at[int(t >= 10.0)]))  # fmt: skip
-
-
 @pytest.mark.parametrize("back", [False, True])
 def test_a_step_of_pitch_overshoots_if_the_wake_has_a_memory(back):
-    """Both ends are steady loads; between, the old wake meets the new pitch."""
-    ends = [rotor_load(straight(), 8.7, SPEED, p) for p in ((PITCH, 0.0) if back else (0.0, PITCH))]
-    quick, slow = pitched(False, back), pitched(True, back)
+    pitches = (PITCH, 0.0) if back else (0.0, PITCH)
+    ends = [rotor_load(straight(), 8.7, SPEED, p) for p in pitches]
+    how = {"blades": straight(), "held": lambda t: (SPEED, pitches[int(t >= 10.0)])}
+    quick, slow = (operate(lambda t: 8.7, 90.0, dynamic=x, **how) for x in (False, True))
     for run in (quick, slow):
         assert_allclose([run.thrust[190], run.thrust[-1]], [e.thrust for e in ends], rtol=4e-4)
         assert_allclose([run.torque[190], run.torque[-1]], [e.torque for e in ends], rtol=1e-3)
@@ -152,7 +146,6 @@ def test_a_step_of_pitch_overshoots_if_the_wake_has_a_memory(back):
 
 
 def test_the_control_carries_the_turbine_from_part_load_to_full_load():
-    """8 to 20 m/s in 200 s: speed held within 5 %, and at the end the steady pitch and power."""
     run = operate(lambda t: 8.0 + 12.0 * min(max(t - 20.0, 0.0) / 200.0, 1.0), 400.0)
     end = steady(20.0)
     assert_allclose(run.speed.max(), end.speed, rtol=0.05)
@@ -162,7 +155,6 @@ def test_the_control_carries_the_turbine_from_part_load_to_full_load():
 
 
 def test_a_gust_speeds_the_rotor_up_by_what_its_inertia_takes():
-    """Momentum of 43.78e6 kg m^2, between the wind and 97 times the generator."""
     run = operate(lambda t: 8.0 + 2.0 * (t > 5.0), 15.0)
     dt, fast = run.t[1], 97.0 * run.speed
     generator = 97.0 * run.power / (0.944 * fast)
@@ -178,15 +170,16 @@ test_what_cannot_be_is_named = refused(
     (lambda: operate(recorded([0.0, 1.0, 2.0, 5.0], [8.0] * 4), 5.0), "a gap from 2 s to 5 s"),
     (lambda: operate(lambda t: 8.0, 1.0, held=lambda t: (np.nan, 0.0)), "held at 0 s = nan"),
     (lambda: operate(lambda t: 8.0, 1.0, held=lambda t: (1.0, 20.0)), "pitch .* = 20"),
+    *((lambda wind=wind: steady(wind), "parked in a wind of") for wind in (2.9, 25.1, -8.0)),
+    (lambda: control.power_curve([8.0, 25.1]), "parked in a wind of"),
+    (lambda: steady(9.0, scaled(2.0), held=lambda wind: (np.nan, 0.0)), "nan"),
     error=ConfigError,
 )
 
 
 def scaled(k):
-    """The rotor of the turbine, k times as large."""
-    one = straight()
-    return replace(one, radius=k * one.radius, length=k * one.length, chord=k * one.chord,
-                   rotor_radius=k * one.rotor_radius, hub_radius=k * one.hub_radius)  # fmt: skip
+    lengths = ("radius", "length", "chord", "rotor_radius", "hub_radius")
+    return replace(straight(), **{name: k * getattr(straight(), name) for name in lengths})
 
 
 @pytest.mark.parametrize("call", [
@@ -196,8 +189,8 @@ def scaled(k):
 ])  # fmt: skip
 def test_another_rotor_needs_a_controller_of_its_own(call):
     """The published one would turn blades of 126 m with tips of 160 m/s, without a word."""
-    refuses(ConfigError, r"126 m would have tips of 159\.7 m/s", lambda: call(scaled(2.0)))
-    refuses(ConfigError, "2 blades", lambda: call(replace(blading(), n_blades=2)))
+    refuses(ConfigError, r"126 m would have tips of 159\.7 m/s", call, scaled(2.0))
+    refuses(ConfigError, "2 blades", call, replace(blading(), n_blades=2))
     call(scaled(1.05))
 
 
@@ -218,10 +211,8 @@ def test_the_power_curve_of_another_rotor_follows_a_controller_that_is_handed_ov
     assert_allclose(large["speed"], [0.22, 0.99, 1.2, 1.2], rtol=1e-12)
     assert_allclose(large["power"], [4 * 0.944 * one.power for one in small], rtol=1e-3)
     assert steady(9.0, scaled(2.0), held=law).torque == pytest.approx(large["torque"][1])
-    refuses(ConfigError, "nan", lambda: steady(9.0, scaled(2.0), held=lambda wind: (np.nan, 0.0)))
 
 
-RPM = np.pi / 30
 # of a run of OpenFAST, averages over steady wind, data/NREL5MW/NREL5MW_Oper.csv
 # of github.com/ebranlard/welib: wind [m/s], speed [1/min], pitch [deg], power [kW], thrust [kN]
 OPENFAST = np.array([
@@ -266,41 +257,25 @@ def test_gains_fall_with_the_pitch_as_published():
     assert_allclose(there.pitch, DOUBLING_PITCH)  # where the factor of `at` is that of the steps
 
 
-@pytest.fixture(scope="module")
-def curve():
-    return control.power_curve(np.arange(3.0, 25.5))
-
-
-def test_pitch_above_the_rated_wind_is_that_of_the_report(curve):
-    """Table 7-1, within a tenth of a degree to 21 m/s and 0.4 at 25."""
+def test_the_power_curve_is_that_of_the_report_of_openfast_and_of_a_specialist():
+    """Pitch of table 7-1, within a tenth of a degree to 21 m/s and 0.4 at 25."""
+    curve = control.power_curve(np.arange(3.0, 25.5))
     winds, pitch = np.array(control.PUBLISHED_PITCH).T
     found = np.degrees(np.interp(winds, curve["wind"], curve["pitch"]))
     assert_allclose(found[winds < 21.5], pitch[winds < 21.5], atol=0.11)
     assert_allclose(found, pitch, atol=0.4)
-
-
-def test_power_thrust_and_speed_are_those_of_openfast(curve):
     wind, speed, pitch, power, thrust = OPENFAST.T
     at = np.isin(curve["wind"], wind)
     assert_allclose(curve["speed"][at], speed * RPM, rtol=0.011)
     assert_allclose(np.degrees(curve["pitch"][at]), pitch, atol=0.3)
     assert_allclose(curve["power"][at], 1e3 * power, rtol=0.036)
     assert_allclose(curve["thrust"][at], 1e3 * thrust, rtol=0.03)
-
-
-def test_the_curve_has_a_specialists_numbers(curve):
-    """5 MW from 11.4 m/s on; power below Betz; largest thrust at the rated wind."""
-    rated = steady(11.4)
-    assert_allclose(0.944 * rated.power, 5e6, rtol=0.02)
+    assert_allclose(0.944 * steady(11.4).power, 5e6, rtol=0.02)
     assert (curve["power"] < 5.0001e6).all()
     assert_allclose(curve["power"][curve["wind"] >= 12.0], 5e6, rtol=1e-4)
     assert (curve["power_coefficient"] < BETZ_LIMIT).all()
     assert_allclose(curve["power_coefficient"][5:8], 0.482, rtol=0.01)
     assert abs(curve["wind"][curve["thrust"].argmax()] - 11.4) < 1.0
-
-
-def test_balance_of_torque_and_power(curve):
-    """The rotor drives the generator of 97 times its speed; behind it 94.4 % are left."""
     below = curve["wind"] < 11.0
     asked = [GEAR_RATIO * generator_torque(GEAR_RATIO * w) for w in curve["speed"][below]]
     assert_allclose(curve["torque"][below], asked, rtol=1e-6)
@@ -333,14 +308,3 @@ def test_the_filter_loses_three_decibels_at_a_quarter_hertz():
         one.step(x, dt)
         seen.append(one.filtered)
     assert_allclose(np.ptp(seen[20_000:]) / 2, np.sqrt(0.5), rtol=2e-3)
-
-
-@pytest.mark.parametrize("wind", [2.9, 25.1, -8.0])
-def test_wind_beyond_the_curve_is_named(wind):
-    refuses(ConfigError, "parked in a wind of", steady, wind)
-    refuses(ConfigError, "parked in a wind of", control.power_curve, [8.0, wind])
-
-
-def test_other_blades_and_the_tower_change_the_curve_a_little():
-    free, dammed, straight = steady(8.0), steady(8.0, tower=True), steady(8.0, blading(0.0, 0.0))
-    assert 0.97 * free.power < dammed.power < free.power < straight.power < 1.03 * free.power

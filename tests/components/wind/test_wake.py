@@ -21,7 +21,6 @@ SPEED = 1.0  # rad/s
 
 
 def turning_blade(winds, yaw=0.0, n=8):
-    """A stiff blade on a driven hub, and the rotor of its strips."""
     mech, body = rom.Mechanism(gravity=(0, 0, 0)), stiff_body(n)
     A = rotation.matrix(rotation.exp([0.0, 0.0, -yaw]))
     part = mech.add_nonlinear("blade", body, orientation=A, omega=(SPEED, 0.0, 0.0))
@@ -30,18 +29,13 @@ def turning_blade(winds, yaw=0.0, n=8):
     return mech, same_strips(body)
 
 
-@pytest.fixture(scope="module")
-def gust():
-    """Seven metres per second and nine from three seconds on."""
-    mech, rotor = turning_blade([[0.0, 7.0], [3.0, 7.0], [3.0 + 1e-9, 9.0], [40.0, 9.0]])
-    return mech, rotor, rom.simulate(mech, t_end=12.0, dt=0.02, rho_inf=0.3)
-
-
-def test_a_stiff_blade_in_a_gust_has_the_loads_of_the_rotor_whose_wake_is_late(gust):
-    """The same filters, run by a mechanism and by `operate`: 3 % of the change apart."""
-    _, rotor, sol = gust
-    beside = operate(lambda t: 7.0 if t <= 3.0 else 9.0, 12.0, dt=0.02, blades=rotor,
-                     held=lambda t: (SPEED, 0.0))  # fmt: skip
+def test_a_stiff_blade_in_a_gust_has_the_loads_and_the_memory_of_the_rotor_whose_wake_is_late():
+    """By `operate`: 3 % of the change apart; 1.1 R / (1 - 1.3 a) / V by the law of each strip."""
+    winds = [[0.0, 7.0], [3.0, 7.0], [3.0 + 1e-9, 9.0], [40.0, 9.0]]
+    mech, rotor = turning_blade(winds)
+    sol = rom.simulate(mech, t_end=12.0, dt=0.02, rho_inf=0.3)
+    how = {"dt": 0.02, "blades": rotor, "held": lambda t: (SPEED, 0.0)}
+    beside = operate(lambda t: 7.0 if t <= 3.0 else 9.0, 12.0, **how)
     torque, thrust = -N_BLADES * sol.drive_load("speed"), N_BLADES * -sol.reaction("shaft")[:, 0]
     for found, expected in ((torque, beside.torque), (thrust, beside.thrust)):
         size = np.abs(expected[-1] - expected[100])
@@ -50,11 +44,6 @@ def test_a_stiff_blade_in_a_gust_has_the_loads_of_the_rotor_whose_wake_is_late(g
     quick = rotor_load(rotor, 9.0, SPEED)
     at = np.searchsorted(sol.t, 3.6)
     assert torque[at] > quick.torque + 0.02 * (quick.torque - beside.torque[100])  # overshoots
-
-
-def test_strips_remember_filters_of_a_step_as_the_closed_form_has_them(gust):
-    """Both filters from steady values, by the law of each strip; 1.1 R / (1 - 1.3 a) / V."""
-    _, rotor, sol = gust
     rows = [rotor_load(rotor, v, SPEED, n_azimuths=1).strip[0] for v in (7.0, 9.0)]
     before, after = (v - row[:, 2] for v, row in zip((7.0, 9.0), rows, strict=True))
     t = sol.t[sol.t > 3.0] - 3.0 + 0.01
@@ -87,12 +76,11 @@ def test_a_late_wake_leans_in_wind_from_aside():
         lift, drag = (np.interp(attack, one.angle, x) for x in (one.lift, one.drag))
         q = 0.6125 * rotor.chord[k] * rotor.length[k] * np.hypot(through, across)
         normal, driving = q * (lift * across + drag * through), q * (lift * through - drag * across)
-        assert_allclose(np.linalg.norm(said.force[last][:, 0], axis=1), np.hypot(normal, driving),
-                        atol=0.01 * np.ptp(normal))  # fmt: skip
+        found, expected = np.linalg.norm(said.force[last][:, 0], axis=1), np.hypot(normal, driving)
+        assert_allclose(found, expected, atol=0.01 * np.ptp(normal))
 
 
 def test_the_first_instant_and_equilibria_have_the_steady_wake():
-    """A long calm wind changes nothing; no step of the wake from zero at the start."""
     mech, rotor = turning_blade(8.0)
     sol = rom.simulate(mech, t_end=3.0, dt=0.02, rho_inf=0.3)
     steady_wake = 8.0 - rotor_load(rotor, 8.0, SPEED, n_azimuths=1).strip[0, :, 2]
@@ -102,20 +90,13 @@ def test_the_first_instant_and_equilibria_have_the_steady_wake():
     assert rom.check_law(mech, "blade strip 5").ok
 
 
-@pytest.fixture(scope="module")
-def storm():
-    """A rigid tower, 15 m/s and then 17, under control."""
-    point = steady(15.0, tower=True)
-    winds = [[0.0, 15.0], [10.0, 15.0], [12.0, 17.0]]
-    plant = turbine(6, tower_segments=0, wind=winds, late_wake=True, controlled=True,
-                    pitch=point.pitch, speed=point.speed)  # fmt: skip
-    return plant, rom.simulate(plant.mechanism, t_end=36.0, dt=0.02, rho_inf=0.5)
-
-
 @pytest.mark.long
-def test_a_controlled_turbine_rides_through_a_gust_as_the_rigid_rotor_does(storm):
-    """Largest speed, and pitch behind the gust, beside `operate`, which knows no bending."""
-    plant, sol = storm
+def test_a_controlled_turbine_rides_through_a_gust_as_the_rigid_rotor_does():
+    """A rigid tower, 15 m/s and then 17; beside `operate`, which knows no bending."""
+    point = steady(15.0, tower=True)
+    how = {"wind": [[0.0, 15.0], [10.0, 15.0], [12.0, 17.0]], "late_wake": True, "controlled": True}
+    plant = turbine(6, tower_segments=0, pitch=point.pitch, speed=point.speed, **how)
+    sol = rom.simulate(plant.mechanism, t_end=36.0, dt=0.02, rho_inf=0.5)
     beside = operate(lambda t: float(np.interp(t, [10.0, 12.0], [15.0, 17.0])), 36.0, dt=0.02)
     speed, said = sol.omega("wheel") @ plant.axis, sol.law("control").outputs
     late = sol.t > 11.0
@@ -132,7 +113,6 @@ def parked(**choices):
 
 
 def test_the_control_in_a_mechanism_is_the_controller_at_its_speed():
-    """The same filter, torque and pitch, step by step, for a rotor that is run up without wind."""
     plant, dt = parked(speed=0.0), 0.02
     speed, angle = ramp(1.4, 10.0)
     plant.turn_by(angle, speed)
@@ -166,7 +146,6 @@ def test_the_control_in_a_mechanism_is_the_controller_at_its_speed():
 
 
 def test_the_generator_is_braked_against_the_nacelle():
-    """Moments of the law add to nothing, and it brakes the generator by its own torque."""
     plant = parked(speed=1.0)
     sol = rom.simulate(plant.mechanism, t_end=0.2, dt=0.02, rho_inf=0.5)
     said = sol.law("control")
@@ -180,9 +159,8 @@ def test_the_generator_is_braked_against_the_nacelle():
 def test_the_actuator_is_that_of_the_report():
     """30 Hz and two percent of critical damping belong to one inertia, about that of a blade."""
     inertia = PITCH_STIFFNESS / (2 * np.pi * 30.0) ** 2
-    assert_allclose(
-        whole_turbine.PITCH_DAMPING, 2 * 0.02 * np.sqrt(PITCH_STIFFNESS * inertia), rtol=2e-3
-    )
+    damping = 2 * 0.02 * np.sqrt(PITCH_STIFFNESS * inertia)
+    assert_allclose(whole_turbine.PITCH_DAMPING, damping, rtol=2e-3)
 
 
 @pytest.mark.parametrize(
