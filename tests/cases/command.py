@@ -32,7 +32,6 @@ def rom(*arguments, n=1, **options):
 
 
 def wait_until(true, seconds=20):
-    """Wait for what other processes do."""
     end = time.monotonic() + seconds
     while not true():
         assert time.monotonic() < end, "it did not come"

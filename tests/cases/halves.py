@@ -20,9 +20,8 @@ def half(side, kind, cells=(4, 2, 2), n_modes=None):
 
 
 def halves(kind, cells=((4, 2, 2), (4, 2, 2)), n_modes=None):
-    return {
-        side: half(side, kind, c, n_modes) for side, c in zip(("left", "right"), cells, strict=True)
-    }
+    ends = zip(("left", "right"), cells, strict=True)
+    return {side: half(side, kind, c, n_modes) for side, c in ends}
 
 
 def joined(*arguments, **options):

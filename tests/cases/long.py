@@ -9,14 +9,10 @@ ROM_LONG = bool(os.environ.get("ROM_LONG"))
 # numbers of processes whose results are compared with those of one
 SHARED_BY = (2, 3) if ROM_LONG else (2,)
 # folders and files marked `once` as a whole
-ONCE = (
-    "components",
-    "faults/test_archive_faults.py",
-    "fe/mesh/test_mesh_decks.py",
-    "mbs/elements/test_mbs_laws.py",
-    "mbs/equations/test_mbs_cache.py",
-    "project/test_docs.py",
-)
+ONCE = """
+components faults/test_archive_faults.py fe/mesh/test_mesh_decks.py mbs/elements/test_mbs_laws.py
+mbs/equations/test_mbs_cache.py project/test_docs.py
+""".split()
 # marks of files about small meshes of finite elements, which are warned of
 COARSE = [
     pytest.mark.fenicsx,
@@ -27,23 +23,14 @@ COARSE = [
 # what the light environment has not
 ABSENT = ("dolfinx", "gmsh", "h5py", "matplotlib", "meshio", "pyvista")
 # files of `make test` that begin, so that no worker is left alone with one of them at the end
-LONGEST_FIRST = (
-    "project/test_demos.py",
-    "faults/test_generated.py",
-    "mbs/published/test_mbs_crank.py",
-    "mbs/analysis/test_mbs_equilibrium.py",
-    "fe/test_fe_mpi.py",
-    "faults/test_kills.py",
-    "faults/test_geometry_programs.py",
-    "faults/test_run_kills.py",
-    "faults/test_planted_modules.py",
-    "faults/test_mesh_faults.py",
-    "reduction/test_compressor_blade.py",
-    "fe/test_fe_reduction.py",
-    "parametric/test_family_fe.py",
-    "fe/mesh/test_mesh_geometries.py",
-    "reduction/test_methods_on_components.py",
-)
+LONGEST_FIRST = """
+project/test_demos.py faults/test_generated.py mbs/published/test_mbs_crank.py
+mbs/analysis/test_mbs_equilibrium.py fe/test_fe_mpi.py faults/test_kills.py
+faults/test_geometry_programs.py faults/test_run_kills.py faults/test_planted_modules.py
+faults/test_mesh_faults.py reduction/test_compressor_blade.py fe/test_fe_reduction.py
+parametric/test_family_fe.py fe/mesh/test_mesh_geometries.py
+reduction/test_methods_on_components.py
+""".split()
 
 
 def few(number, cases):

@@ -12,7 +12,6 @@ TURN = np.linalg.qr(np.random.default_rng(8).normal(size=(3, 3)))[0]
 
 
 def areas(mesh):
-    """Area of each named surface of straight triangles."""
     found = {}
     for name, rows in mesh.facets.items():
         a, b, c = np.moveaxis(mesh.points[rows[:, :3]], 1, 0)
@@ -30,9 +29,8 @@ def volume(mesh):
     if kind.shape == "tetrahedron":  # Jacobian of the collapsed cube
         u, v = np.repeat(x, n * n), np.tile(np.repeat(x, n), n)
         weights = weights * (1 - u) ** 2 * (1 - v)
-    return float(
-        (jacobians(mesh.points[mesh.cells], kind.gradients(kind.quadrature[0])) @ weights).sum()
-    )
+    at = kind.gradients(kind.quadrature[0])
+    return float((jacobians(mesh.points[mesh.cells], at) @ weights).sum())
 
 
 def surface(name, n=400):

@@ -6,9 +6,7 @@ import pytest
 def refused(*rows, error=None):
     """A test that each call is refused, by the class of the error and the name of the culprit.
 
-    Args:
-        rows: a call without arguments, the class, and what the message must match.
-        error: the class, where rows leave it out.
+    Rows are a call without arguments, the class unless it is that of all, what the message matches.
     """
 
     @pytest.mark.parametrize("row", rows)

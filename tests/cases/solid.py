@@ -6,9 +6,8 @@ import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix, identity, kron
 
 import rom
-from rom.model import FEModel, Interface, Material, Region, SurfaceMesh
 
-STEEL = Material(E=210e9, nu=0.3, rho=7850.0)
+STEEL = rom.Material(E=210e9, nu=0.3, rho=7850.0)
 KINDS = {"root": "rbe2", "tip": "rbe2"}
 GAUSS = np.array([-1.0, 1.0]) / np.sqrt(3.0)
 CORNERS = np.array([[i, j, k] for k in (-1, 1) for j in (-1, 1) for i in (-1, 1)], dtype=float)
@@ -56,7 +55,7 @@ def block(size=(1.0, 0.1, 0.08), cells=(8, 2, 2), material=STEEL, origin=(0.0, 0
     cell = size[1:] / cells[1:]
     interfaces = {name: _interface(name, face, points, cell) for name, face in faces.items()}
     surface = surface_of(np.take(number, end, axis) for axis in range(3) for end in (0, -1))
-    return FEModel(0.5 * (K + K.T), M, points, interfaces, surface=surface)
+    return rom.FEModel(0.5 * (K + K.T), M, points, interfaces, surface=surface)
 
 
 def reduced(n_modes, model, **how):
@@ -78,7 +77,7 @@ def composite(materials, region, size=(1.0, 0.1, 0.08), cells=(8, 2, 2), origin=
         K_e, M_e = brick(np.array(size) / cells, material)
         K = assembled(dofs, K_e, plain.n_dofs)
         M = kron(assembled(nodes, M_e, plain.n_dofs // 3), identity(3), format="csr")
-        regions[name] = Region(0.5 * (K + K.T), M)
+        regions[name] = rom.Region(0.5 * (K + K.T), M)
     K, M = (sum(getattr(part, which) for part in regions.values()) for which in "KM")
     return replace(plain, K=K, M=M, regions=regions)
 
@@ -102,7 +101,7 @@ def _interface(name, face, points, cell):
         for j in range(face.shape[1] - 1)
     ]
     S = assembled(np.array(quads), quad, nodes.size)
-    return Interface(name, nodes, points[nodes], S, points[nodes].mean(axis=0))
+    return rom.Interface(name, nodes, points[nodes], S, points[nodes].mean(axis=0))
 
 
 def quads_of(face):
@@ -116,7 +115,7 @@ def surface_of(faces):
     quads = np.vstack([quads_of(face) for face in faces])
     nodes = np.unique(quads)
     local = np.searchsorted(nodes, quads)
-    return SurfaceMesh(nodes, np.vstack([local[:, [0, 1, 2]], local[:, [0, 2, 3]]]))
+    return rom.SurfaceMesh(nodes, np.vstack([local[:, [0, 1, 2]], local[:, [0, 2, 3]]]))
 
 
 def chain(n, k=4.0e4, m=0.25):

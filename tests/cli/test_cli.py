@@ -25,7 +25,6 @@ from rom.cli.answer import Answer, table, to_json
 from rom.cli.main import main
 from rom.cli.parser import build_parser, verb_modules
 from rom.cli.verbs import check
-from rom.errors import RomWarning
 from rom.fe.mesh.summary import cell_volumes, vtk_cells
 from rom.io.fields.vtu import grid
 
@@ -35,7 +34,6 @@ NAMES = list(verb_modules())
 
 @pytest.fixture(scope="module")
 def file(tmp_path_factory):
-    """A body made without FEniCSx."""
     body = reduced(60, block(), reference="root", certify=True)
     assert body.certificate.ok
     return rom.save(body, tmp_path_factory.mktemp("body") / "rod.rom.npz")
@@ -43,15 +41,9 @@ def file(tmp_path_factory):
 
 @pytest.fixture
 def geometry(monkeypatch):
-    """The geometries of the project, by the short names the README uses."""
     pytest.importorskip("dolfinx", reason="dolfinx is not installed")
     monkeypatch.chdir(ROOT)
     return "meshes/beam.geo"
-
-
-def test_verbs_are_those_of_the_design():
-    first = "doctor mesh modes reduce check export simulate view report swing update"
-    assert [*first.split(), "bench", "completion"] == NAMES
 
 
 @pytest.mark.skipif(shutil.which("bash") is None, reason="there is no bash")
@@ -68,7 +60,6 @@ def test_bash_completes_verbs_and_options_and_leaves_files_alone(words, expected
 
 
 def test_help_answers_within_half_a_second():
-    """Processor time: the claim is about the program, not about a busy machine."""
     seconds = []
     for _ in range(3):
         start = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -95,11 +86,17 @@ def test_help_of_a_verb_has_examples_that_parse(verb, capsys):
         assert build_parser().parse_args(line.split()).verb == verb
 
 
-def test_check_prints_the_certificate_and_passes(file, capsys):
+def test_check_prints_the_certificate_and_its_numbers(file, capsys):
     assert main(["check", str(file)]) == 0
     out, err = capsys.readouterr()
     assert "free: worst error of 6 frequencies" in out and "FAILED" not in out
     assert err == ""
+    report = rom.check(rom.load(file))
+    rows = answer(capsys, "check", file)["report"]["rows"]
+    assert [row["quantity"] for row in rows] == [row.quantity for row in report.rows]
+    assert_allclose([row["value"] for row in rows], [row.value for row in report.rows])
+    assert main(["--json", "-q", "check", str(file)]) == 0
+    assert json.loads(capsys.readouterr().out)["ok"] is True
 
 
 def test_a_failed_gate_is_exit_code_5_in_both_forms(tmp_path, capsys):
@@ -112,13 +109,6 @@ def test_a_failed_gate_is_exit_code_5_in_both_forms(tmp_path, capsys):
     assert found["ok"] is False and found["failed"]
     rows = {row["quantity"]: row["ok"] for row in found["report"]["rows"]}
     assert rows["free: worst error of 6 frequencies"] is False
-
-
-def test_json_of_check_holds_the_numbers_of_the_report(file, capsys):
-    report = rom.check(rom.load(file))
-    rows = answer(capsys, "check", file)["report"]["rows"]
-    assert [row["quantity"] for row in rows] == [row.quantity for row in report.rows]
-    assert_allclose([row["value"] for row in rows], [row.value for row in report.rows])
 
 
 def test_simulate_lets_the_body_fall_about_its_hinge(file, tmp_path, capsys):
@@ -158,15 +148,10 @@ def test_bench_prints_figures_with_their_aims(capsys, monkeypatch):
     assert main(["bench", "two"]) == 2
 
 
-def test_common_options_may_stand_before_the_verb(file, capsys):
-    assert main(["--json", "-q", "check", str(file)]) == 0
-    assert json.loads(capsys.readouterr().out)["ok"] is True
-
-
 def warned(monkeypatch, text="E looks like GPa."):
     def run(args):
-        warnings.warn(text, RomWarning, stacklevel=1)
-        warnings.warn(text, RomWarning, stacklevel=1)
+        warnings.warn(text, rom.RomWarning, stacklevel=1)
+        warnings.warn(text, rom.RomWarning, stacklevel=1)
         return Answer({"value": float("nan"), "array": np.arange(2)}, "done")
 
     monkeypatch.setattr(check, "run", run)
@@ -210,7 +195,6 @@ def test_progress_goes_to_stderr(option, seen, monkeypatch, capsys):
 
 
 def test_a_closed_pipe_is_silent():
-    """As in ``rom check | head -1``: the reader leaves before the answer."""
     code = "import sys; from rom.cli.speech import say; from rom.cli.verbs import check\n"
     code += "from rom.cli.answer import Answer; from rom.cli.main import main\n"
     code += "check.run = lambda args: Answer({}, 'done')\nsys.exit(main(['check', 'x']))"
@@ -221,12 +205,9 @@ def test_a_closed_pipe_is_silent():
     assert process.stderr.read() == b""
 
 
-def test_table_aligns_names_left_and_numbers_right():
+def test_tables_are_aligned_and_json_is_strict():
     text = table(("name", "value"), [("a", "1.5"), ("long name", "22")])
     assert text.splitlines() == ["name       value", "a            1.5", "long name     22"]
-
-
-def test_json_is_strict():
     given = {"a": [np.inf, np.float64(2.5)], "b": np.array([1.0, np.nan]), 3: "µ"}
     assert json.loads(to_json(given)) == {"a": [None, 2.5], "b": [1.0, None], "3": "µ"}
 
@@ -247,7 +228,7 @@ def test_mesh_says_what_is_inside(geometry, tmp_path, capsys):
 
 
 @pytest.mark.fenicsx
-def test_mesh_lists_the_faces_of_a_step_file(tmp_path, capsys):
+def test_mesh_lists_and_picks_faces_of_a_step_file_in_its_unit(tmp_path, capsys):
     step_box(tmp_path / "box.step", 20, 10, 10)
     data = answer(capsys, "mesh", tmp_path / "box.step", "-p", "lc=0.01", "--faces")
     found = data["interfaces"]
@@ -261,26 +242,17 @@ def test_mesh_lists_the_faces_of_a_step_file(tmp_path, capsys):
     middles = sorted(tuple(round(x, 9) for x in face["middle"]) for face in found.values())
     assert middles == [(0.0, 0.005, 0.005), (0.01, 0.0, 0.005), (0.01, 0.005, 0.0),
                        (0.01, 0.005, 0.01), (0.01, 0.01, 0.005), (0.02, 0.005, 0.005)]  # fmt: skip
+    # A box of 20 x 10 x 10 mm; STEP files carry their unit, so that no scale is needed
+    step_box(tmp_path / "box.step", 20, 10, 10)
+    command = ("mesh", tmp_path / "box.step", "-p", "lc=0.005", "--face", "end=0.02,0.005,0.005")
+    found = answer(capsys, *command)
+    assert_allclose(found["volume"], 2e-6, rtol=1e-9)
+    assert list(found["interfaces"]) == ["end"] and found["interfaces"]["end"]["facets"] > 4
+    assert_allclose(answer(capsys, *command[:4], "--scale", "2")["volume"], 16e-6, rtol=1e-9)
 
 
 @pytest.mark.fenicsx
-def test_the_faces_of_a_plate_as_text_and_as_a_picture(tmp_path, capsys):
-    pytest.importorskip("pyvista", reason="pictures need pyvista")
-    step_plate(tmp_path / "plate.step")
-    picture = tmp_path / "faces.png"
-    assert main(["mesh", str(tmp_path / "plate.step"), "--faces", "--face", "pin=radius:0.006",
-                 "--save", str(picture)]) == 0  # fmt: skip
-    lines = capsys.readouterr().out.splitlines()
-    rows = [line.split() for line in lines if " cylinder " in line]
-    assert [row[2] for row in rows] == ["0.006", "0.01", "0.01"]
-    assert rows[0][4:] == ["0.03,0.03,0.005", "0,0,1", "pin"] and rows[1][5:] == ["0,0,1"]
-    assert any(line.split()[0] == "pin" and line.endswith("0,0,1") for line in lines if line)
-    assert picture.read_bytes()[:4] == b"\x89PNG"
-
-
-@pytest.mark.fenicsx
-def test_faces_of_a_component_file_are_picked_in_the_same_words(tmp_path, capsys):
-    """Also those that the command line adds; a wrong one names its line."""
+def test_faces_of_a_plate_are_picked_in_a_file_in_the_same_words_and_drawn(tmp_path, capsys):
     step_plate(tmp_path / "plate.step")
     file = tmp_path / "plate.toml"
     lines = ["[geometry]", 'file = "plate.step"', "[geometry.faces]", 'pin = "radius:0.006"',
@@ -294,17 +266,17 @@ def test_faces_of_a_component_file_are_picked_in_the_same_words(tmp_path, capsys
     assert main(["mesh", str(file)]) == 2
     said = capsys.readouterr().err
     assert "plate.toml:5" in said and "'radius:6 mm' is no face" in said
-
-
-@pytest.mark.fenicsx
-def test_a_step_file_in_millimetres_with_a_picked_face(tmp_path, capsys):
-    """A box of 20 x 10 x 10 mm; STEP files carry their unit, so that no scale is needed."""
-    step_box(tmp_path / "box.step", 20, 10, 10)
-    command = ("mesh", tmp_path / "box.step", "-p", "lc=0.005", "--face", "end=0.02,0.005,0.005")
-    found = answer(capsys, *command)
-    assert_allclose(found["volume"], 2e-6, rtol=1e-9)
-    assert list(found["interfaces"]) == ["end"] and found["interfaces"]["end"]["facets"] > 4
-    assert_allclose(answer(capsys, *command[:4], "--scale", "2")["volume"], 16e-6, rtol=1e-9)
+    pytest.importorskip("pyvista", reason="pictures need pyvista")
+    step_plate(tmp_path / "plate.step")
+    picture = tmp_path / "faces.png"
+    assert main(["mesh", str(tmp_path / "plate.step"), "--faces", "--face", "pin=radius:0.006",
+                 "--save", str(picture)]) == 0  # fmt: skip
+    lines = capsys.readouterr().out.splitlines()
+    rows = [line.split() for line in lines if " cylinder " in line]
+    assert [row[2] for row in rows] == ["0.006", "0.01", "0.01"]
+    assert rows[0][4:] == ["0.03,0.03,0.005", "0,0,1", "pin"] and rows[1][5:] == ["0,0,1"]
+    assert any(line.split()[0] == "pin" and line.endswith("0,0,1") for line in lines if line)
+    assert picture.read_bytes()[:4] == b"\x89PNG"
 
 
 @pytest.mark.fenicsx
@@ -376,7 +348,6 @@ def test_supports_in_part_by_option_and_by_file(geometry, tmp_path, capsys):
 
 @pytest.mark.fenicsx
 def test_reduce_by_assumed_modes(geometry, tmp_path, capsys):
-    """Right where they are clamped; the certificate says that they are not elsewhere."""
     path = tmp_path / "beam.rom.npz"
     arguments = ("-i", "root=rbe2", "-i", "tip=rbe2", "-m", 3, "--reference", "root", "-o", path)
     assert main(["reduce", geometry, *STEEL, "--method", "assumed", *map(str, arguments)]) == 5

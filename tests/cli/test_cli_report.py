@@ -57,7 +57,6 @@ def has(text, *words):
 
 @pytest.mark.once
 def test_a_body_is_described_with_its_numbers(folder):
-    """Mass, centre, frequencies of both models, interfaces, checks, command."""
     pytest.importorskip("pyvista", reason="VTK comes with the pictures")
     reader = reported("rod.rom.npz")
     body = rom.load("rod.rom.npz")
@@ -77,7 +76,10 @@ def test_inertia_is_that_about_the_mass_centre(bare):
     assert "No picture here: pictures need" in text
 
 
-def test_a_mechanism_is_moved_where_that_is_asked_for(bare, capsys):
+def test_a_mechanism_is_described_as_it_starts_and_moved_where_that_is_asked_for(bare, capsys):
+    has(reported("crank.toml").text, "Mechanism crank", "3 bodies", "4 joints", "revolute",
+        "crank.pin and rod.root", "drive", "main bearing", "ground.end",
+        "[bodies.slider]")  # fmt: skip
     text = reported("pendulum.toml", "--move").text
     has(text, "Mechanism pendulum", "Reached t = 0.5 s.", "energy balance / energy")
     assert main(["report", "rod.rom.npz", "--move", "-o", "s.html"]) == 2
@@ -85,13 +87,7 @@ def test_a_mechanism_is_moved_where_that_is_asked_for(bare, capsys):
     assert not (bare / "s.html").exists()
 
 
-def test_a_mechanism_is_described_as_it_starts(bare):
-    has(reported("crank.toml").text, "Mechanism crank", "3 bodies", "4 joints", "revolute",
-        "crank.pin and rod.root", "drive", "main bearing", "ground.end",
-        "[bodies.slider]")  # fmt: skip
-
-
-def test_a_finished_run_is_described(bare):
+def test_finished_runs_of_mechanisms_and_bodies_are_described(bare):
     assert main(["simulate", "pendulum.toml", "--t-end", "0.1", "-q", "-o", "out"]) == 0
     text = reported("out").text
     record = json.loads((bare / "out" / "run.json").read_text())
@@ -102,9 +98,6 @@ def test_a_finished_run_is_described(bare):
     gained = float(numbers["kinetic_J"][-1])
     assert f"{gained:.5g}" in text
     assert_allclose(gained, 2 * 9.81 * -numbers["bob_position_y_m"][-1], rtol=1e-4)
-
-
-def test_a_body_on_its_hinge_is_described_too(bare):
     words = ["simulate", "rod.rom.npz", "--hinge", "root", "--t-end", "1e-3", "--dt", "1e-4"]
     assert main([*words, "-q", "-o", "swing"]) in (0, 5)
     said = reported("swing").text

@@ -10,10 +10,10 @@ from numpy.testing import assert_allclose
 
 import rom
 from cases.files.toml_files import PENDULUM
+from cases.refusals import refuses
 from rom.config.document import parsed
 from rom.config.expressions import MAX_LETTERS, Reader
 from rom.config.keys import Place
-from rom.errors import ConfigError
 from rom.mbs.elements.formulas.codes import FUNCTIONS
 from rom.mbs.elements.formulas.programs import formula
 
@@ -63,16 +63,12 @@ CLOSED_FORMS = {  # formula: its first and second derivative by t, in closed for
 }
 
 
-def in_python(text, t):
-    return eval(text.replace("^", "**"), KNOWN | {"t": t})
-
-
 @pytest.mark.parametrize("text", CLOSED_FORMS)
 def test_values_and_derivatives_are_those_of_the_closed_form(text):
     found, t = read(text), np.array([0.13, 0.71, 1.27, 1.9])
     forms = text, *CLOSED_FORMS[text]
     for function, closed in zip((found, found.rate, found.acceleration), forms, strict=True):
-        wanted = [in_python(closed, float(x)) for x in t]
+        wanted = [eval(closed.replace("^", "**"), KNOWN | {"t": float(x)}) for x in t]
         assert_allclose(function(t), wanted, rtol=2e-13, atol=1e-13)
         assert function(0.71) == function(t)[1]
 
@@ -91,16 +87,17 @@ def test_every_function_has_a_closed_form():
     assert all(any(f"{name}(" in text for text in CLOSED_FORMS) for name in FUNCTIONS)
 
 
-def test_constants_stay_constants_where_slopes_are_infinite():
+def test_constants_stay_constants_where_slopes_are_infinite_and_huge_powers_are_numbers():
     found = read("sqrt(0) + 0^0.5 + abs(0) + t")
     assert (found(2.0), found.rate(2.0), found.acceleration(2.0)) == (2.0, 1.0, 0.0)
+    assert read("9^9^9^9")(0.0) == math.inf
+    assert read("2^-3^2")(0.0) == 2.0**-9
 
 
 WORDS = ["t", "x", "v", "pi", "2", "0.5", "1e1", ".25", "k"]
 
 
 def random_formula(chance, depth):
-    """A legal text."""
     if depth == 0:
         return chance.choice(WORDS)
     kind = chance.random()
@@ -116,7 +113,6 @@ def random_formula(chance, depth):
 
 
 def test_signs_bind_as_in_python():
-    """Random formulas against Python's own arithmetic; powers are written as ^, too."""
     chance, same = random.Random(3), 0
     names = {key: getattr(math, key) for key in ("sin", "cos", "atan", "exp", "tanh", "pi")}
     names |= {"abs": abs, "t": 0.3, "x": 0.7, "v": 1.9, "k": 3.0}
@@ -137,26 +133,20 @@ def test_signs_bind_as_in_python():
 REFUSED = {  # formula: what is said of it, and the letter that the caret is under
     "": ("is empty", None),
     "sinn(t)": ("there is no 'sinn'", 0),
-    "1 + tt": ("there is no 'tt'", 4),
     "t.real": ("'.' has no meaning here", 1),
     "__import__('os')": ("there is no '__import__'", 0),
     "[t for t in x]": ("'[' has no meaning here", 0),
     "t := 1": ("':' has no meaning here", 2),
-    "t == 1": ("'=' has no meaning here", 2),
-    "t if x else v": ("there is no 'if'", 2),
     "'text'": ('"\'" has no meaning here', 0),
-    "b'x'": ("there is no 'b'", 0),
     "t + \u03c0": ("'\u03c0' has no meaning here", 4),
     "\uff54": ("has no meaning here", 0),
     "t\0": ("has no meaning here", 1),
-    "t # x": ("'#' has no meaning here", 2),
     "2t": ("a sign is missing between 2 and t", 1),
     "0x10": ("a sign is missing between 0 and x10", 1),
     "1..2": ("a sign is missing between 1. and .2", 2),
     "t t": ("this is no formula", 2),
     "01": ("this is no formula", 0),
     "1 +": ("this is no formula", None),
-    "*t": ("this is no formula", 0),
     "1 // t": ("this is nothing a formula has", 0),
     "max(*t, 1)": ("this is nothing a formula has", 4),
     "1, 2": ("a comma stands between arguments", 0),
@@ -167,7 +157,6 @@ REFUSED = {  # formula: what is said of it, and the letter that the caret is und
     "1 + step(t, 1)": ("step has 2 arguments; it takes 3", 4),
     "min(t)": ("min has 1 arguments; it takes 2 or more", 0),
     "t(2)": ("this is no function", 0),
-    "sin(t)(x)": ("this is no function", 0),
     "1e999": ("this number is too large", 0),
     "(" * 401 + "t" + ")" * 401: ("this is no formula: too many nested parentheses", None),
     "-" * 900 + "t": ("nested", None),
@@ -181,7 +170,7 @@ REFUSED = {  # formula: what is said of it, and the letter that the caret is und
 @pytest.mark.parametrize("text", REFUSED, ids=lambda text: ascii(text[:20]))
 def test_what_is_no_formula_is_refused_with_its_place(text):
     message, at = REFUSED[text]
-    with pytest.raises(ConfigError) as refused:
+    with pytest.raises(rom.ConfigError) as refused:
         read(text)
     error = refused.value
     assert message in error.message and error.where == "p.toml:2"
@@ -193,23 +182,14 @@ def test_what_is_no_formula_is_refused_with_its_place(text):
 
 
 def test_the_nearest_name_is_offered():
-    with pytest.raises(ConfigError) as refused:
-        read("2*stifness*x", stiffness=3.0)
-    assert "Did you mean stiffness?" in refused.value.hint
-    with pytest.raises(ConfigError, match="there is no 'x'"):
-        read("x", ("t",))
-
-
-def test_huge_powers_are_numbers_and_fill_no_memory():
-    assert read("9^9^9^9")(0.0) == math.inf
-    assert read("2^-3^2")(0.0) == 2.0**-9
+    refuses(rom.ConfigError, "Did you mean stiffness?", read, "2*stifness*x", stiffness=3.0)
+    refuses(rom.ConfigError, "there is no 'x'", read, "x", ("t",))
 
 
 LETTERS = "txv0123456789.eE+-*/^(), \tsincoslogabsminmaxstep_'\"[]{}:=<>!@#$%&|~`\\\u00e9\u03c0\x00"
 
 
 def test_noise_is_refused_or_a_number():
-    """Nothing but a ConfigError leaves the reader, whatever the letters."""
     chance, legal = random.Random(11), 0
     for _ in range(4000):
         n = chance.randrange(1, 25)
@@ -217,7 +197,7 @@ def test_noise_is_refused_or_a_number():
                        else chance.choices(LETTERS, k=n))  # fmt: skip
         try:
             found = read(text)
-        except ConfigError as error:
+        except rom.ConfigError as error:
             assert error.message.startswith("motors.m.law") and error.where == "p.toml:2"
         else:
             assert isinstance(found(0.1, 0.2, 0.3), float)

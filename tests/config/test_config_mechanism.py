@@ -14,13 +14,12 @@ from cases.command import ROOT
 from cases.files.schema import answer
 from cases.files.toml_files import ALL, CRANK, PENDULUM, laid_out
 from cases.long import few
+from cases.refusals import refuses
 from cases.solid import block, reduced
 from rom.cli.main import main
 from rom.config.document import parsed
 from rom.config.keys import Place
 from rom.config.laws import law_kind, law_of
-from rom.config.mechanism import read_mechanism
-from rom.errors import ConfigError
 
 
 @pytest.fixture(scope="module")
@@ -40,14 +39,13 @@ def test_the_pendulum_reaches_the_bottom_when_it_must(folder):
     inertia, moment = 0.025 + 2 * 0.5**2, 2 * 9.81 * 0.5
     quarter = ellipk(0.5) * np.sqrt(inertia / moment)
     changes = {("simulation", "t_end"): quarter, ("simulation", "dt"): "0.1 ms"}
-    file = read_mechanism("pendulum.toml", changes)
+    file = rom.read_mechanism("pendulum.toml", changes)
     sol = file.simulate()
     assert_allclose(sol.position("bob")[-1], [0.0, -0.5, 0.0], atol=2e-7)
     assert_allclose(sol.omega("bob")[-1, 2], -np.sqrt(2 * moment / inertia), rtol=1e-6)
 
 
 def in_python(rod):
-    """The slider-crank of the file, word by word."""
     mech = rom.Mechanism(gravity=(0, -9.81, 0))
     crank = mech.add_rigid("crank", mass=1.0, inertia=(1e-3, 1e-3, 2e-3), at=(0.05, 0, 0),
                            markers={"shaft": (-0.05, 0, 0), "pin": (0.05, 0, 0)})  # fmt: skip
@@ -67,13 +65,12 @@ def in_python(rod):
         rate=lambda t: speed * (t / T - np.sin(w * t) / (2 * np.pi)),
         acceleration=lambda t: speed / T * (1 - np.cos(w * t)),
     )  # fmt: skip
-    mech.force("gas", slider.marker("pin"),
-               lambda t: np.array([-50.0 * np.sin(40 * np.pi * t), 0, 0]))  # fmt: skip
+    mech.force("gas", slider.marker("pin"), lambda t: np.array([-50.0 * np.sin(speed * t), 0, 0]))
     return mech
 
 
 def test_the_slider_crank_is_that_of_python(folder, rod):
-    sol = read_mechanism("crank.toml").simulate()
+    sol = rom.read_mechanism("crank.toml").simulate()
     same = rom.simulate(in_python(rod), t_end=0.01, dt=1e-4, rho_inf=0.8)
     assert_array_equal(sol.t, same.t)
     for name in ("crank", "rod", "slider"):
@@ -122,7 +119,7 @@ def test_a_column_to_plot_is_looked_for_before_the_run(folder, capsys):
 @pytest.mark.filterwarnings("ignore::rom.errors.RomWarning")  # its joints are anywhere
 def test_every_section_reaches_the_mechanism(folder):
     (folder / "all.toml").write_text(ALL)
-    mech = read_mechanism("all.toml").mechanism()
+    mech = rom.read_mechanism("all.toml").mechanism()
     body = rom.load("rod.rom.npz")
     a, c = mech.parts["a"], body.first_moment / body.mass
     assert a.r == 0 and a.mass == body.mass
@@ -136,6 +133,8 @@ def test_every_section_reaches_the_mechanism(folder):
     assert_allclose(mech.design_point(a.marker("tip")), [-x[1], x[0], x[2]], atol=1e-12)
     kinds = {"turn": "revolute", "slide": "prismatic", "ball": "distance", "gear": "coupling"}
     assert {n: j.kind for n, j in mech.joints.items()} == kinds
+    assert_array_equal(mech.parts["c"].spin, [0, 0, 500])
+    assert "spin of c" in mech.elements
     assert mech.springs["s"].stiffness == 2000 and mech.springs["s"].free_length == 0.1
     assert mech.springs["s"].damping == 3 and mech.turns["r"].free_angle == np.pi
     assert mech.motors["t"].law(0.0, 0.0, 0.0) == 7.0
@@ -148,31 +147,9 @@ def test_every_section_reaches_the_mechanism(folder):
     assert mech.frictions["d"].numbers[0] == 4 and mech.frictions["d"].numbers[-1] == 1e-3
     assert mech.stops["e"].limits == ((1, np.pi / 4),)
     assert mech.contacts["k"].radius[0] == 0.05 and mech.contacts["k"].law.exponent == 1.5
-
-
-def test_round_bodies_turn_in_their_frames(tmp_path):
-    text = """
-[bodies.top]
-mass = 3.0
-inertia = [0.03, 0.03, 0.05]
-at = [0, 0, 0.1]
-spin = [0, 0, 500]
-markers = { low = [0, 0, -0.1] }
-[simulation]
-t_end = 0.1
-dt = 0.01
-"""
-    (tmp_path / "top.toml").write_text(text)
-    mech = read_mechanism(tmp_path / "top.toml").mechanism()
-    assert_array_equal(mech.parts["top"].spin, [0, 0, 500])
-    assert "spin of top" in mech.elements
-
-
-@pytest.mark.filterwarnings("ignore::rom.errors.RomWarning")
-def test_a_pulley_that_is_not_on_the_path_is_told(folder):
     (folder / "all.toml").write_text(ALL.replace('pulleys."a.tip"]', 'pulleys."a.tap"]'))
-    with pytest.raises(ConfigError, match=r"'a.tap' is no marker of the path.*a\.tip"):
-        read_mechanism("all.toml").mechanism()
+    made = rom.read_mechanism("all.toml").mechanism
+    refuses(rom.ConfigError, r"'a.tap' is no marker of the path.*a\.tip", made)
 
 
 def law(text, unit):
@@ -223,16 +200,10 @@ MISTAKES = {  # what stands in the file, or nothing; what instead, or behind it;
     "name with a dot": ("[bodies.bob]", '[bodies."b.c"]', 4, "'b.c' is no name for a body"),
     "rho": ("rho_inf = 1", "rho_inf = 7", 18, "rho_inf"),
     "unknown section": ("[simulation]", "[springy.x]\n[simulation]", 15, "Did you mean springs?"),
-    "unknown joint": (
-        "",
-        DRIVE.replace("pivot", "pivto") + "1\n",
-        20,
-        "'pivto'. Did you mean pivot?",
-    ),
+    "unknown joint": ("", DRIVE.replace("pivot", "pivto") + "1\n", 20, "'pivto'. Did you mean"),
     "a way for an angle": ("", DRIVE + '"1 m"\n', 21, "drives.m.law: '1 m' is a length; an angle"),
     "short table": ("", TABLE % "0.05, 0.1", 21, "of drives.m.law cover 0 s to 0.1 s; the run"),
     "table that falls": ("", TABLE % "2, 1", 21, "law.t = [0, 2, 1] must be 2 or more numbers"),
-    "name twice": ("", DRIVE.replace(".m", ".pivot") + "1\n", 19, "'pivot' is used twice"),
     "stop": ("", '[stops.m]\njoint = "pivot"\nstiffness = 1\n', 19, "stop 'm' has no limit"),
     "missing file": ("", '[bodies.x]\nfile = "nope.rom.npz"\n', 19, "nope.rom.npz"),
     "no bodies": (PENDULUM, "[simulation]\nt_end = 1.0\n", 2, "bodies is missing"),
@@ -246,21 +217,19 @@ def test_a_mistake_is_told_with_file_and_line(case, tmp_path):
     assert old in PENDULUM
     (tmp_path / "p.toml").write_text(PENDULUM.replace(old, new) if old else PENDULUM + new)
     with pytest.raises(rom.RomError) as refused:
-        read_mechanism(tmp_path / "p.toml").simulate()
+        rom.read_mechanism(tmp_path / "p.toml").simulate()
     assert f"p.toml:{line}" in refused.value.where and culprit in str(refused.value)
 
 
 def test_markers_far_apart_are_warned_of(tmp_path):
-    """A wrong number in a file would else bend the mechanism before it starts."""
     (tmp_path / "p.toml").write_text(PENDULUM.replace('"-500 mm"', '"-400 mm"'))
     with pytest.warns(rom.errors.RomWarning, match=r"p.toml:10: .* 'pivot' are 0.1 m apart"):
-        read_mechanism(tmp_path / "p.toml").mechanism()
+        rom.read_mechanism(tmp_path / "p.toml").mechanism()
 
 
 @pytest.mark.long
 @pytest.mark.fenicsx
 def test_the_sample_is_the_mechanism_of_the_demo(tmp_path):
-    """Its bodies are meshed and reduced, here coarsely; the rod stays as long as it is."""
     for folder in ("meshes", "demos"):
         (tmp_path / folder).mkdir()
     for name in ("connecting_rod", "crank"):
@@ -270,7 +239,7 @@ def test_the_sample_is_the_mechanism_of_the_demo(tmp_path):
         (tmp_path / "meshes" / f"{name}.toml").write_text(text)
     sample = tmp_path / "demos" / "slider_crank.toml"
     sample.write_text((ROOT / "demos" / "slider_crank.toml").read_text())
-    sol = read_mechanism(sample, {("simulation", "t_end"): "0.4 ms"}).simulate()
+    sol = rom.read_mechanism(sample, {("simulation", "t_end"): "0.4 ms"}).simulate()
     steel = rom.Material(E=210e9, nu=0.3, rho=7850.0)
     model = rom.fe.model(ROOT / "meshes" / "crank.geo", material=steel, parameters={"lc": 9e-3})
     crank = rom.mass_properties(model)
@@ -297,11 +266,10 @@ FMU_CASES = {
 @pytest.mark.once
 @pytest.mark.parametrize("case", few(1, FMU_CASES))
 def test_an_fmu_of_a_file_moves_as_the_file(case, folder, monkeypatch):
-    """Bodies travel inside, the folder may go; nothing but rom need be found."""
     fmpy = pytest.importorskip("fmpy", reason="fmpy is not installed")
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
     monkeypatch.delenv("ROM_PYTHON", raising=False)
-    file = read_mechanism("crank.toml", FMU_CASES[case])
+    file = rom.read_mechanism("crank.toml", FMU_CASES[case])
     free = ["free.tip"] if ("bodies", "free") in FMU_CASES[case] else []
     names = ["slider.pin", "main bearing", *free] if case != "as it is" else None
     rom.write_mechanism_fmu(file, "crank.fmu", outputs=names)

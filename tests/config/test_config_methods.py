@@ -11,9 +11,6 @@ from numpy.testing import assert_allclose, assert_array_equal
 import rom
 from cases.files.toml_files import PENDULUM
 from cases.solid import block, reduced
-from rom.config.mechanism import read_mechanism
-from rom.errors import RomError
-from rom.mbs.mechanism import Mechanism
 
 # elements of any family, by what others make in Python
 OF_OTHERS = {"add", "check_apart", "check_markers"}
@@ -22,8 +19,8 @@ OF_OTHERS = {"add", "check_apart", "check_markers"}
 def adding_methods():
     """Methods whose first argument is the name of what they add."""
     found = set()
-    for name in dir(Mechanism):
-        method = getattr(Mechanism, name)
+    for name in dir(rom.Mechanism):
+        method = getattr(rom.Mechanism, name)
         if inspect.isfunction(method) and not name.startswith("_"):
             arguments = list(inspect.signature(method).parameters)
             if arguments[1:2] == ["name"] and len(arguments) > 2:
@@ -139,15 +136,15 @@ def test_an_entry_calls_the_method(method, soft, tmp_path, monkeypatch):
     (tmp_path / "soft.rom.npz").symlink_to(soft)
     (tmp_path / "f.py").write_text("def none(t, a):\n    return (0, 0, 0), (0, 0, 0)\n")
     (tmp_path / "m.toml").write_text(BASE + ENTRIES[method])
-    calls, plain = [], getattr(Mechanism, method)
+    calls, plain = [], getattr(rom.Mechanism, method)
 
     @wraps(plain)
     def noted(self, name, *arguments, **named):
         calls.append(name)
         return plain(self, name, *arguments, **named)
 
-    monkeypatch.setattr(Mechanism, method, noted)
-    made = read_mechanism(tmp_path / "m.toml", trust=True).mechanism()
+    monkeypatch.setattr(rom.Mechanism, method, noted)
+    made = rom.read_mechanism(tmp_path / "m.toml", trust=True).mechanism()
     assert "new" in calls
     assert any(name.startswith("new") for name in (*made.parts, *made.joints, *made.drives,
                                                     *made.elements, *made.events))  # fmt: skip
@@ -159,7 +156,7 @@ def made_of(soft, tmp_path, more):
     (tmp_path / "m.toml").write_text(
         BASE[: BASE.index("[joints")] + more + "[simulation]\nt_end=1\n"
     )
-    return read_mechanism(tmp_path / "m.toml").mechanism()
+    return rom.read_mechanism(tmp_path / "m.toml").mechanism()
 
 
 def test_elastic_coordinates_surfaces_and_spread_loads_are_those_of_python(soft, tmp_path):
@@ -226,7 +223,7 @@ def test_every_refusal_of_a_mechanism_file_has_file_line_and_cure(tmp_path):
         key, _, value = change.partition(" = ")
         try:
             rom.read_mechanism(path).mechanism()
-        except RomError as error:
+        except rom.RomError as error:
             refused += 1
             assert re.search(r"crank\.toml:\d+", error.where), (k, change, str(error))
             assert error.hint, (k, change, str(error))

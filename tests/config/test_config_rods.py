@@ -6,10 +6,10 @@ from numpy.testing import assert_allclose
 
 import rom
 from cases.beam import elastica
+from cases.refusals import refuses
 from rom import rotation
 from rom.components.cosserat.bodies import body, shape_of
 from rom.components.cosserat.shapes import straight
-from rom.config.mechanism import read_mechanism
 
 STEEL = 'material = { E = "210 GPa", nu = 0.3, rho = "7850 kg/m^3" }\n'
 E, NU, RHO = 210e9, 0.3, 7850.0
@@ -19,7 +19,7 @@ G = E / 2 / (1 + NU)
 def file_of(tmp_path, rod, more="", gravity="[0, 0, 0]", t_end=1.0, dt=0.01):
     text = f"gravity = {gravity}\n[rods.wire]\n{rod}\n{more}\n"
     (tmp_path / "w.toml").write_text(text + f"[simulation]\nt_end = {t_end}\ndt = {dt}\n")
-    return read_mechanism(tmp_path / "w.toml")
+    return rom.read_mechanism(tmp_path / "w.toml")
 
 
 def rod_of(tmp_path, section, points="[[0, 0, 0], [2, 0, 0]]", more=STEEL):
@@ -83,18 +83,7 @@ def torsion_of_a_rectangle(a, b):
     return a * b**3 / 3 * (1 - 192 * b / np.pi**5 / a * series)
 
 
-def test_a_square_in_torsion_has_the_published_constant(tmp_path):
-    """0.1406 of the fourth power of its side; 0.229 b^3 a at 2 : 1 (Timoshenko, Goodier)."""
-    for width, height, factor in ((0.1, 0.1, 0.1406), (0.2, 0.1, 0.229), (0.1, 0.2, 0.229)):
-        section = f'{{ kind = "rectangle", width = {width}, height = {height} }}'
-        bend = rod_of(tmp_path, section).rod.bend[0]
-        long, short = max(width, height), min(width, height)
-        assert_allclose(bend[2] / G, factor * long * short**3, rtol=2e-3)
-        assert_allclose(bend[2] / G, torsion_of_a_rectangle(long, short), rtol=1e-8)
-        assert_allclose(bend[:2], [E * width * height**3 / 12, E * height * width**3 / 12])
-
-
-def test_circles_and_tubes_have_their_areas_and_moments(tmp_path):
+def test_sections_have_their_areas_moments_and_published_torsion(tmp_path):
     d, w = 0.02, 0.003
     for section, inner in (
         ('{ kind = "circle", diameter = "20 mm" }', 0.0),
@@ -106,16 +95,23 @@ def test_circles_and_tubes_have_their_areas_and_moments(tmp_path):
         assert_allclose(found.rod.bend[0], [E * moment, E * moment, 2 * G * moment])
         assert_allclose(found.rod.stretch[0, 2], E * area)
         assert_allclose(found.frames.mass.sum(), RHO * area * 2.0)
-        assert_allclose(found.frames.inertia.sum(axis=0),
-                        RHO * moment * 2.0 * np.array([1, 1, 2]))  # fmt: skip
+        turning = RHO * moment * 2.0 * np.array([1, 1, 2])
+        assert_allclose(found.frames.inertia.sum(axis=0), turning)
     shear = rod_of(tmp_path, '{ kind = "circle", diameter = 0.02 }').rod.stretch[0, 0]
     assert_allclose(shear / G / (np.pi * d**2 / 4), 6 * 1.3 / (7 + 1.8))  # Cowper, 1966
     thin = rod_of(tmp_path, '{ kind = "tube", diameter = 1, thickness = 1e-4 }').rod.stretch[0]
     assert_allclose(thin[0] * E / thin[2] / G, 2 * 1.3 / (4 + 0.9), rtol=1e-6)
+    # 0.1406 of the fourth power of its side; 0.229 b^3 a at 2 : 1 (Timoshenko, Goodier)
+    for width, height, factor in ((0.1, 0.1, 0.1406), (0.2, 0.1, 0.229), (0.1, 0.2, 0.229)):
+        section = f'{{ kind = "rectangle", width = {width}, height = {height} }}'
+        bend = rod_of(tmp_path, section).rod.bend[0]
+        long, short = max(width, height), min(width, height)
+        assert_allclose(bend[2] / G, factor * long * short**3, rtol=2e-3)
+        assert_allclose(bend[2] / G, torsion_of_a_rectangle(long, short), rtol=1e-8)
+        assert_allclose(bend[:2], [E * width * height**3 / 12, E * height * width**3 / 12])
 
 
-def test_points_on_a_circle_make_an_arc(tmp_path):
-    """A quarter turn of radius one: length, ends, directions; sections do not turn about it."""
+def test_points_make_arcs_and_helices_whose_sections_turn_least(tmp_path):
     angles = np.linspace(0, np.pi / 2, 13)
     points = [[float(np.sin(a)), float(1 - np.cos(a)), 0.0] for a in angles]
     found = rod_of(tmp_path, '{ kind = "circle", diameter = 0.01 }', str(points),
@@ -129,10 +125,7 @@ def test_points_on_a_circle_make_an_arc(tmp_path):
     assert_allclose(frames[[0, -1], :, 2], [[1, 0, 0], [0, 1, 0]], atol=5e-4)
     middle = np.pi / 60 * (np.arange(30) + 0.5)
     assert_allclose(frames[1:-1, :2, 2].T, [np.cos(middle), np.sin(middle)], atol=1e-3)
-
-
-def test_sections_along_a_helix_turn_by_its_torsion(tmp_path):
-    """Frames that turn least stay behind the normal of the helix by torsion times length."""
+    # Frames that turn least stay behind the normal of the helix by torsion times length
     R, h = 1.0, 0.5
     turns = np.linspace(0, 2 * np.pi, 60)
     points = [[R * float(np.cos(a)), R * float(np.sin(a)), h * float(a)] for a in turns]
@@ -168,15 +161,11 @@ def test_a_mistake_of_a_rod_is_told_with_file_and_line(case, tmp_path):
     assert message in str(refused.value) and "w.toml:" in refused.value.where
 
 
-MARKERS = {
-    '"wire.tip"': "body 'wire' has no marker 'tip'",
-    '"wire.22"': "body 'wire' has no marker '22'",
-    "{ wire = [0, 0, 0] }": "rod 'wire' has no points of its own",
-}
-
-
-@pytest.mark.parametrize("marker", MARKERS)
-def test_a_marker_that_no_rod_has_is_told(marker, tmp_path):
-    with pytest.raises(rom.RomError) as refused:
-        file_of(tmp_path, ROUND + STEEL, CLAMP.replace('"wire.end"', marker)).mechanism()
-    assert MARKERS[marker] in str(refused.value)
+def test_a_marker_that_no_rod_has_is_told(tmp_path):
+    for marker, message in (
+        ('"wire.tip"', "body 'wire' has no marker 'tip'"),
+        ('"wire.22"', "body 'wire' has no marker '22'"),
+        ("{ wire = [0, 0, 0] }", "rod 'wire' has no points of its own"),
+    ):
+        made = file_of(tmp_path, ROUND + STEEL, CLAMP.replace('"wire.end"', marker)).mechanism
+        refuses(rom.RomError, message, made)

@@ -3,7 +3,6 @@
 One seeded instant of each kind, and the instant that matters; ten with ROM_LONG=1.
 """
 
-import os
 import random
 import signal
 import subprocess
@@ -18,7 +17,6 @@ import pytest
 from cases.boxes import BOX_GEO
 from cases.command import alive, environment, wait_until
 from cases.long import ROM_LONG, few
-from rom.process import child
 
 pytestmark = [
     pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc"),
@@ -60,20 +58,10 @@ def processes(mark):
 
 
 def meshes(pid):
-    """Whether a process has loaded gmsh."""
     try:
         return "libgmsh" in Path(f"/proc/{pid}/maps").read_text()
     except OSError:
         return False
-
-
-def gone(mark):
-    end = time.monotonic() + PATIENCE
-    while left := processes(mark):
-        if time.monotonic() > end:
-            return left
-        time.sleep(0.05)
-    return []
 
 
 # each work and each signal once; with more time all pairs
@@ -101,7 +89,7 @@ def test_a_signal_at_any_instant_leaves_nothing(work, number, tmp_path):
         time.sleep(wait)
         process.send_signal(number)
         process.communicate(timeout=20)
-        assert gone(mark.encode()) == [], f"after {wait:.2f} s"
+        wait_until(lambda mark=mark: not processes(mark.encode()), PATIENCE)
         if number != signal.SIGKILL:
             assert not list(temporary.glob("rom-*")), f"after {wait:.2f} s"
         assert len(list(temporary.glob("rom-*"))) <= 1, "the run before is not swept"
@@ -111,7 +99,6 @@ def test_a_signal_at_any_instant_leaves_nothing(work, number, tmp_path):
 
 @pytest.mark.parametrize("number", few(1, SIGNALS), ids=lambda n: n.name)
 def test_a_signal_while_the_mesher_works_is_survived_by_nobody(number, tmp_path):
-    """At the instant that matters: the child is at work, its folder is there."""
     if find_spec("gmsh") is None:
         pytest.skip("gmsh is not installed")
     (tmp_path / "slow.geo").write_text(SLOW)
@@ -127,28 +114,8 @@ def test_a_signal_while_the_mesher_works_is_survived_by_nobody(number, tmp_path)
     killed = number == signal.SIGKILL
     assert process.returncode == (-number if killed else 7)
     assert (b"error: interrupted." in said) != killed and b"Traceback" not in said
-    assert gone(mark.encode()) == []
+    wait_until(lambda: not processes(mark.encode()), PATIENCE)
     assert len(list(tmp_path.glob("rom-mesh-*"))) == killed
     (tmp_path / "slow.geo").write_text(SLOW.replace("Sleep 20;", ""))
     assert subprocess.run(command, env=env, cwd=tmp_path, capture_output=True).returncode == 0
-    assert not list(tmp_path.glob("rom-*"))
-
-
-def test_ctrl_c_in_a_film_of_the_library_leaves_nothing(tmp_path, monkeypatch):
-    """In this process, by an alarm: what interrupts the wait ends the child."""
-    monkeypatch.setenv("ROM_TEST_MARK", mark := f"{tmp_path}-alarm")
-    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-
-    def interrupt(*_):
-        raise KeyboardInterrupt
-
-    previous = signal.signal(signal.SIGALRM, interrupt)
-    try:
-        signal.setitimer(signal.ITIMER_REAL, 0.7)
-        with pytest.raises(KeyboardInterrupt), child.scratch("test"):
-            child.run([sys.executable, "-c", "import time; time.sleep(30)"])
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGALRM, previous)
-    assert [pid for pid in gone(mark.encode()) if pid != os.getpid()] == []
     assert not list(tmp_path.glob("rom-*"))

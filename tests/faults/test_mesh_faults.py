@@ -90,7 +90,6 @@ MSH = {  # the same of box.msh
         FileFormatError, "cut"),
     "unknown version": (replaced("2.2 0 8", "9.9 0 8"), FileFormatError, "9.9"),
     "half": (cut(0.5), FileFormatError, "cut"),
-    "nearly whole": (cut(0.97), FileFormatError, "cut"),
     "only a header": (cut(0.02), FileFormatError, "cut"),
     "claims a billion nodes": (replaced("$Nodes\n36", "$Nodes\n999999999999"), FileFormatError),
     "claims more cells": (replaced("$Elements\n88", "$Elements\n99999"), FileFormatError),
@@ -118,6 +117,12 @@ MSH = {  # the same of box.msh
 GEOS = {  # text of box.geo
     "geo syntax error": (GEO + "Box(2) = {0, 0, 0\n", FileFormatError, "line 6"),
     "geo unknown variable": (GEO + "Box(2) = {q, 0, 0, 1, 1, 1};\n", FileFormatError, "'q'"),
+    "geo of a lost surface": (GEO + 'Physical Surface("a", 12) = {99};\n', TagError, "'a'"),
+    "geo of a lost volume": (GEO + 'Physical Volume("a", 12) = {99};\n', TagError, "'a'"),
+    "geo of a group below zero": (GEO.replace('"body", 1', '"body", -3'), TagError, "volume 1"),
+    "geo of a lost file": (GEO + 'Include "nope.geo";\n', FileFormatError, "nope.geo"),
+    "geo that merges a lost file": (GEO + 'Merge "nope.step";\n', FileFormatError),
+    "geo that deletes all": (GEO + "Delete All;\n", (FileFormatError, TagError, MeshError)),
     "geo that refuses": ('Error("too thin");\n', FileFormatError, "too thin"),
     "geo without volume": ("Point(1) = {0, 0, 0};\n", MeshError, "no volume"),
     "geo of zero size": (GEO.replace("1, 1, 1}", "1, 1, 0}"), (FileFormatError, MeshError)),
@@ -169,20 +174,15 @@ def test_bad_file_is_a_clear_error_within_seconds(case, tmp_path, monkeypatch, c
     assert capfd.readouterr() == ("", "")
 
 
-def test_a_script_beside_a_mesh_is_not_run(tmp_path):
-    """gmsh executes box.msh.opt when it opens box.msh."""
-    write_msh(tmp_path / "box.msh", BOX.points, BLOCKS, NAMES)
-    (tmp_path / "box.msh.opt").write_text(f'SystemCall "touch {tmp_path}/pwned";\n')
-    assert len(read_mesh(tmp_path / "box.msh").cells) == 72
-    assert not (tmp_path / "pwned").exists()
-
-
-def test_names_with_blanks_and_umlauts_work(tmp_path):
+def test_names_with_blanks_and_umlauts_work_and_a_script_beside_a_mesh_is_not_run(tmp_path):
+    """Gmsh executes box.msh.opt when it opens box.msh."""
     folder = tmp_path / "Größe 1"
     folder.mkdir()
+    (folder / "Würfel a.msh.opt").write_text(f'SystemCall "touch {tmp_path}/pwned";\n')
     names = [(3, 1, "Körper 1"), (2, 11, "root"), (2, 12, "tip")]
     mesh = read_mesh(write_msh(folder / "Würfel a.msh", BOX.points, BLOCKS, names))
-    assert mesh.region_names == {1: "Körper 1"}
+    assert mesh.region_names == {1: "Körper 1"} and len(mesh.cells) == 72
+    assert not (tmp_path / "pwned").exists()
 
 
 def originals(folder):

@@ -151,7 +151,6 @@ def test_a_link_is_replaced_and_not_followed(folder, capsys):
 
 
 def test_every_verb_that_writes_has_force():
-    """A verb writes when it has an output; completion and the others print."""
     verbs = set(verb_modules())
     have, write = set(), set()
     for verb in verbs:
@@ -164,7 +163,6 @@ def test_every_verb_that_writes_has_force():
 
 
 def exported(body, folder):
-    """One file of every format, by kind."""
     guyan = rom.reduce(block(cells=(4, 1, 1)), method=rom.Guyan(), certify=False,
                        interfaces={"root": "rbe2", "tip": "rbe2"})  # fmt: skip
     found = {}

@@ -66,7 +66,6 @@ def files(folder):
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
-    """The mechanism file, and the files of a run that nothing interrupts."""
     folder = tmp_path_factory.mktemp("whole")
     (folder / "pendulum.toml").write_text(MECHANISM)
     assert main(["simulate", str(folder / "pendulum.toml"), "-o", str(folder / "out"), "-q"]) == 0
@@ -144,7 +143,10 @@ CHANGES = [
 ]
 
 
-def test_another_run_is_refused_by_the_name_of_what_differs(folder, capsys):
+def test_a_run_that_is_another_or_not_there_is_not_resumed(folder, capsys):
+    assert main([*RUN, "--resume"]) == 2
+    assert "nothing to resume" in capsys.readouterr().err
+    assert not (folder / "out").exists()
     kill_within(folder, signal.SIGKILL, random.Random(4))
     for change, words in CHANGES:
         more = change if change[0].startswith("--") else ()
@@ -157,15 +159,7 @@ def test_another_run_is_refused_by_the_name_of_what_differs(folder, capsys):
     assert (folder / "out" / "motion.parts" / "state.npz").exists()
 
 
-def test_where_there_is_nothing_to_resume_it_says_so(folder, capsys):
-    assert main([*RUN, "--resume"]) == 2
-    assert "nothing to resume" in capsys.readouterr().err
-    assert not (folder / "out").exists()
-
-
 def test_a_film_that_is_interrupted_takes_nothing_away(folder, monkeypatch, capsys):
-    """Ctrl-C once while the film is drawn, and a second time while the motion is being written."""
-
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 

@@ -14,12 +14,10 @@ import pytest
 
 import rom
 from cases.command import environment, python
+from cases.refusals import refuses
 from cases.solid import block, reduced
 from rom.cli.main import main
-from rom.config.component import read_component
-from rom.errors import ConfigError, ResourceError, RomWarning
 from rom.io import files
-from rom.mbs.integrate.keeping import Keeping
 from rom.names import csv_cell
 from rom.process import child
 
@@ -29,7 +27,6 @@ FULL = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 @pytest.fixture
 def here(tmp_path, monkeypatch):
-    """A folder with a body file in it."""
     monkeypatch.chdir(tmp_path)
     made = reduced(4, block(), reference="root")
     rom.save(made, "bar.rom.npz")
@@ -44,25 +41,18 @@ def test_a_full_temporary_folder_is_named_with_its_variable(here, monkeypatch, c
     assert "TMPDIR" in said and tempfile.gettempdir() in said and "traceback" not in said.lower()
 
 
-@pytest.mark.parametrize("error", [FULL, OSError(errno.EFBIG, ""), OSError(errno.EDQUOT, "")])
-def test_what_lacks_room_inside_a_scratch_folder_says_so(error):
-    with pytest.raises(ResourceError, match=r"no room for files.*TMPDIR"), child.scratch("full"):
-        raise error
-
-
-def test_a_child_that_failed_in_a_full_folder_is_told_the_same(monkeypatch):
-    """Whatever error its end became here; with room it stays what it was."""
-    for room, kind in ((2**40, ConfigError), (0, ResourceError)):
+def test_what_lacks_room_or_a_place_for_a_scratch_folder_says_so(monkeypatch):
+    for number in (errno.ENOSPC, errno.EFBIG, errno.EDQUOT):
+        with pytest.raises(rom.ResourceError, match="TMPDIR"), child.scratch("full"):
+            raise OSError(number, "")
+    for room, kind in ((2**40, rom.ConfigError), (0, rom.ResourceError)):
         monkeypatch.setattr(child.shutil, "disk_usage", lambda _, n=room: SimpleNamespace(free=n))
         with pytest.raises(kind), child.scratch("full"):
-            raise ConfigError("the process that draws ended with code 1.")
-
-
-def test_where_no_folder_takes_a_file_there_is_none(monkeypatch):
+            raise rom.ConfigError("the process that draws ended with code 1.")
     monkeypatch.setattr(tempfile, "tempdir", None)
     lost = FileNotFoundError(errno.ENOENT, "No usable temporary directory found in ['/tmp']")
     monkeypatch.setattr(tempfile, "_get_default_tempdir", lambda *_: (_ for _ in ()).throw(lost))
-    with pytest.raises(ResourceError, match="TMPDIR"), child.scratch("none"):
+    with pytest.raises(rom.ResourceError, match="TMPDIR"), child.scratch("none"):
         pass
 
 
@@ -80,7 +70,7 @@ def test_a_disk_that_is_full_at_the_end_leaves_the_motion_and_says_how_to_go_on(
             raise FULL
         sync(handle)
 
-    monkeypatch.setattr(Keeping, "due", lambda *_: True)
+    monkeypatch.setattr(rom.Keeping, "due", lambda *_: True)
     monkeypatch.setattr(files.os, "fsync", no_room)
     full.append(True)
     assert main([*SWING, "out"]) == 6
@@ -102,38 +92,23 @@ def test_what_takes_long_after_ctrl_c_is_said(here, monkeypatch, capsys):
     assert "Ctrl-C leaves that out" in capsys.readouterr().err
 
 
-OUT = [("../x.rom.npz", False), ("/x.rom.npz", False), ("a/../../x.rom.npz", False),
-       ("link/x.rom.npz", False), ("x.rom.npz", True), ("a/x.rom.npz", True),
-       ("a/../x.rom.npz", True)]  # fmt: skip
-
-
-@pytest.mark.parametrize(("name", "inside"), OUT)
-def test_the_output_of_a_file_stays_in_its_folder(name, inside, tmp_path):
+def test_the_output_of_a_file_stays_in_its_folder(tmp_path):
     folder = tmp_path / "here"
     (folder / "a").mkdir(parents=True)
     (folder / "link").symlink_to(tmp_path)
     file = folder / "part.toml"
-    file.write_text(f'[output]\nfile = "{name}"\n')
-    if inside:
-        assert read_component(file).output == folder / name
-        return
-    with pytest.raises(ConfigError, match=r"output.file.*leads out of the folder"):
-        read_component(file)
+    for name in ("x.rom.npz", "a/x.rom.npz", "a/../x.rom.npz"):
+        file.write_text(f'[output]\nfile = "{name}"\n')
+        assert rom.read_component(file).output == folder / name
+    for name in ("../x.rom.npz", "/x.rom.npz", "a/../../x.rom.npz", "link/x.rom.npz"):
+        file.write_text(f'[output]\nfile = "{name}"\n')
+        refuses(rom.ConfigError, "output.file.*leads out of the folder", rom.read_component, file)
 
 
-CELLS = {"=1+1": "'=1+1", "+cmd": "'+cmd", "-2": "'-2", "@x": "'@x", "\tx": "'\tx",
-         "\rx": "\"'\rx\"", "plain": "plain", "a=b": "a=b", "a,b": '"a,b"',
-         'a "b"': '"a ""b"""', "=a,b": "\"'=a,b\"", "": ""}  # fmt: skip
-
-
-@pytest.mark.parametrize("text", CELLS)
-def test_a_text_in_a_table_is_no_formula_and_one_cell(text):
-    assert csv_cell(text) == CELLS[text]
-    (row,) = csv.reader(io.StringIO(f"{csv_cell(text)},2\n", newline=""))
-    assert row[0].removeprefix("'" if text[:1] in "=+-@\t\r" else "") == text
-
-
-def test_tables_of_motions_have_no_formulas_in_their_heads(tmp_path):
+def test_texts_in_tables_of_motions_too_are_no_formulas_and_one_cell(tmp_path):
+    for text in (*"=1+1 +cmd -2 @x plain a=b a,b =a,b".split(), "\tx", "\rx", 'a "b"', ""):
+        (row,) = csv.reader(io.StringIO(f"{csv_cell(text)},2\n", newline=""))
+        assert row == ["'" * (text[:1] in [*"=+-@\t\r"]) + text, "2"]
     mech = rom.Mechanism(gravity=(0, 0, -9.81))
     for k, name in enumerate(('=HYPERLINK("x")', "+a", "@b")):
         mech.add_rigid(name, mass=1.0, inertia=(1e-2,) * 3, at=(k, 0, 0))
@@ -149,8 +124,7 @@ def test_code_is_trusted_of_oneself_the_administrator_and_who_owns_the_package(t
     file = tmp_path / "code"
     assert child.trusted(file)  # which is not there
     file.touch()
-    modes = {0o644: True, 0o600: True, 0o646: False, 0o777: False}
-    for mode, safe in modes.items():
+    for mode, safe in {0o644: True, 0o600: True, 0o646: False, 0o777: False}.items():
         file.chmod(mode)
         assert child.trusted(file) is safe, oct(mode)
     if os.geteuid() == 0:
@@ -176,7 +150,6 @@ print(len(COMPILED_FUNCTIONS))
 
 
 def test_compiled_code_that_others_may_have_written_is_not_loaded(tmp_path):
-    """Of the folder, and of one file in it."""
     script, code = tmp_path / "twice.py", tmp_path / "code"
     script.write_text(KEPT)
     code.mkdir()
@@ -204,5 +177,5 @@ def test_forms_are_not_taken_from_where_others_may_write(tmp_path, monkeypatch):
     monkeypatch.setattr(jit, "cache_directory", lambda: tmp_path)
     assert jit.usable_cache() == tmp_path
     tmp_path.chmod(0o777)
-    with pytest.warns(RomWarning, match="others may write there"):
+    with pytest.warns(rom.RomWarning, match="others may write there"):
         assert jit.usable_cache() != tmp_path

@@ -20,7 +20,6 @@ from cases.long import few
 from cases.paths import TESTS
 from cases.solid import block, reduced
 from rom.cli.main import main
-from rom.errors import ConfigError, ResourceError
 from rom.io.files import write_whole
 from rom.io.ours import LOCK_NAME, claimed
 from rom.process.mpirun import found, mpirun
@@ -48,7 +47,7 @@ def body():
     return reduced(2, block(cells=(4, 1, 1)), name="b")
 
 
-def test_a_body_file_of_two_writers_is_always_one_of_both(body, tmp_path):
+def test_a_file_of_two_writers_is_always_one_of_both_also_if_one_is_killed(body, tmp_path):
     path, seen = tmp_path / "b.npz", set()
     rom.save(replace(body, name="one"), path)
 
@@ -59,9 +58,6 @@ def test_a_body_file_of_two_writers_is_always_one_of_both(body, tmp_path):
     for _ in together(work, "one", "two"):
         seen.add(rom.load(path).name)  # compares all checksums
     assert seen <= {"one", "two"} and os.listdir(tmp_path) == ["b.npz"]
-
-
-def test_a_writer_that_is_killed_leaves_the_file_of_the_other(tmp_path):
     path = tmp_path / "x.bin"
     path.write_bytes(b"whole")
 
@@ -96,7 +92,7 @@ def held(tmp_path):
 
 def test_a_folder_that_is_written_names_who_does_it(held, body, capsys, monkeypatch):
     folder, process = held
-    with pytest.raises(ResourceError, match=f"process {process.pid} on"), claimed(folder):
+    with pytest.raises(rom.ResourceError, match=f"process {process.pid} on"), claimed(folder):
         pass
     rom.save(body, folder.parent / "b.npz")
     monkeypatch.chdir(folder.parent)
@@ -115,18 +111,15 @@ def test_the_claim_of_a_process_that_is_gone_is_taken_over(held, ending):
     assert not (folder / LOCK_NAME).exists()
 
 
-def test_a_lock_left_by_a_crash_of_the_machine_is_taken_over(tmp_path):
+def test_a_lock_of_a_crash_is_taken_over_and_a_link_is_not_followed(tmp_path):
     (tmp_path / LOCK_NAME).write_text("process 1 on elsewhere")
     with claimed(tmp_path):
         pass
     assert not os.listdir(tmp_path)
-
-
-def test_a_lock_that_is_a_link_is_not_followed(tmp_path):
     (tmp_path / "mine").write_text("text")
     (tmp_path / "out").mkdir()
     os.symlink(tmp_path / "mine", tmp_path / "out" / LOCK_NAME)
-    with pytest.raises(ConfigError, match="is not writable"), claimed(tmp_path / "out"):
+    with pytest.raises(rom.ConfigError, match="is not writable"), claimed(tmp_path / "out"):
         pass
     assert (tmp_path / "mine").read_text() == "text"
 
@@ -146,7 +139,6 @@ def test_a_claim_leaves_a_folder_as_it_was(made_before, tmp_path):
 
 
 def test_one_at_a_time_has_the_folder_however_many_want_it(tmp_path):
-    """A counter that is read and written without a lock of its own would lose some."""
     folder, counter = tmp_path / "out", tmp_path / "counter"
     counter.write_text("0")
 
@@ -156,7 +148,7 @@ def test_one_at_a_time_has_the_folder_however_many_want_it(tmp_path):
                 try:
                     with claimed(folder):
                         counter.write_text(str(int(counter.read_text()) + 1))
-                except ResourceError:
+                except rom.ResourceError:
                     continue
                 break
 
@@ -166,7 +158,6 @@ def test_one_at_a_time_has_the_folder_however_many_want_it(tmp_path):
 
 
 def test_two_runs_into_one_folder_leave_the_files_of_one(body, tmp_path, monkeypatch, capsys):
-    """Each either has the folder for itself or is told who has it."""
     monkeypatch.chdir(tmp_path)
     rom.save(body, "b.npz")
     assert main([*PENDULUM, "-o", "warm"]) in (0, 5)
@@ -249,7 +240,6 @@ if __name__ == "__main__":
 
 
 def test_a_kernel_that_cannot_be_compiled_is_left_to_others(tmp_path):
-    """While the process that tried it lives on, as a notebook does."""
     (tmp_path / "broken.py").write_text(BROKEN)
     with subprocess.Popen([sys.executable, tmp_path / "broken.py"], env=environment(), text=True,
                           stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:  # fmt: skip
@@ -326,7 +316,6 @@ def test_a_rank_has_one_thread_unless_the_user_chooses(numpy_comes, chosen):
 @pytest.mark.fenicsx
 @pytest.mark.mpi
 def test_two_ranks_are_one_writer(body, tmp_path):
-    """Neither keeps the other out of their folder, and both end with what the first one finds."""
     rom.save(body, tmp_path / "b.npz")
     assert command(*PENDULUM, "-o", "out", n=2, cwd=tmp_path).returncode in (0, 5)
     (tmp_path / "out" / "b.csv").write_text("my notes\n")

@@ -9,29 +9,17 @@ import rom
 from cases.mbs.mechanisms import random_body
 from cases.solid import block, reduced
 from rom import errors
-from rom.errors import RomError, RomWarning, UnknownNameError
 
 
 @pytest.mark.once
-@pytest.mark.parametrize(
-    ("message", "expected"),
-    [
-        ("n = -1 must be a whole number.", "n = -1 must be a whole number."),
+def test_the_cure_is_what_is_given_or_the_last_clause_which_is_not_said_twice():
+    for message, cure in (
         ("no body 'a'; the mechanism has ['b'].", "the mechanism has ['b']."),
-        ("a.x has the ending '.x'; known: .mtx, .mm.", "known: .mtx, .mm."),
         ("K has shape (2, 3), needed is (3, 3).", "K has shape (2, 3), needed is (3, 3)."),
         ("the wheel turns. Use 3.5 m", "Use 3.5 m"),
-        ("K is (2, 3); K must be a. b; c", "c"),
-    ],
-)
-def test_the_cure_of_a_message_is_its_last_clause(message, expected):
-    error = errors.ConfigError(message)
-    assert error.hint == expected
-    assert str(error) == message  # what the message says is not said twice
-
-
-@pytest.mark.once
-def test_a_given_hint_is_said_and_kept():
+    ):
+        error = errors.ConfigError(message)
+        assert (error.hint, str(error)) == (cure, message)
     error = errors.ConfigError("n must be 1.", where="here", hint="Leave n out.")
     assert (error.hint, str(error)) == ("Leave n out.", "here: n must be 1. Leave n out.")
     assert errors.FileFormatError("a number is missing.").hint == errors.FileFormatError.advice
@@ -44,10 +32,9 @@ def things(tmp_path_factory):
     mech = rom.Mechanism(gravity=(0, 0, 0))
     solid = {"mass": 1.0, "inertia": (1.0, 1.0, 1.0), "markers": {"m": (1, 0, 0)}}
     a, b = (mech.add_rigid(name, at=(0, 0, z), **solid) for name, z in (("a", 0), ("b", 1)))
-    mech.revolute("hinge", a.marker("m"), mech.ground.marker((1, 0, 0)), axis=(0, 0, 1))
     sol = rom.simulate(mech, t_end=0.02, dt=0.01)
     folder = tmp_path_factory.mktemp("files")
-    for ending in ("SID_FEM", "bdf", "msh", "toml", "op4", "unv", "npz"):
+    for ending in ("SID_FEM", "bdf", "toml", "op4", "unv", "npz"):
         (folder / f"x.{ending}").write_text("$ a text\n")
     return {"model": model, "body": body, "mech": mech, "a": a, "b": b, "state": sol.final,
             "sol": sol, "folder": folder}  # fmt: skip
@@ -60,9 +47,7 @@ WRONG_CALLS = {  # call: words of the message or hint
     "rom.reduce(rom.FEModel, **TO_TIP)": "FEModel is a class; write",
     'rom.reduce(model, interfaces={"root": rom.Polynomial})': r"rom.Polynomial\(order\)",
     'sol.position("a", b.marker("m"))': r"Write \('b', 'm'\)",
-    'sol.position("a", "end")': r"\['m'\]",
     'sol.position(a, "m")': "write 'a'",
-    'mech.drive("d", a, lambda t: t)': "write 'a'",
     'rom.reduce(model, method="rubin", **TO_TIP)':
         r"^reduce: method = 'rubin' must be .* Method \(such as rom.CraigBampton\(n_modes=20\)",
     'mech.revolute("j", a, b.marker("m"), axis=(0, 0, 1))':
@@ -70,18 +55,10 @@ WRONG_CALLS = {  # call: words of the message or hint
     'state.position("a")': "rom.snapshot.mechanism, state",
     "sol.positions": "'position'",
     'mech.add_body("c")': "Write add_rigid, or add_flexible",
-    'mech.add_revolute("c")': "'revolute'",
-    "body.frequency": "'frequencies'",
-    "model.frequencies": r"rom.modes\(model, 12\)",
     'rom.load(folder / "x.SID_FEM")': "rom.read_sid",
     'rom.load(folder / "x.bdf")': "rom.fe.model",
-    'rom.load(folder / "x.msh")': "rom.fe.model",
-    'rom.load(folder / "x.toml")': "rom.read_mechanism",
     'rom.load(folder / "x.op4")': "rom.read_model",
-    'rom.load(folder / "x.unv")': "rom.io.read_responses",
-    'rom.load(folder / "x.npz")': "cut in a transfer",
     'rom.load(folder / "y.npz")': "Relative paths",
-    'rom.units.in_si("3 furlong", "m")': "unit",
     'mech.add_rigid("a", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0))': "in use are",
 }  # fmt: skip
 
@@ -89,21 +66,20 @@ WRONG_CALLS = {  # call: words of the message or hint
 @pytest.mark.once
 @pytest.mark.parametrize("case", WRONG_CALLS)
 def test_a_wrong_call_is_answered_with_the_way_that_works(case, things):
-    with pytest.raises(RomError, match=WRONG_CALLS[case]) as caught:
+    with pytest.raises(rom.RomError, match=WRONG_CALLS[case]) as caught:
         eval(case, globals() | things)
     assert caught.value.hint
 
 
 @pytest.mark.once
 def test_an_unknown_name_is_still_an_attribute_error(things):
-    """So that hasattr, copies and pickles of records go on."""
     assert not hasattr(things["sol"], "positions")
     with pytest.raises(AttributeError) as caught:
         _ = things["mech"]._no_such
-    assert not isinstance(caught.value, RomError)
+    assert not isinstance(caught.value, rom.RomError)
     with pytest.raises(AttributeError, match=r"near are.*'reduce'"):
         _ = rom.Reduce
-    assert issubclass(UnknownNameError, AttributeError)
+    assert issubclass(rom.UnknownNameError, AttributeError)
 
 
 @cache
@@ -131,7 +107,7 @@ CALLS = {  # how the user's line comes to the warning: what is said
 def test_a_warning_names_the_line_outside_the_package(way, tmp_path):
     call, words = CALLS[way]
     rod()
-    with pytest.warns(RomWarning, match=words) as caught:
+    with pytest.warns(rom.RomWarning, match=words) as caught:
         call(tmp_path)
     (one,) = (found for found in caught if words in str(found.message))
     lines = {line for _, _, line in call.__code__.co_lines()}

@@ -4,6 +4,7 @@ import ast
 import csv
 import json
 import os
+import re
 import unicodedata
 import xml.etree.ElementTree as ET
 import zipfile
@@ -12,14 +13,13 @@ from dataclasses import replace
 import pytest
 
 import rom
+from cases.refusals import refuses
 from cases.solid import block, reduced
-from rom.arguments import Quantity
 from rom.cli.main import main
-from rom.config.keys import Named
 from rom.errors import ConfigError, FileFormatError, InterfaceError, RomError
 from rom.io.archive import write_archive
 from rom.io.native import body_arrays, body_manifest
-from rom.names import MAX_CHARACTERS, check_name, check_text, file_name, inside, named, offered
+from rom.names import MAX_CHARACTERS, check_name, check_text, file_name, inside
 
 UNSEEN = ["a\0b", "a\nb", "a\rb", "a\x1b[2Jb", "\u202egnp.x", "a\u200bb", "a\u2028b", "\ud800",
           "x" * 300, "", " "]  # fmt: skip
@@ -30,32 +30,24 @@ HARMLESS = ["$(touch x)", "`touch x`", "~root", "CON", "a;b", "50% (a+b), #3", "
 INJECTED = 'a"""<b>&\'],;=x'
 
 
-@pytest.mark.parametrize("name", [*UNSEEN, 5, None, b"x"])
-def test_what_is_no_visible_line_of_text_names_nothing(name):
-    for check in (check_text, check_name):
-        with pytest.raises(ConfigError, match="name"):
-            check(name, "a body")
-
-
-@pytest.mark.parametrize("name", ELSEWHERE)
-def test_what_leads_elsewhere_may_be_read_but_not_given(name):
-    assert check_text(name, "a body") == name
-    for check in (lambda n: check_name(n, "a body"), file_name):
-        with pytest.raises(ConfigError) as caught:
-            check(name)
-        assert repr(name) in str(caught.value)
-
-
-@pytest.mark.parametrize("name", HARMLESS)
-def test_other_names_are_kept_and_make_one_file(name, tmp_path):
-    assert check_name(name, "a body") == name
-    path = inside(tmp_path, name, ".csv")
-    path.touch()
-    assert os.listdir(tmp_path) == [f"{name}.csv"]
+def test_names_are_visible_and_lead_nowhere_else(tmp_path):
+    for name in (*UNSEEN, 5, None, b"x"):
+        for check in (check_text, check_name):
+            refuses(ConfigError, "name", check, name, "a body")
+    for name in ELSEWHERE:  # which may be read but not given
+        assert check_text(name, "a body") == name
+        refuses(ConfigError, re.escape(repr(name)), check_name, name, "a body")
+        refuses(ConfigError, re.escape(repr(name)), file_name, name)
+    for name in HARMLESS:
+        assert check_name(name, "a body") == name
+        path = inside(tmp_path, name, ".csv")
+        path.touch()
+        assert os.listdir(tmp_path) == [f"{name}.csv"]
+        path.unlink()
+    refuses(ConfigError, "shorter name", file_name, "ピ" * MAX_CHARACTERS, ".rom.npz")
 
 
 def test_every_character_of_unicode_is_either_visible_or_refused():
-    """The categories of characters that Unicode itself calls control, format or not assigned."""
     for code in range(0x3000):
         name = f"a{chr(code)}b"
         hidden = unicodedata.category(chr(code))[0] == "C" or code in (0x2028, 0x2029)
@@ -65,16 +57,6 @@ def test_every_character_of_unicode_is_either_visible_or_refused():
             assert hidden and f"U+{code:04X}" in error.message and name not in error.message
         else:
             assert not hidden
-
-
-def test_a_file_name_fits_into_255_bytes_while_it_is_written():
-    with pytest.raises(ConfigError, match="shorter name"):
-        file_name("ピ" * MAX_CHARACTERS, ".rom.npz")
-
-
-def test_all_names_are_told_up_to_a_line():
-    assert named(["b", 3, "a"]) == "'b', 3, 'a'"
-    assert named(range(30)).endswith("18, 19 and 10 more")
 
 
 @pytest.fixture(scope="module")
@@ -125,43 +107,22 @@ def test_a_body_file_with_that_name_writes_below_its_folder_only(name, body, fol
 def test_a_body_file_with_an_unseen_name_is_not_read(name, body, tmp_path):
     for changed in ({"name": name}, {"name": "b", "marker": name}):
         path = forged(body, tmp_path / "b.npz", **changed)
-        with pytest.raises(FileFormatError, match=r"b\.npz: the name"):
-            rom.load(path)
-
-
-def test_a_body_file_with_a_slash_in_an_interface_stays_readable(body, tmp_path):
+        refuses(FileFormatError, r"b\.npz: the name", rom.load, path)
     assert rom.load(forged(body, tmp_path / "b.npz", "b", "pin/a")).interface_names[0] == "pin/a"
 
 
-def mech_with(body):
-    mech = rom.Mechanism()
-    return mech, mech.ground.marker((0, 0, 0)), mech.add_flexible("b", body).marker("root")
-
-
-def jointed(name, body):
-    mech, ground, root = mech_with(body)
-    mech.fixed(name, ground, root)
-
-
-def loaded(name, body):
-    mech, _, root = mech_with(body)
-    mech.force(name, root, (0, 0, 1.0))
-
-
-GIVEN = {
-    "reduce": lambda name, body: reduced(0, block(cells=(1, 1, 1)), name=name),
-    "rigid body": lambda name, body: rom.Mechanism().add_rigid(
-        name, mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0)),
-    "flexible body": lambda name, body: rom.Mechanism().add_flexible(name, body),
-    "joint": jointed, "force": loaded,
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("way", GIVEN)
 @pytest.mark.parametrize("name", UNSEEN + ELSEWHERE)
-def test_no_thing_is_given_such_a_name(way, name, body):
-    with pytest.raises(ConfigError, match="name"):
-        GIVEN[way](name, body)
+def test_no_thing_is_given_such_a_name(name, body):
+    mech = rom.Mechanism()
+    ground, root = mech.ground.marker((0, 0, 0)), mech.add_flexible("b", body).marker("root")
+    for give in (
+        lambda: reduced(0, block(cells=(1, 1, 1)), name=name),
+        lambda: mech.add_rigid(name, mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0)),
+        lambda: mech.add_flexible(name, body),
+        lambda: mech.fixed(name, ground, root),
+        lambda: mech.force(name, root, (0, 0, 1.0)),
+    ):
+        refuses(ConfigError, "name", give)
 
 
 @pytest.mark.parametrize("name", UNSEEN)
@@ -191,25 +152,9 @@ def test_the_command_line_refuses_it_before_the_computation(name, folder, capsys
     assert listing(folder.parents[1]) == before
 
 
-def test_a_table_of_a_description_tells_the_line_of_a_wrong_name(tmp_path):
-    from rom.config.document import parsed
-    from rom.config.keys import Place
-
-    document = parsed('good = 1.0\n"a\\u202eb" = 2.0\n', tmp_path / "x.toml")
-    place = Place(document)
-    assert list(Named(Quantity(), "points").read(document.data, place)) == ["good"]
-    assert "U+202E" in str(place.mistakes[0])
-
-
-@pytest.fixture(scope="module")
-def marked(body):
-    """A body whose name and interface hold every character that other formats could trip over."""
-    markers = {INJECTED if n == "tip" else n: m for n, m in body.markers.items()}
-    markers = {n: replace(m, name=n) for n, m in markers.items()}
-    return replace(body, name=INJECTED, markers=markers)
-
-
-def test_names_do_not_break_out_of_xml(marked, tmp_path):
+def test_names_do_not_break_out_of_xml_tables_and_programs(body, tmp_path, folder):
+    tip = replace(body.markers["tip"], name=INJECTED)
+    marked = replace(body, name=INJECTED, markers={"root": body.markers["root"], INJECTED: tip})
     labelled = replace(marked, labels=(INJECTED,) * marked.n_modes)
     root = ET.parse(rom.export(labelled, tmp_path / "x.vtu")).getroot()
     fields = [e.get("Name") for e in root.iterfind(".//PointData/DataArray")]
@@ -219,9 +164,6 @@ def test_names_do_not_break_out_of_xml(marked, tmp_path):
         told = ET.fromstring(archive.read("modelDescription.xml"))
     assert not [name for name in names if name.startswith("/") or ".." in name]
     assert any("<b>" in v.get("name") for v in told.iter("ScalarVariable"))
-
-
-def test_names_do_not_break_out_of_tables_and_programs(marked, folder):
     rom.save(marked, folder / "b.npz")
     assert main(["simulate", "b.npz", "--hinge", "root", "--t-end", "2e-6", "--dt", "1e-6",
                  "-o", "out", "--history", "csv"]) in (0, 5)  # fmt: skip
@@ -250,8 +192,7 @@ def test_all_that_is_missing_is_named(body, tmp_path):
     model = block(cells=(1, 1, 1))
     with pytest.raises(InterfaceError, match="'a', 'b'; there are"):
         rom.reduce(model, method=rom.Guyan(), interfaces={"a": "rbe2", "root": "rbe2", "b": "full"})
-    with pytest.raises(InterfaceError, match="'a', 'b'; there are"):
-        body.frequencies(3, fixed=("a", "root", "b"))
+    refuses(InterfaceError, "'a', 'b'; there are", body.frequencies, 3, fixed=("a", "root", "b"))
     arrays = body_arrays(body)
     for gone in (("K", "D"), ("marker/0/hold", "marker/1/point", "surface/shape")):
         left = {name: A for name, A in arrays.items() if name not in gone}
@@ -260,13 +201,6 @@ def test_all_that_is_missing_is_named(body, tmp_path):
             rom.load(path)
         assert not [name for name in gone if repr(name) not in caught.value.message]
         assert caught.value.where == str(path)
-
-
-def test_few_names_are_all_offered_and_of_many_the_most_alike():
-    assert offered({"b", "a"}, "c") == "['a', 'b']" and offered((), "c") == "[]"
-    many = [f"rod.{k}" for k in range(150)] + ["wrist pin", "crank pin"]
-    text = offered(many, "wrist_pin")
-    assert text.startswith("['wrist pin', 'crank pin'") and text.endswith("] and 144 more")
 
 
 def test_a_body_that_is_none_of_hundreds_is_answered_in_one_line():

@@ -7,7 +7,7 @@ import pytest
 
 import rom
 from cases.solid import block, reduced
-from rom.model import Modes, Report, Row
+from rom.model import Report, Row
 from rom.notebook import MAX_ROWS, html_table, listed
 
 
@@ -35,62 +35,23 @@ class Cells(HTMLParser):
             self.rows[-1][-1] += data
 
 
-@pytest.fixture(scope="module")
-def bar():
-    return reduced(4, block(cells=(4, 1, 1)), name="<b>bar")
-
-
-@pytest.fixture(scope="module")
-def motion():
-    mech = rom.Mechanism(gravity=(0, 0, -9.81))
-    bob = mech.add_rigid(
-        "<bob>", mass=2.5, inertia=(1, 1, 1), at=(1, 0, 0), markers={"o": (0, 0, 0)}
-    )
-    mech.spherical("pivot", mech.ground.marker((1, 0, 0)), bob.marker("o"))
-    mech.event("never", lambda t, instant: 1.0 + t)
-    return rom.simulate(mech, t_end=0.01, dt=1e-3)
-
-
-def test_texts_are_escaped_and_numbers_short():
+def test_texts_are_escaped_numbers_short_and_long_tables_cut():
     text = html_table("a < b", ("x", "y"), [("<script>", 1.23456789), (3, np.float64(2e-9))])
     assert "<script>" not in text and text.startswith("<div><b>a &lt; b</b>")
     assert Cells(text).rows == [["x", "y"], ["<script>", "1.2346"], ["3", "2e-09"]]
-
-
-def test_long_tables_say_how_long_they_are():
     rows = Cells(html_table("", ("k",), [(k,) for k in range(MAX_ROWS + 7)])).rows
     assert len(rows) == MAX_ROWS + 2 and rows[-1] == ["and 7 more"]
     assert listed("abcdefghij") == "a, b, c, d, e, f, g, h, and 2 more" and listed(()) == "none"
 
 
-def test_a_body(bar):
+def test_a_body():
+    bar = reduced(4, block(cells=(4, 1, 1)), name="<b>bar")
     rows = dict(Cells(bar._repr_html_()).rows)
     assert float(rows["mass [kg]"]) == pytest.approx(bar.mass, rel=1e-4)
     assert rows["interface tip"].startswith("rbe2 at [1.0, ") and rows["certificate"] == "none"
     assert rows["elastic coordinates"] == str(bar.n_modes)
     assert "<b>bar" not in bar._repr_html_()
     assert repr(bar).startswith("FlexibleBody('<b>bar': 62.8 kg, ") and len(repr(bar)) < 200
-
-
-def test_a_model_prints_in_one_line():
-    model = block(cells=(4, 1, 1))
-    assert repr(model) == "FEModel(60 dofs, regions none, interfaces root, tip)"
-    root = model.interfaces["root"]
-    assert repr(root).startswith("Interface('root': 4 nodes, origin (0, ")
-    rows = dict(Cells(model._repr_html_()).rows)
-    assert rows["nodes"] == "20" and rows["interface root"] == repr(root)
-    basis = rom.Basis(np.ones((60, 9)), np.ones(3), ("mode",) * 9)
-    assert repr(basis) == "Basis(9 columns of 60 rows, 3 of them modes)"
-
-
-def test_bodies_and_joints_of_a_mechanism_print_in_one_line(bar, motion):
-    mech = rom.Mechanism(gravity=(0, 0, 0))
-    rod = mech.add_flexible("rod", bar)
-    words = f"flexible, {bar.n_modes} elastic coordinates, {bar.mass:.5g} kg, markers root, tip"
-    assert repr(rod) == f"Part('rod': {words})"
-    assert repr(motion.mechanism.part("<bob>")) == "Part('<bob>': rigid, 2.5 kg, markers o)"
-    pivot = motion.mechanism.joints["pivot"]
-    assert repr(pivot) == "Joint('pivot': spherical, ground.(1.0, 0.0, 0.0) to <bob>.o)"
 
 
 def test_a_report_begins_with_what_fails():
@@ -102,14 +63,12 @@ def test_a_report_begins_with_what_fails():
     assert [row.quantity for row in report.failures] == ["bad"]
 
 
-def test_modes():
-    modes = Modes(2 * np.pi * np.array([10.0, 25.5]), np.zeros((6, 2)), np.array([1e-9, 2e-9]))
-    assert Cells(modes._repr_html_()).rows[1:] == [["1", "10", "1e-09"], ["2", "25.5", "2e-09"]]
-    assert repr(modes) == "Modes(2 modes, 10 to 25.5 Hz)"
-    assert repr(Modes(*np.zeros((3, 0)))) == "Modes(none)"
-
-
-def test_a_motion_and_its_mechanism(motion):
+def test_a_motion_and_its_mechanism():
+    mech, markers = rom.Mechanism(gravity=(0, 0, -9.81)), {"o": (0, 0, 0)}
+    bob = mech.add_rigid("<bob>", mass=2.5, inertia=(1, 1, 1), at=(1, 0, 0), markers=markers)
+    mech.spherical("pivot", mech.ground.marker((1, 0, 0)), bob.marker("o"))
+    mech.event("never", lambda t, instant: 1.0 + t)
+    motion = rom.simulate(mech, t_end=0.01, dt=1e-3)
     rows = dict(Cells(motion._repr_html_()).rows)
     assert rows["instants"] == "11" and rows["bodies"] == "<bob>"
     assert rows["event never"] == "0 times"

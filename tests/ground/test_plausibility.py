@@ -10,9 +10,9 @@ from numpy.testing import assert_allclose
 import rom
 from cases.files.cells import solid as solid_mesh
 from cases.files.step_parts import step_box
+from cases.refusals import refuses
 from cases.solid import STEEL, block, reduced
 from rom.body.conversion import Factors
-from rom.body.rotating import rotating_frequencies
 from rom.body.stiffening import known_loads
 from rom.components.cosserat import HelicalSpring
 from rom.components.gear_mesh import GearPair, RackPair
@@ -29,33 +29,24 @@ from rom.units import unit_system
 
 
 def said(make):
-    """What a call warns of."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         make()
     return [str(w.message) for w in caught if issubclass(w.category, RomWarning)]
 
 
-def moduli(E, nu, rho):
-    return rom.Orthotropic((E, E, E), (nu,) * 3, (E / 2.6,) * 3, rho)
-
-
 WAYS = {
     "material": rom.Material,
-    "orthotropic": moduli,
+    "orthotropic": lambda E, nu, rho: rom.Orthotropic((E,) * 3, (nu,) * 3, (E / 2.6,) * 3, rho),
     "replace": lambda E, nu, rho: replace(rom.Material(210e9, nu, 7850.0), E=E, rho=rho),
 }
 WRONG = {  # E, rho: what is said
     "E in MPa": (2.1e5, 7850.0, "5.172 m/s"),
-    "E in GPa": (210.0, 7850.0, "0.1636 m/s"),
     "rho in g/cm^3": (210e9, 7.85, "1.636e+05 m/s"),
     "mm, t, s": (2.1e5, 7.85e-9, "from_units('mm-t-s'"),
     "mm, kg, ms": (210.0, 7.85e-6, "from_units('mm-kg-ms'"),
-    "kPa and t/m^3": (210e6, 7.85, "7.85 kg/m^3"),
     "rho in g/m^3": (210e9, 7.85e6, "7.85e+06 kg/m^3"),
     "MPa and g/cm^3": (2.1e5, 7.85, "7.85 kg/m^3"),
-    "MPa and g/cm^3, aluminium": (7e4, 2.7, "2.7 kg/m^3"),
-    "E in kPa": (2.1e8, 7850.0, "163.6 m/s"),
     "E in psi": (3.05e7, 7850.0, "62.33 m/s"),
     "ksi and lb/in^3": (3.05e4, 0.284, "0.284 kg/m^3"),
     "just too slow": (9.5e4, 1000.0, "9.747 m/s"),
@@ -99,20 +90,12 @@ def test_limits_follow_the_units_that_are_declared(units, E, rho):
         assert_allclose([np.max(solid.E), solid.rho], [210e9, 7850.0], rtol=1e-14)
 
 
-DAMPING = {
-    "beyond one": (2.0, "2 per cent write 0.02"),
-    "negative": (-0.01, "-0.01 is negative"),
-    "just beyond one": (1.01, "1.01 per cent write 0.0101"),
-}
-
-
 @pytest.mark.parametrize("many", [False, True], ids=["one", "list"])
-@pytest.mark.parametrize("case", DAMPING.values(), ids=DAMPING)
-def test_damping_that_no_structure_has_is_refused(case, many):
-    ratio, words = case
-    with pytest.raises(ConfigError, match="ratio = ") as caught:
-        rom.ModalDamping([0.01, ratio] if many else ratio)
-    assert words in str(caught.value)
+@pytest.mark.parametrize(
+    ("ratio", "words"), [(2.0, "2 per cent"), (-0.01, "-0.01"), (1.01, "0.0101")]
+)
+def test_damping_that_no_structure_has_is_refused(ratio, words, many):
+    refuses(ConfigError, f"ratio = .*{words}", rom.ModalDamping, [0.01, ratio] if many else ratio)
 
 
 @pytest.mark.parametrize(("share", "n"), [(0.2, 0), (0.5, 1), (3.0, 1)])
@@ -125,8 +108,7 @@ def test_rayleigh_is_doubted_by_its_lowest_mode(part, share, n):
 def test_the_line_of_a_damping_ratio_in_a_file_is_told(tmp_path):
     path = tmp_path / "part.toml"
     path.write_text('[geometry]\nfile = "part.geo"\n[damping]\nratio = 2.0\n')
-    with pytest.raises(ConfigError, match=r"part.toml:\d.*= 2 is beyond"):
-        rom.read_component(path).damping()
+    refuses(ConfigError, r"part.toml:\d.*= 2 is beyond", rom.read_component(path).damping)
 
 
 def pendulum(at=(0.0, 0.0, 0.0)):
@@ -137,16 +119,17 @@ def pendulum(at=(0.0, 0.0, 0.0)):
     return mech
 
 
-SPRINGS = {
-    "spring": lambda m, **k: m.spring_damper(
-        "soft", m.ground.marker((0, 0, 1)), m.parts["bob"].marker("a"), **k
-    ),
-    "turn": lambda m, **k: m.rotational_spring("soft", "pin", **k),
-}
+def on_spring(**how):
+    mech = pendulum()
+    ends = mech.ground.marker((0, 0, 1)), mech.parts["bob"].marker("a")
+    mech.spring_damper("soft", *ends, **{"stiffness": 5.0} | how)
+
+
+def on_turning_spring(**how):
+    pendulum().rotational_spring("soft", "pin", **{"stiffness": 5.0} | how)
 
 
 def in_film(**how):
-    """A journal in a film."""
     mech = rom.Mechanism()
     rotor = mech.add_rigid("rotor", mass=1.0, inertia=(1e-2,) * 3, at=(0, 0, 0))
     ends = rotor.marker((0, 0, 0)), mech.ground.marker((0, 0, 0))
@@ -155,7 +138,6 @@ def in_film(**how):
 
 
 def geared(**how):
-    """Two wheels in mesh."""
     mech, pair = rom.Mechanism(), GearPair((26, 40), 4e-3, 0.03)
     ends = [mech.add_rigid(name, mass=1, inertia=(1, 1, 1), at=(x, 0, 0)).marker((0, 0, 0))
             for name, x in (("a", 0.0), ("b", pair.distance))]  # fmt: skip
@@ -189,7 +171,6 @@ SLIPS = {  # what is made of a number, the number, the same in another unit, wha
 
 @pytest.mark.parametrize("case", SLIPS)
 def test_components_doubt_what_looks_like_another_unit(case):
-    """A warning names the number, what is usual and the slip; it is never refused."""
     make, meant, slipped, words = SLIPS[case]
     assert not [text for text in said(lambda: make(meant)) if "looks like" in text or "; " in text]
     found = said(lambda: make(slipped))
@@ -201,7 +182,6 @@ def rigid(**how):
 
 
 def carrying(inertia, at=None):
-    """A model with something on an interface."""
     carried = rom.Attachment("tip", 1.0, inertia * np.eye(3), at)
     rom.mass_properties(replace(block(cells=(2, 1, 1)), attachments=(carried,)))
 
@@ -224,14 +204,10 @@ DOUBTED = {  # what is made of a number, numbers taken in silence, numbers doubt
     "point": (lambda x: rigid(inertia=(x,) * 3, markers={"a": (1, 0, 0)}), (1e-9,), ()),
     "inertia alone": (lambda x: rigid(inertia=(x,) * 3, markers={"a": (0, 0, 0)}), (), (1e12,),
                       "1e+06 m", "'bob'"),
-    "spring": (lambda x: SPRINGS["spring"](pendulum(), stiffness=x, damping=0.0), (5.0, 0.0),
-               (-5.0,), "the stiffness of 'soft' is -5;"),
-    "turn": (lambda x: SPRINGS["turn"](pendulum(), stiffness=x, damping=0.0), (5.0, 0.0),
-             (-5.0,), "the stiffness of 'soft' is -5;"),
-    "damper": (lambda x: SPRINGS["spring"](pendulum(), stiffness=5.0, damping=x), (0.0, 1.0),
-               (-2.0,), "the damping of 'soft' is -2;"),
-    "turn that damps": (lambda x: SPRINGS["turn"](pendulum(), stiffness=5.0, damping=x), (0.0, 1.0),
-                        (-2.0,), "the damping of 'soft' is -2;"),
+    "spring": (lambda x: on_spring(stiffness=x), (5.0, 0.0), (-5.0,), "stiffness of 'soft' is -5;"),
+    "turn": (lambda x: on_turning_spring(stiffness=x), (5.0, 0.0), (-5.0,), "'soft' is -5;"),
+    "damper": (lambda x: on_spring(damping=x), (0.0, 1.0), (-2.0,), "damping of 'soft' is -2;"),
+    "turn that damps": (lambda x: on_turning_spring(damping=x), (0.0, 1.0), (-2.0,), "is -2;"),
     "friction of a stop": (lambda mu: Impact(stiffness=1e5, mu=mu), (0.0, 0.3, 2.0), (30.0,),
                            "friction", "is 30;"),
     "friction": (lambda mu: pendulum().friction("rub", "pin", mu=mu, radius=0.01,
@@ -244,8 +220,7 @@ DOUBTED = {  # what is made of a number, numbers taken in silence, numbers doubt
     "joints far away": (lambda x: rom.simulate(pendulum(at=(x, 0, 0)), t_end=2e-3, dt=1e-3),
                         (0.0, 1e3), (1e6,), "1e+06 m from the origin"),
     "size of a mesh": (mesh_of, (1.0, 1e-5, 3e3), (1e-8, 1e5), "the size of the mesh"),
-    "place of a mesh": (lambda x: mesh_of(shift=x), (50.0,), (), ""),
-    "mesh far away": (lambda x: mesh_of(shift=x), (), (1e6,), "12 of 16 digits"),
+    "mesh far away": (lambda x: mesh_of(shift=x), (50.0,), (1e6,), "12 of 16 digits"),
     "mesh away": (lambda x: mesh_of(shift=x), (), (3e3,), "7 of 16 digits"),
 }  # fmt: skip
 
@@ -257,11 +232,6 @@ def test_numbers_of_no_machine_are_doubted_and_those_of_machines_are_not(case):
     for x in doubted:
         (text,) = set(said(lambda x=x: make(x)))
         assert not [word for word in words if word.format(x) not in text], text
-
-
-def test_a_negative_length_is_refused_with_its_spring():
-    with pytest.raises(ConfigError, match="'soft': free_length = -1 must"):
-        SPRINGS["spring"](pendulum(), stiffness=1.0, free_length=-1.0)
 
 
 @pytest.mark.parametrize(
@@ -330,7 +300,6 @@ MATRICES = {
     "nodes in mm": ({"x": 1e3}, "the speed of sound"),
     "nodes in km": ({"x": 1e-3}, "the mass over the volume"),
     "E in MPa": ({"k": 1e-6}, "the speed of sound"),
-    "mass in t": ({"m": 1e-3}, "the speed of sound"),
     "mass in g": ({"m": 1e3}, "the mass over the volume"),
     "rubber": ({"material": rom.Material(1e6, 0.45, 1100.0)}, ""),
 }
@@ -402,7 +371,7 @@ def test_geometric_stiffness_keeps_its_meaning_in_other_units(part):
 
     def hertz(body, length=1.0):
         at = length * np.array([2.0, 1.0, 3.0])
-        return rotating_frequencies(body, 3.0, (0.0, 0.6, 0.8), fixed=("root",), at=at)
+        return rom.body.rotating_frequencies(body, 3.0, (0.0, 0.6, 0.8), fixed=("root",), at=at)
 
     stiff = replace(part, K_geo={load: 1e3 * A for load, A in part.K_geo.items()})
     wanted = hertz(stiff)
@@ -524,8 +493,7 @@ def test_loads_may_jump():
     assert said(lambda: rom.simulate(mech, t_end=0.05, dt=1e-3)) == []
 
 
-@pytest.mark.parametrize(("distance", "n"), [(99.0, 0), (1e3, 1), (1e6, 1)])
-def test_digits_lost_are_two_for_each_factor_of_ten(distance, n):
-    text = far_doubt(distance, 1.0, "it")
-    assert bool(text) == bool(n)
-    assert not n or f"about {2 * np.log10(distance):.0f} of 16" in text
+def test_digits_lost_are_two_for_each_factor_of_ten():
+    assert not far_doubt(99.0, 1.0, "it")
+    assert "about 6 of 16" in far_doubt(1e3, 1.0, "it")
+    assert "about 12 of 16" in far_doubt(1e6, 1.0, "it")

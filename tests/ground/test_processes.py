@@ -55,7 +55,6 @@ HYDRA = "HYDRA build details:\n    Version:                                 5.0.
 
 
 def fake(folder, said, code=0):
-    """A launcher that says its version."""
     folder.mkdir(exist_ok=True)
     path = folder / "mpirun"
     path.write_text(f"#!/bin/sh\ncat <<'EOF'\n{said}EOF\nexit {code}\n")
@@ -89,8 +88,7 @@ def test_a_launcher_that_cannot_be_started_has_no_version(tmp_path):
     assert mpirun.version(str(tmp_path / "mpirun")) == ""
 
 
-def test_the_launcher_beside_this_python_comes_before_that_of_the_system(places):
-    """Wheels of MPI bring their own, also into an environment that nobody has activated."""
+def test_the_launcher_beside_this_python_comes_first_and_is_told_what_it_knows(places):
     beside, system = places
     theirs = fake(system, OPEN_MPI)
     assert mpirun.found() == theirs
@@ -98,10 +96,6 @@ def test_the_launcher_beside_this_python_comes_before_that_of_the_system(places)
     assert mpirun.found() == ours
     Path(ours).chmod(0o644)
     assert mpirun.found() == theirs
-
-
-def test_only_open_mpi_is_told_that_there_may_be_more_processes_than_cores(places):
-    """MPICH allows it, and does not know the word."""
     beside, system = places
     theirs = fake(system, OPEN_MPI)
     assert mpirun.mpirun(3) == [theirs, "--oversubscribe", "-n", "3"]
@@ -116,7 +110,7 @@ def test_no_launcher_is_said(places, monkeypatch):
         mpirun.mpirun(2)
 
 
-def test_a_handler_of_the_user_is_left_alone():
+def test_a_handler_of_the_user_and_another_thread_are_left_alone():
     heard = []
     signal.signal(signal.SIGTERM, lambda *_: heard.append(1))
     try:
@@ -125,6 +119,16 @@ def test_a_handler_of_the_user_is_left_alone():
         assert heard == [1]
     finally:
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    seen = []
+
+    def work():
+        with terminable():
+            seen.append(signal.getsignal(signal.SIGTERM))
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    assert seen == [signal.SIG_DFL]
 
 
 def test_ctrl_c_raises_inside_though_a_library_lets_it_end_the_process():
@@ -136,19 +140,6 @@ def test_ctrl_c_raises_inside_though_a_library_lets_it_end_the_process():
         assert signal.getsignal(signal.SIGINT) is signal.SIG_DFL
     finally:
         signal.signal(signal.SIGINT, before)
-
-
-def test_another_thread_changes_nothing():
-    seen = []
-
-    def work():
-        with terminable():
-            seen.append(signal.getsignal(signal.SIGTERM))
-
-    thread = threading.Thread(target=work)
-    thread.start()
-    thread.join()
-    assert seen == [signal.SIG_DFL]
 
 
 def test_the_process_cleans_up_and_ends_by_sigterm():

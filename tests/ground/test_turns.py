@@ -32,7 +32,7 @@ def hold(*paths):
     return process
 
 
-def test_a_turn_ends_with_the_process_that_has_it_whatever_ends_that(tmp_path):
+def test_a_turn_ends_with_its_process_or_when_it_is_over(tmp_path):
     turns, path = Turns(), tmp_path / "made"
     with hold(path) as other:
         assert not turns.take(path, wait=False)
@@ -41,9 +41,6 @@ def test_a_turn_ends_with_the_process_that_has_it_whatever_ends_that(tmp_path):
         os.kill(other.pid, 9)
         assert turns.take(path)
     assert time.perf_counter() - began < 60
-
-
-def test_who_waits_goes_on_when_the_turn_is_over(tmp_path):
     turns, paths = Turns(), [tmp_path / name for name in "abc"]
     assert all(turns.take(path) for path in paths[1:])
     with hold(*paths) as other:
@@ -72,19 +69,15 @@ def test_processes_that_would_wait_for_each_other_do_not(tmp_path):
         other.kill()
 
 
-@pytest.mark.parametrize("folder", ["missing", "file"])
-def test_nobody_waits_where_there_can_be_no_locks(tmp_path, folder):
-    (tmp_path / "file").touch()
-    turns, path = Turns(), tmp_path / folder / "made"
-    assert not turns.take(path)
-    turns.end_all()
-
-
-def test_a_turn_leaves_one_file_in_the_folder(tmp_path):
+def test_turns_leave_one_file_in_the_folder_and_nobody_waits_where_there_is_none(tmp_path):
     turns = Turns()
     assert turns.take(tmp_path / "a") and turns.take(tmp_path / "b") and turns.take(tmp_path / "a")
     turns.end_all()
     assert os.listdir(tmp_path) == [LOCK_FILE]
+    (tmp_path / "file").touch()
+    for folder in ("missing", "file"):
+        assert not turns.take(tmp_path / folder / "made")
+    turns.end_all()
 
 
 class Clock:

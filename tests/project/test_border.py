@@ -18,12 +18,12 @@ import pytest
 
 import rom
 import rom.view
-from cases.files.border_calls import body, calls, mistuned
+from cases.files.border_calls import SKIPPED, body, calls, mistuned
 from cases.files.docstrings import public
 from cases.paths import ROOT
+from cases.refusals import refuses
 from rom.arguments.border import _Border, _taken
 from rom.arguments.kinds import Unfit, parameters_of
-from rom.errors import RomError
 
 SECONDS = 5.0  # a wrong argument is refused before work starts
 WRONG = {str(x): x for x in (None, -1, 0, 1.5, np.nan, np.inf, True)} | {
@@ -46,7 +46,7 @@ WRONG = {str(x): x for x in (None, -1, 0, 1.5, np.nan, np.inf, True)} | {
 }
 BEYOND = {  # wrong values that annotations do not rule out: arguments by which they are refused
     ("-1",): "simulate.t_end modes.f_max equilibrium.steps write_animation.frames Density.low "
-    "craig_bampton.n_modes second_order_balanced_truncation.r reduce_parametric.tol "
+    "craig_bampton.n_modes second_order_balanced_truncation.r "
     "FlexibleBody.frequencies.n BalancedTruncation.pool Polynomial.order",
     ("-1", "0"): "modes.n write_history.every Solution.to_pandas.every Characteristic.n "
     "Snapshots.n Assembly.reduced.n_interface Material.E Material.rho",
@@ -60,11 +60,11 @@ BEYOND = {  # wrong values that annotations do not rule out: arguments by which 
     ("text", "nan", "five numbers", "complex"): "Mechanism.force.vector",
 }
 REFUSED_AS_THEY_ARE = set(  # legal calls that lack more than arguments: a file, a mesh, a film
-    "BladedWheel.amplification BladedWheel.response FlexibleBody.critical_loads "
+    "FlexibleBody.critical_loads "
     "FlexibleBody.equilibria Mechanism.capsule_on_capsule Mechanism.distance Mechanism.law "
-    "certify_pieces periodic_path read_component read_mechanism reduce_sector surface_load "
+    "certify_pieces read_component read_mechanism surface_load "
     "write_body_fmu write_fmu write_mechanism_fmu write_stress write_stress_history "
-    "Solution.element Solution.journal_bearing Solution.law Solution.stress Solution.to_pandas "
+    "Solution.element Solution.law Solution.stress Solution.to_pandas "
     "Solution.to_xarray".split()
 )
 # pairs of argument and value, fewer without finite elements; a lost annotation takes some away
@@ -79,8 +79,6 @@ class TooSlow(Exception):
 
 @contextmanager
 def limited(seconds):
-    """Raise `TooSlow` inside after some time."""
-
     def stop(number, frame):
         raise TooSlow
 
@@ -119,7 +117,7 @@ def outcome(function, given, wrong, argument, must):
         with limited(SECONDS), warnings.catch_warnings():
             warnings.simplefilter("ignore")
             function(**given | {argument: wrong})
-    except RomError as error:
+    except rom.RomError as error:
         COUNTED["refused"] += 1
         COUNTED["named"] += argument in str(error)
         return f"exit code 1: {error}" if error.exit_code == 1 else None
@@ -137,25 +135,25 @@ def outcome(function, given, wrong, argument, must):
 @pytest.mark.parametrize("label", calls())
 def test_a_wrong_argument_is_a_mistake_of_the_user_and_named(label, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    call = calls()[label]
+    make, arguments = calls()[label]
     COUNTED["callables"] += 1
-    function, legal_call = call.make()
+    function, legal_call = make()
     # compiles what is not yet, untimed
-    with suppress(*[RomError] * (label in REFUSED_AS_THEY_ARE)), warnings.catch_warnings():
+    with suppress(*[rom.RomError] * (label in REFUSED_AS_THEY_ARE)), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         function(**legal_call)
         if label == "simulate":
             function(**legal_call | {"dt": None})
-    found, made, legal = {}, call.make(), COUNTED["legal"]
+    found, made, legal = {}, make(), COUNTED["legal"]
     refused = beyond(label)
-    assert {argument for argument, _ in refused} <= {*call.arguments}
-    for argument in call.arguments:
+    assert {argument for argument, _ in refused} <= {p.name for p in arguments}
+    for argument in (p.name for p in arguments):
         for kind, wrong in WRONG.items():
-            if (argument, kind) not in call.skipped:
+            if kind not in SKIPPED.get((label, argument), ()):
                 must = (argument, kind) in refused
                 found[f"{argument}={kind}"] = outcome(*made, wrong, argument, must)
             if COUNTED["legal"] > legal and label.startswith("Mechanism."):  # it has changed
-                made, legal = call.make(), COUNTED["legal"]
+                made, legal = make(), COUNTED["legal"]
     bad = [f"{label}: {case}: {what}" for case, what in found.items() if what]
     assert not bad, "\n".join(bad)
 
@@ -173,14 +171,13 @@ def at_the_border():
 
 @pytest.mark.once
 def test_every_function_refuses_what_its_annotations_rule_out():
-    """By the name of the argument, before it looks at the rest, in components too."""
     ruled, bad = 0, []
     for name, function, own in at_the_border():
         for argument, kind in ruled_out(function):
             ruled += 1
             try:
                 function(*own, **{argument: WRONG[kind]})
-            except RomError as error:
+            except rom.RomError as error:
                 bad += [f"{name}: {argument}={kind}: {error}"] * (argument not in str(error))
             else:
                 bad.append(f"{name}: {argument}={kind} is taken")
@@ -213,7 +210,6 @@ def test_limits_and_units_of_numbers_are_those_on_record():
 
 @pytest.mark.once
 def test_nearly_every_refusal_names_the_argument(capsys):
-    """Of the calls above; the others name what the argument belongs to, a joint or an interface."""
     if not COUNTED["callables"]:
         pytest.skip("counts the cases of the test above")
     share = COUNTED["named"] / COUNTED["refused"]
@@ -222,21 +218,17 @@ def test_nearly_every_refusal_names_the_argument(capsys):
     assert share > 0.97
 
 
-@pytest.mark.parametrize("given", [{}, {"body": 1, "path": "x", "ending": ".npz"}])
-def test_missing_arguments_are_a_type_error_of_python(given):
-    """As everywhere; what is there and wrong is told first."""
-    with pytest.raises(TypeError if not given else rom.ConfigError):
-        rom.save(**given)
-    with pytest.raises(TypeError, match="unexpected keyword"):
-        rom.save(body(), "x", ending=".npz")
+def test_missing_arguments_are_a_type_error_of_python():
+    refuses(TypeError, "", rom.save)
+    refuses(rom.ConfigError, "", rom.save, body=1, path="x", ending=".npz")
+    refuses(TypeError, "unexpected keyword", rom.save, body(), "x", ending=".npz")
 
 
-@pytest.mark.parametrize("function", [rom.reduce_parametric, rom.reduce_sector, rom.linearize])
-def test_large_deflection_is_refused_by_name_where_it_is_not_taken(function):
-    with pytest.raises(
-        rom.ConfigError, match=rf"{function.__name__}: .* is for rom\.reduce, .*out"
-    ):
-        function(nonlinear=rom.Geometric({"tip": (0, 1.0, 0, 0, 0, 0)}))
+def test_large_deflection_is_refused_by_name_where_it_is_not_taken():
+    loads = rom.Geometric({"tip": (0, 1.0, 0, 0, 0, 0)})
+    for function in (rom.reduce_parametric, rom.reduce_sector, rom.linearize):
+        words = rf"{function.__name__}: .* is for rom\.reduce, .*out"
+        refuses(rom.ConfigError, words, function, nonlinear=loads)
 
 
 def test_forces_with_a_phase_are_numbers():

@@ -35,11 +35,6 @@ def test_demo_ends_in_the_numbers_expected(demo, tmp_path, monkeypatch):
     assert not found
 
 
-def test_what_is_left_to_make_long_exists():
-    """A name that is none would let a demo run twice, or hide that all are left."""
-    assert {demo.stem for demo in DEMOS} > LONG_DEMOS
-
-
 @pytest.mark.long
 @pytest.mark.mpi
 @pytest.mark.timeout(1800)  # another test file may run on the same two cores

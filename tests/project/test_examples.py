@@ -25,7 +25,6 @@ MAX_LINES = 7
 
 @cache
 def examples():
-    """{name: example} of everything public, each function once."""
     found, seen = {}, set()
     for name, one in public().items():
         text = one.sections.get("Example", "")
@@ -42,7 +41,6 @@ EXAMPLES = examples()
 
 @pytest.fixture(scope="module")
 def beam(tmp_path_factory):
-    """The body that examples load: of steel, 1 m x 50 mm x 30 mm, reduced to its ends."""
     path = tmp_path_factory.mktemp("beam") / "beam.rom.npz"
     model = block(size=(1.0, 0.05, 0.03), cells=(20, 2, 2))
     kinds = {"root": "rbe2", "tip": "rbe2"}
@@ -113,7 +111,6 @@ def values(words, text):
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
-    """{name: what it has printed}, each notebook run where its geometries are."""
     nbformat = pytest.importorskip("nbformat", reason="notebooks need the extra [docs]")
     nbclient = pytest.importorskip("nbclient", reason="notebooks need the extra [docs]")
     above = tmp_path_factory.mktemp("clone")
@@ -148,7 +145,6 @@ def rod():
 
 
 def test_notebooks_lie_here_without_outputs_and_the_site_names_them():
-    """Outputs would be out of date, and of one machine."""
     index, start = ((ROOT / "docs" / f"{name}.md").read_text() for name in ("index", "start"))
     for path in NOTEBOOKS:
         assert f"(notebooks/{path.stem}.ipynb)" in index and f"\nnotebooks/{path.stem}\n" in start
@@ -177,7 +173,6 @@ def test_the_first_body_weighs_what_the_cad_says_in_every_frame(run, rod):
 @pytest.mark.fenicsx
 @pytest.mark.long
 def test_the_first_mechanism_is_a_pendulum_on_a_spring(run, rod):
-    """Frequency and pull at rest against the CAD; undamped, the rod would sink twice as far."""
     text = run("first_mechanism")
     mass, centre, about_hinge = rod
     stiffness, arm = 2e3, 0.2  # [N/m], [m]

@@ -8,8 +8,8 @@ from textwrap import dedent
 import pytest
 
 import rom
-from cases.command import environment, python
-from cases.paths import ROOT
+from cases.command import ROOT, environment, python
+from cases.refusals import refuses
 from rom import fields
 from rom.components.gear_mesh import GearPair
 from rom.fields import FIELDS, families, find, record
@@ -43,7 +43,6 @@ NO_COMPONENTS = "import sys; sys.modules['rom.components'] = None\n"  # as if th
 
 
 def run(code, *paths, cwd=None):
-    """What Python has done, modules of these folders first."""
     path = ":".join(map(str, [*paths, environment()["PYTHONPATH"]]))
     done = python("-c", dedent(code), cwd=cwd, env=environment(PYTHONPATH=path), timeout=600)
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr
@@ -52,7 +51,6 @@ def run(code, *paths, cwd=None):
 
 @pytest.mark.parametrize("place", FIELDS)
 def test_the_list_has_the_names_by_which_fields_are_asked(place):
-    """Of those that may be missing, so that the error can say whose they are."""
     kinds = "methods", "bodies", "sections", "columns", "takes", "verbs", "first_use"
     given = {name for kind in kinds for name in getattr(record(place), kind)}
     words = set(FIELDS[place].split())
@@ -71,7 +69,6 @@ def test_who_checks_types_sees_what_fields_give():
 
 
 def test_a_pendulum_imports_no_gears_films_races_or_tendons():
-    """Modules of rom once it has moved; they were 178 when elements were imported all at once."""
     said = run(
         PENDULUM + "import sys; print(*(m for m in sys.modules if m.split('.')[0] == 'rom'))"
     )
@@ -88,11 +85,10 @@ def test_methods_of_fields_are_those_of_the_class():
     assert {"tendon", "tendons", "force"} <= set(dir(rom.Mechanism)) & set(dir(rom.Mechanism()))
     assert "teeth" in rom.Mechanism.gear_mesh.__doc__.lower()
     assert "journal_bearing" in dir(rom.mbs.Solution)
-    with pytest.raises(AttributeError, match=r"'gear_mash'.*gear_mesh"):
-        rom.Mechanism().gear_mash  # noqa: B018
-    with pytest.raises(AttributeError, match="gear_mash"):
-        rom.Mechanism.gear_mash  # noqa: B018
+    for thing in (rom.Mechanism(), rom.Mechanism):
+        refuses(AttributeError, "gear_mash", getattr, thing, "gear_mash")
     assert find("methods", "gear_mash") is None
+    refuses(ModuleNotFoundError, "springs_of", __import__, "rom.mbs.elements.springs_of_gears")
 
 
 def test_families_keep_their_order_whatever_is_added_first():
@@ -107,7 +103,6 @@ def test_families_keep_their_order_whatever_is_added_first():
 
 
 def test_all_components_may_be_deleted(tmp_path):
-    """A pendulum moves, a body bends, a file is read; the rest is told by the name of its field."""
     code = NO_COMPONENTS + CORE + dedent("""
     from rom.cli.parser import build_parser
     def told(call):
@@ -127,9 +122,7 @@ def test_all_components_may_be_deleted(tmp_path):
     whose = {"gear_mesh": "gear_mesh", "spin": "round_bodies", "Pulley": "tendons",
              "rods": "cosserat", "update": "updating"}  # fmt: skip
     for name, module in whose.items():
-        sentence = (
-            f"'{name}' belongs to the field 'rom.components.{module}', which is not installed"
-        )
+        sentence = f"'{name}' belongs to the field 'rom.components.{module}', which is not in"
         assert sentence in said
     assert said.count("pip install --force-reinstall fenicsx-rom") == 5
     assert "fields.toml:" in said and "VERB" in said
@@ -202,7 +195,6 @@ def install(folder, package):
 
 
 def test_a_stranger_brings_a_field_in_three_files_beside_one_that_fails(tmp_path):
-    """Method, elements, file, symbol, column and verb; what fails is told once by name."""
     install(tmp_path, CAMS)
     install(tmp_path, BROKEN)
     code = PENDULUM + dedent("""
@@ -246,25 +238,6 @@ def test_a_stranger_brings_a_field_in_three_files_beside_one_that_fails(tmp_path
     assert "pip install --force-reinstall broken-field" in done.stderr
 
 
-def test_a_field_of_ours_that_cannot_be_imported_takes_no_other_down():
-    code = dedent("""
-    import sys
-    class Cut:
-        def find_spec(self, name, *_):
-            if name == "rom.components.tendons.field":
-                raise RuntimeError("cut")
-    sys.meta_path.insert(0, Cut())
-    """) + PENDULUM + dedent("""
-    mech.spring_damper("s", hinge, bob.marker("p"), stiffness=1.0)
-    print(mech.gear_mesh.__name__, hasattr(mech, "tendon"), list(mech.families()))
-    mech.tendon
-    """)  # fmt: skip
-    done = python("-c", code)
-    assert "gear_mesh False" in done.stdout and done.returncode == 1
-    assert "'tendon' belongs to the field 'rom.components.tendons', which cannot be" in done.stderr
-    assert "RuntimeError: cut" in done.stderr
-
-
 @pytest.mark.parametrize(
     ("thing", "now", "before"),
     [(GearPair((20, 30), 2e-3, 0.02), "gear_mesh.gears.geometry", "mbs.elements.gears.geometry"),
@@ -281,8 +254,3 @@ def test_what_was_pickled_under_the_names_before_is_read(thing, now, before):
     written = pickle.dumps(thing, protocol=0)
     assert now in written
     assert pickle.loads(written.replace(now, before)) == thing
-
-
-def test_a_module_that_never_was_is_not_found():
-    with pytest.raises(ModuleNotFoundError, match="springs_of_gears"):
-        __import__("rom.mbs.elements.springs_of_gears")

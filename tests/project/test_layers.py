@@ -8,8 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from cases.command import python
-from cases.paths import ROOT
+from cases.command import ROOT, python
 
 pytestmark = pytest.mark.once
 
@@ -86,7 +85,6 @@ def whole(module, name):
 
 
 def wrong(part, name):
-    """What is wrong with an import, or nothing."""
     package, _, rest = name.partition(".")
     if package in HEAVY and part != "fe":
         return f"{name}; only rom.fe may"
@@ -104,18 +102,18 @@ def wrong(part, name):
 
 
 def remarks(judge):
-    """What is said against the imports of all files, by (path, module, name)."""
     said = ((path, line, judge(path, module, name)) for path in MODULES
             for line, module, name in imports(path))  # fmt: skip
     return [f"{path.relative_to(ROOT)}:{line} {what}" for path, line, what in said if what]
 
 
-def test_imports_follow_the_layers():
+def test_imports_follow_the_layers_and_none_is_of_a_higher_room():
     def judge(path, module, name):
         own = path.relative_to(ROOT / "rom").with_suffix("").parts[0]
         return wrong(own, whole(module, name) if module == "rom" else module)
 
     assert not remarks(judge)
+    assert not remarks(lambda path, module, name: upward(path, whole(module, name), ORDER))
 
 
 def upward(path, name, order):
@@ -134,23 +132,19 @@ def upward(path, name, order):
     return None
 
 
-def test_no_file_imports_from_a_higher_room():
-    """At every level, also inside functions and where only types are meant."""
-    assert not remarks(lambda path, module, name: upward(path, whole(module, name), ORDER))
-
-
-def test_every_room_has_its_place_in_the_order():
-    """A folder with folders in it says in which order they and its files lie."""
+def test_every_room_has_its_place_in_the_order_and_can_be_looked_over():
     for folder in {ROOT / "rom", *(path.parent for path in MODULES)}:
         level = ".".join(folder.relative_to(ROOT / "rom").parts)
         inside = {p.stem for p in folder.glob("*.py")} - {"__init__"}
         folders = {p.parent.name for p in folder.glob("*/__init__.py")}
         if level in ORDER or (folders and level != "components"):
             assert inside | folders == set(ORDER[level]), level or "rom"
+    assert [path.name for path in TESTS.glob("*.py")] == ["conftest.py"]
+    for folder in {path.parent for path in (*MODULES, *TESTS.rglob("*.py"))}:
+        assert len([p for p in folder.glob("*.py") if p.name != "__init__.py"]) <= 15, folder
 
 
 def test_no_files_go_round_in_circles():
-    """Also inside functions and where only types are meant; fronts too."""
     parts = {path: path.relative_to(ROOT).with_suffix("").parts for path in MODULES}
     names = {".".join(p[:-1] if p[-1] == "__init__" else p): path for path, p in parts.items()}
     reach = {
@@ -172,14 +166,7 @@ def test_the_newest_numba_that_was_tried_bounds_what_is_installed():
     assert re.search(f'"numba>=[\\d.]+,{bound}', (ROOT / "pyproject.toml").read_text())
 
 
-def test_folders_hold_no_more_than_one_can_look_over():
-    assert [path.name for path in TESTS.glob("*.py")] == ["conftest.py"]
-    for folder in {path.parent for path in (*MODULES, *TESTS.rglob("*.py"))}:
-        assert len([p for p in folder.glob("*.py") if p.name != "__init__.py"]) <= 15, folder
-
-
 def run_blocked(code, *, blocked):
-    """Run code in a process where some packages cannot be imported."""
     block = f"import sys; sys.modules.update(dict.fromkeys({sorted(blocked)!r}))\n"
     return python("-c", block + code)
 
@@ -191,13 +178,11 @@ def run_blocked(code, *, blocked):
     ids=["the front door", "checks of meshes"],
 )  # fmt: skip
 def test_what_needs_no_fenicsx_opens_without(code, blocked):
-    """Where only NumPy, SciPy and Numba are installed."""
     done = run_blocked(code, blocked=blocked)
     assert done.returncode == 0, done.stderr
 
 
 def test_fronts_load_nothing_but_fronts():
-    """Start-up time: neither NumPy nor a module behind them, so that a name costs what it needs."""
     stubs = (path.parent.relative_to(ROOT).parts for path in (ROOT / "rom").rglob("__init__.pyi"))
     fronts = [".".join(parts) for parts in stubs if "fe" not in parts]
     done = run_blocked(f"import sys, {', '.join(fronts)}; print(*sys.modules)", blocked=())

@@ -13,8 +13,7 @@ import numpy as np
 import pytest
 
 import rom
-from cases.command import ran
-from cases.paths import ROOT
+from cases.command import ROOT, ran
 from cases.solid import block, reduced
 
 pytest.importorskip("wheel", reason="setuptools of Debian 12 needs wheel to make one")
@@ -43,7 +42,6 @@ print(*sol.position("slider")[:, 0])
 
 
 def hook(name, folder, out):
-    """Call a build hook in a process of its own, as every installer does."""
     code = f"from setuptools import build_meta; print(build_meta.{name}({str(out)!r}))"
     done = ran(sys.executable, "-c", code, cwd=folder, timeout=600, check=True)
     return out / done.stdout.splitlines()[-1]
@@ -75,7 +73,6 @@ def installed(shipped, tmp_path_factory):
 
 
 def started(place, folder, *words):
-    """Python in a folder, with rom from a place."""
     # 20 steps in plain Python take a second; a fresh place would compile for two minutes
     env = os.environ | {"PYTHONPATH": str(place), "NUMBA_DISABLE_JIT": "1"}
     return ran(sys.executable, *words, cwd=folder, env=env, timeout=600)
@@ -86,24 +83,24 @@ def test_the_wheel_holds_every_module_and_its_data(shipped):
     names = set(zipfile.ZipFile(shipped[1]).namelist())
     files = [p for p in (ROOT / "rom").rglob("*") if p.is_file() and "__pycache__" not in p.parts]
     wanted = {str(p.relative_to(ROOT)) for p in files}
-    tables = {
-        f"rom/components/wind/nrel5mw_{name}.csv" for name in ("blade", "elements", "profiles")
-    }
+    parts = ("blade", "elements", "profiles")
+    tables = {f"rom/components/wind/nrel5mw_{name}.csv" for name in parts}
     assert {"rom/py.typed", *tables} <= wanted <= names
     assert not {n for n in names if not n.startswith(("rom/", "fenicsx_rom-"))}
 
 
-def test_the_wheel_asks_pip_for_three_libraries(shipped):
+def test_the_wheel_asks_pip_for_three_libraries_and_has_the_command(shipped, installed, tmp_path):
     with zipfile.ZipFile(shipped[1]) as wheel:
         (text,) = (wheel.read(n) for n in wheel.namelist() if n.endswith("METADATA"))
     metadata = Parser().parsestr(text.decode())
     needed = [r for r in metadata.get_all("Requires-Dist") if "extra" not in r]
     assert {re.match(r"\w+", r).group() for r in needed} == {"numpy", "scipy", "numba"}
     assert metadata["Version"] == rom.__version__
+    done = started(installed, tmp_path, installed / "bin" / "rom", "--version")
+    assert done.stdout.split() == ["rom", rom.__version__], done.stderr
 
 
 def test_benchmarks_are_in_the_source_and_said_to_be_where_they_are_not(installed, tmp_path):
-    """The verb stays in both: one sentence and exit code 2, or what there is to measure."""
     said = {}
     for place in (installed, ROOT):
         said[place] = started(place, tmp_path, "-P", "-m", "rom", "bench", "--list")
@@ -128,12 +125,7 @@ def test_a_saved_slider_crank_runs_from_the_wheel_alone(installed, tmp_path):
     assert np.ptp(x) > 5e-4
 
 
-def test_the_command_comes_with_the_wheel(installed, tmp_path):
-    done = started(installed, tmp_path, installed / "bin" / "rom", "--version")
-    assert done.stdout.split() == ["rom", rom.__version__], done.stderr
-
-
-def test_versions_agree_everywhere():
+def test_versions_agree_everywhere_and_what_the_image_copies_is_sent():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     citation = (ROOT / "CITATION.cff").read_text()
     changes = (ROOT / "CHANGELOG.md").read_text()
@@ -141,9 +133,6 @@ def test_versions_agree_everywhere():
     assert f"\nversion: {newest}\ndate-released: {day}\n" in citation
     assert project["version"] == newest == rom.__version__
     assert f"license: {project['license']['text']}" in citation
-
-
-def test_what_the_image_copies_is_sent():
     recipe, sent = ((ROOT / name).read_text() for name in ("Dockerfile", ".dockerignore"))
     words = " ".join(re.findall(r"^COPY (.+) \S+$", recipe, re.M)).split()
     assert words and all(f"!{word}\n" in sent for word in words)

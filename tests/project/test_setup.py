@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from cases.command import ran
+from cases.files.demos import DEMOS, LONG_DEMOS
 from cases.long import LONGEST_FIRST, ONCE
 from cases.paths import ROOT, TESTS
 from rom.doctor.libraries import PACKAGES, SLOW_ADVICE, SYSTEM_COMMAND
@@ -34,7 +35,6 @@ def names_of(requirements):
 
 
 def function_of(name):
-    """A function of the script."""
     return re.search(rf"^{name}\(\) \{{.*?^\}}$", SETUP.read_text(), re.S | re.M).group()
 
 
@@ -71,7 +71,6 @@ def test_a_system_without_debian_packages_is_told_so(tmp_path):
 
 
 def test_programs_to_compare_with_are_not_needed(tmp_path):
-    """The function of the script, where nothing is installed and nothing can be."""
     script = "set -eu\noptional=calculix-ccx\ninstalled() { false; }\n"
     script += function_of("try_optional") + "\ntry_optional\n"
     done = ran("sh", "-c", script, env=deny_network(tmp_path))
@@ -101,26 +100,20 @@ def test_what_first_motions_need_is_compiled_until_it_is_and_when_sources_change
     assert SETUP.read_text().count("compiled for .venv") == 2  # both environments, or an error
 
 
-def test_scripts_are_valid_shell():
+def test_scripts_are_valid_shell_and_what_waits_for_make_long_exists():
     for script in (ROOT / ".ci" / "run", *(ROOT / ".ci").glob("*.sh")):
         assert os.access(script, os.X_OK), f"{script} is not executable"
         ran("sh", "-n", script, check=True)
-
-
-def test_what_begins_exists_and_what_waits_for_make_long_is_run_there():
-    """A file under another name would come last again; `make long` finds files by what they say."""
     assert (ROOT / ".ci" / "run").read_text().endswith("\nexec make test\n")
     assert [name for name in (*LONGEST_FIRST, *ONCE) if not (TESTS / name).exists()] == []
+    assert {demo.stem for demo in DEMOS} > LONG_DEMOS
     importing = {path for path in TESTS.rglob("*.py") if "cases.long" in path.read_text()}
     apart = {TESTS / "conftest.py", Path(__file__)}
     assert all(path.name.startswith("test_") for path in importing - apart)
 
 
 def test_lists_of_packages_agree():
-    """Of what the doctor advises, the set-up and the image install, and both ways in need.
-
-    pip cannot see Debian's gmsh and h5py, and would put other builds in front of them.
-    """
+    """Pip cannot see Debian's gmsh and h5py, and would put other builds in front of them."""
     setup, by_pip = packages(SETUP), packages(OTHER_SYSTEMS)
     of_debian = {debian for debian, _ in PACKAGES.values()} | set(DEBIAN_PACKAGES.split())
     cures = {word for word in f"{SYSTEM_COMMAND} {SLOW_ADVICE}".split() if word[:3] == "lib"}
@@ -143,38 +136,6 @@ def test_lists_of_packages_agree():
     usual = names_of([*project["dependencies"], *chain(*extras.values())])
     shadowing = {*wheels, *"gmsh h5py petsc4py slepc4py mpi4py meshio fenics-dolfinx".split()}
     assert not usual & shadowing and {"numpy", "scipy", "numba"} <= usual
-
-
-PLANTED_IN = """
-@inner
-def f(x, k, out):
-    out[k + 1] += 2.0 * x - x[k - 1] / 3.0
-    return k + 1
-
-def g(x):
-    return x + x
-
-def law(x):
-    return x - 0.5
-
-compiled_law(law)
-"""
-
-
-def test_it_plants_one_sign_or_factor_of_compiled_functions_alone():
-    signs, factors, _ = plant.places(PLANTED_IN)
-    found = [[ast.unparse(node) for node in nodes] for nodes in (signs, factors)]
-    assert found == [
-        ["out[k + 1] += 2.0 * x - x[k - 1] / 3.0", "2.0 * x - x[k - 1] / 3.0", "x - 0.5"],
-        ["2.0 * x", "x[k - 1] / 3.0"],
-    ]
-    changed = [plant.planted(PLANTED_IN, node) for node in (*signs[:2], *factors)]
-    assert [text.splitlines()[3].strip() for text in changed] == [
-        "out[k + 1] -= (2.0 * x - x[k - 1] / 3.0)",
-        "out[k + 1] += ((2.0 * x) + (x[k - 1] / 3.0))",
-        "out[k + 1] += (2.0 * (2.0 * x)) - x[k - 1] / 3.0",
-        "out[k + 1] += 2.0 * x - (2.0 * (x[k - 1] / 3.0))",
-    ]
 
 
 @pytest.mark.long

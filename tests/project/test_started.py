@@ -14,13 +14,11 @@ import rom
 from benchmarks import two_stages
 from benchmarks.benchmarks import BENCHMARKS
 from cases import command
-from cases.command import ran
+from cases.command import ROOT, ran
 from cases.files.docstrings import PAGES, commands
 from cases.files.step_parts import step_part
-from cases.paths import ROOT
 from cases.solid import block, reduced
 from rom.cli.parser import build_parser
-from rom.errors import ResourceError
 
 pytestmark = pytest.mark.once
 
@@ -64,7 +62,7 @@ def test_a_benchmark_runs_from_its_beginning_to_its_end(name, monkeypatch):
     figures = []
     try:
         figures.extend(BENCHMARKS[name](**BRIEF[name]))
-    except ResourceError as error:
+    except rom.ResourceError as error:
         if "could not be made" not in str(error):
             raise
         pytest.skip(str(error))
@@ -85,7 +83,6 @@ STUB = '#!/bin/sh\nprintf "%s\\n" "$*" >> "{log}"\n'
 
 @pytest.mark.parametrize("target", TARGETS)
 def test_a_target_of_make_starts_modules_and_files_that_are_there(target, tmp_path):
-    """Every line of it, with programs that only write down what they are given."""
     if shutil.which("make") is None:
         pytest.skip("make is not installed")
     pytest.importorskip("dolfinx", reason="what targets start stands in the other environment")
@@ -131,7 +128,6 @@ NOTHING_TO_RESUME = "there is nothing to resume"
 
 
 def kind(line):
-    """By what a command is started here."""
     if line.startswith("make "):
         return "make" if line.split()[1] in TARGETS else None
     if line.startswith(OTHERS):
@@ -141,15 +137,13 @@ def kind(line):
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_every_command_of_a_page_is_started_by_something(page):
-    """With verbs and options that the parser knows."""
     assert [line for line in commands(page) if kind(line) is None] == []
     for words in (shlex.split(line) for line in commands(page) if kind(line) == "rom"):
         verb = words[words.index("rom") + 1 :] if "rom" in words else words[1:]
         assert build_parser().parse_args(verb).verb == verb[0]
 
 
-SHOWN = [page for page in PAGES if page.name != "step_part.md" and
-         "rom" in map(kind, commands(page))]  # fmt: skip
+SHOWN = [page for page in PAGES if page.stem != "step_part" and "rom" in map(kind, commands(page))]
 
 
 def part(path):

@@ -56,14 +56,11 @@ def test_labels_do_not_cover_each_other_and_stay_in_the_picture():
         boxes.append(a)
 
 
-def test_what_is_hidden_is_named_below():
+def test_what_is_hidden_is_named_below_and_without_faces_there_is_no_picture():
     points, patches = box_patches()
     spot = scene.Spot("x+", (0, 0), 5.0)
     words = scene._words(points, patches | {"": patches["x-"]}, [[(spot, (0, 0))], []])
     assert "300 mm x 200 mm x 100 mm" in words
     assert words.endswith("Not seen, or too small: x-, y+, y-, z+, z-.")
-
-
-def test_without_faces_there_is_no_picture():
     with pytest.raises(ConfigError, match="no face to draw"):
         view.faces(np.zeros((3, 3)), {"a": np.zeros((0, 3), dtype=int)})

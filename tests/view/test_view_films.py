@@ -15,7 +15,6 @@ pytest.importorskip("matplotlib", reason="pictures need matplotlib")
 import rom
 from cases.solid import block
 from rom.checks import certificate
-from rom.errors import ConfigError, ResourceError
 from rom.io.ours import is_ours
 from rom.process import progress
 from rom.reduction import full_model
@@ -47,16 +46,7 @@ def fake(tmp_path, monkeypatch):
     return folder
 
 
-def test_pages_of_odd_size_are_made_even_by_their_last_row_and_column():
-    pages = even(PAGES)
-    assert pages.shape == (3, 6, 8, 3)
-    np.testing.assert_array_equal(pages[:, :5, :7], PAGES)
-    np.testing.assert_array_equal(pages[:, 5, :7], PAGES[:, 4])
-    np.testing.assert_array_equal(pages[:, :5, 7], PAGES[:, :, 6])
-    assert even(pages).shape == pages.shape
-
-
-def test_ffmpeg_is_given_all_frames_and_told_their_size_and_pace(fake, tmp_path):
+def test_ffmpeg_is_given_all_frames_of_even_size_and_their_pace(fake, tmp_path):
     path = Film(PAGES, 0.04).save(tmp_path / "a.mp4")
     data = path.read_bytes()
     assert data.endswith(even(PAGES).tobytes())
@@ -65,29 +55,31 @@ def test_ffmpeg_is_given_all_frames_and_told_their_size_and_pace(fake, tmp_path)
     assert (said["-f"], said["-pix_fmt"]) == ("rawvideo", "yuv420p")
     assert (said["-s"], said["-c:v"], float(said["-framerate"])) == ("8x6", "libx264", 25.0)
     assert is_ours(path, "mp4") and not is_ours(fake / "ffmpeg", "mp4")
+    pages = even(PAGES)
+    assert pages.shape == (3, 6, 8, 3)
+    np.testing.assert_array_equal(pages[:, :5, :7], PAGES)
+    np.testing.assert_array_equal(pages[:, 5, :7], PAGES[:, 4])
+    np.testing.assert_array_equal(pages[:, :5, 7], PAGES[:, :, 6])
+    assert even(pages).shape == pages.shape
 
 
-def test_a_program_that_fails_leaves_no_file_and_is_quoted(fake, tmp_path):
+def test_an_ffmpeg_that_fails_or_is_missing_is_named_with_its_cure(fake, tmp_path, monkeypatch):
     program(fake, f"#!{sys.executable} -S\nimport sys\nsys.exit('Unknown encoder')\n")
-    with pytest.raises(ResourceError, match="ended with code 1: Unknown encoder"):
+    with pytest.raises(rom.ResourceError, match="ended with code 1: Unknown encoder"):
         Film(PAGES, 0.04).save(tmp_path / "a.mp4")
     assert not (tmp_path / "a.mp4").exists()
-
-
-def test_a_missing_program_is_named_with_its_cure_before_anything_is_drawn(tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
-    with pytest.raises(ResourceError, match="ffmpeg, which is not on the PATH") as caught:
+    with pytest.raises(rom.ResourceError, match="ffmpeg, which is not on the PATH") as caught:
         film_path(tmp_path / "a.mp4")
     assert "apt install ffmpeg" in caught.value.hint and ".gif" in caught.value.hint
     assert film_path(tmp_path / "a.gif") == tmp_path / "a.gif"
-    with pytest.raises(ConfigError, match=r"'\.avi' is unknown") as caught:
+    with pytest.raises(rom.ConfigError, match=r"'\.avi' is unknown") as caught:
         film_path(tmp_path / "a.avi")
     assert ".gif or .mp4" in caught.value.hint
 
 
 @pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="ffmpeg is not installed")
 def test_a_film_of_ffmpeg_plays_with_its_pictures(tmp_path):
-    """Decoded again: as many frames, of even size, in their colours."""
     colours = np.array([[200, 30, 30], [30, 160, 30], [30, 30, 200]], dtype=np.uint8)
     pages = np.broadcast_to(colours[:, None, None], (3, 33, 47, 3))
     path = Film(pages, 0.1).save(tmp_path / "a.mp4")
@@ -106,7 +98,6 @@ class Terminal(io.StringIO):
 
 
 def followed(monkeypatch, stream):
-    """What is seen of work of 10 parts, asked for while it lasts."""
     monkeypatch.setattr(sys, "stderr", stream)
     monkeypatch.setattr(progress, "LOOK_INTERVAL", 1e-3)
     asked = []
@@ -116,28 +107,11 @@ def followed(monkeypatch, stream):
     return stream.getvalue()
 
 
-def test_progress_is_shown_on_a_terminal_and_cleared(monkeypatch):
+def test_progress_and_stages_are_shown_on_a_terminal_and_cleared(monkeypatch):
     monkeypatch.setattr(progress, "find_spec", lambda name: None)
     text = followed(monkeypatch, Terminal())
     assert "\rdrawing   20 %" in text and text.endswith("\r")
     assert text.rsplit("\r", 2)[-2].strip() == ""
-
-
-def test_progress_is_shown_by_tqdm_where_it_is_installed(monkeypatch):
-    pytest.importorskip("tqdm", reason="tqdm is not installed")
-    assert "drawing" in followed(monkeypatch, Terminal())
-
-
-def staged(monkeypatch, stream, **options):
-    """What is seen of two stages of work."""
-    monkeypatch.setattr(sys, "stderr", stream)
-    with progress.stages(2, **options) as begin:
-        begin("factor")
-        begin("solve")
-    return stream.getvalue()
-
-
-def test_stages_are_named_as_they_begin_and_cleared(monkeypatch):
     monkeypatch.setattr(progress, "find_spec", lambda name: None)
     text = staged(monkeypatch, Terminal())
     shown = [part.strip() for part in text.split("\r")[1:]]
@@ -148,8 +122,20 @@ def test_stages_are_named_as_they_begin_and_cleared(monkeypatch):
     assert staged(monkeypatch, Terminal()) == ""
 
 
+def test_progress_is_shown_by_tqdm_where_it_is_installed(monkeypatch):
+    pytest.importorskip("tqdm", reason="tqdm is not installed")
+    assert "drawing" in followed(monkeypatch, Terminal())
+
+
+def staged(monkeypatch, stream, **options):
+    monkeypatch.setattr(sys, "stderr", stream)
+    with progress.stages(2, **options) as begin:
+        begin("factor")
+        begin("solve")
+    return stream.getvalue()
+
+
 def test_reductions_and_modes_of_large_models_say_how_far_they_are(monkeypatch):
-    """On the command line, whose -q sets the logger, as in Python."""
     for module in (bodies, full_model, certificate):
         monkeypatch.setattr(module, "MANY_DOFS", 100)
     monkeypatch.setattr(progress, "find_spec", lambda name: None)

@@ -16,7 +16,7 @@ from rom.view.figures.things import actors_of
 X = np.linspace(0.0, 1.0, 41)
 
 
-def test_notes_stand_right_of_their_places():
+def test_notes_stand_right_of_their_places_and_a_speed_is_marked():
     panel = view.Panel("Path", "x", "y", {"_path": (X, X)}, notes={"25": (0.5, 0.5), "a": (0, 1)})
     figure = view.panels([[panel]])
     figure.canvas.draw()
@@ -26,41 +26,6 @@ def test_notes_stand_right_of_their_places():
         box = note.get_window_extent()
         assert x < box.x0 < x + 25 and box.y0 < y < box.y1
     assert [note.get_text() for note in axes.texts] == ["25", "a"]
-
-
-def test_ticks_of_an_axis_have_as_many_decimals():
-    ticks = ScaledTicks(1e-3)
-    ticks.set_locs([0.0, 500.0, 1000.0, 1500.0])
-    assert [ticks(x) for x in (0.0, 500.0, 1000.0)] == ["0.0", "0.5", "1.0"]
-    ticks.set_locs([-2000.0, 0.0, 2000.0])
-    assert [ticks(x) for x in (-2000.0, 0.0, 2000.0)] == ["\u22122", "0", "2"]
-    ticks.set_locs([0.0, 250.0, 500.0])
-    assert [ticks(x) for x in (0.0, 250.0, 500.0)] == ["0.00", "0.25", "0.50"]
-
-
-def test_a_number_is_drawn_as_a_level_and_words_as_rows():
-    words = ["none"] * 20 + ["all"] * 11 + ["none"] * 10
-    speeds = {"rotor": 12 * X, "rated": 12.1}
-    figure = view.history(X, [("speed", speeds), ("group", {"": words})])
-    speed, group = figure.axes
-    rotor, rated = speed.lines
-    np.testing.assert_array_equal(rated.get_ydata(), np.full(41, 12.1))
-    assert rated.get_linestyle() == "-." and rotor.get_linestyle() == "-"
-    assert [t.get_text() for t in speed.get_legend().get_texts()] == ["rotor", "rated"]
-    assert [t.get_text() for t in group.get_yticklabels()] == ["none", "all"]
-    np.testing.assert_array_equal(group.lines[0].get_ydata()[[0, 25, 40]], [0, 1, 0])
-
-
-def test_a_name_has_one_colour_in_all_panels():
-    upper = {"a": X, "b": X, "c": X, "d": X}
-    lower = {"d": X, "new": X, "a": X}
-    figure = view.history(X, [("one", upper), ("two", lower)])
-    one, two = ({line.get_label(): line.get_color() for line in axes.lines} for axes in figure.axes)
-    assert len(set(one.values())) == 4 and len(set(two.values())) == 3
-    assert two["a"] == one["a"] and two["d"] == one["d"]
-
-
-def test_a_speed_is_marked_in_a_campbell_diagram():
     speeds = np.linspace(0.0, 100.0, 3)
     diagram = Campbell(speeds, (60j + 0.1j * speeds)[:, None], np.ones((2, 1)))
     (axes,) = view.campbell(diagram, marks={"rated": 10 * np.pi}).axes
@@ -69,9 +34,15 @@ def test_a_speed_is_marked_in_a_campbell_diagram():
     assert "rated" in [t.get_text() for t in axes.get_legend().get_texts()]
 
 
-def test_logarithmic_axes_of_less_than_two_decades_have_ticks_that_do_not_overlap():
-    panel = view.Panel("Error", "step [s]", "error [m]", {"a": (0.002 + 0.018 * X, 1e-9 + X)},
-                       log=True)  # fmt: skip
+def test_ticks_have_as_many_decimals_and_do_not_overlap_on_short_logarithmic_axes():
+    ticks = ScaledTicks(1e-3)
+    ticks.set_locs([0.0, 500.0, 1000.0, 1500.0])
+    assert [ticks(x) for x in (0.0, 500.0, 1000.0)] == ["0.0", "0.5", "1.0"]
+    ticks.set_locs([-2000.0, 0.0, 2000.0])
+    assert [ticks(x) for x in (-2000.0, 0.0, 2000.0)] == ["\u22122", "0", "2"]
+    ticks.set_locs([0.0, 250.0, 500.0])
+    assert [ticks(x) for x in (0.0, 250.0, 500.0)] == ["0.00", "0.25", "0.50"]
+    panel = view.Panel("E", "step [s]", "error [m]", {"a": (0.002 + 0.018 * X, 1e-9 + X)}, log=True)
     figure = view.panels([[panel, panel]])
     figure.canvas.draw()
     axis = figure.axes[0].xaxis
@@ -82,7 +53,26 @@ def test_logarithmic_axes_of_less_than_two_decades_have_ticks_that_do_not_overla
     assert all(np.log10(tick) % 1 == 0 for tick in above.get_ticklocs())
 
 
-def test_level_curves_are_named_on_them_and_away_from_points():
+def test_numbers_are_levels_words_are_rows_and_a_name_has_one_colour():
+    words = ["none"] * 20 + ["all"] * 11 + ["none"] * 10
+    speeds = {"rotor": 12 * X, "rated": 12.1}
+    figure = view.history(X, [("speed", speeds), ("group", {"": words})])
+    speed, group = figure.axes
+    rotor, rated = speed.lines
+    np.testing.assert_array_equal(rated.get_ydata(), np.full(41, 12.1))
+    assert rated.get_linestyle() == "-." and rotor.get_linestyle() == "-"
+    assert [t.get_text() for t in speed.get_legend().get_texts()] == ["rotor", "rated"]
+    assert [t.get_text() for t in group.get_yticklabels()] == ["none", "all"]
+    np.testing.assert_array_equal(group.lines[0].get_ydata()[[0, 25, 40]], [0, 1, 0])
+    upper = {"a": X, "b": X, "c": X, "d": X}
+    lower = {"d": X, "new": X, "a": X}
+    figure = view.history(X, [("one", upper), ("two", lower)])
+    one, two = ({line.get_label(): line.get_color() for line in axes.lines} for axes in figure.axes)
+    assert len(set(one.values())) == 4 and len(set(two.values())) == 3
+    assert two["a"] == one["a"] and two["d"] == one["d"]
+
+
+def test_levels_are_named_away_from_points_and_fields_share_the_colours_asked_for():
     turn = 2 * np.pi * X
     circles = {r: [r * np.column_stack([np.cos(turn), np.sin(turn)])] for r in (0.5, 0.9)}
     outside = {7.0: [np.array([[5.0, 5.0], [6.0, 6.0]])]}
@@ -98,9 +88,6 @@ def test_level_curves_are_named_on_them_and_away_from_points():
     seen, other = axes.collections
     assert not np.allclose(seen.get_facecolor(), other.get_facecolor())
     assert not np.allclose(other.get_facecolor(), other.get_edgecolor())
-
-
-def test_fields_side_by_side_share_the_colours_that_are_asked_for():
     fields = [view.Drawing("Field", "x", "y", (0.0, 1.0, 0.0, 1.0), value * np.eye(3), "load",
                            limits=(0.0, 5.0)) for value in (2.0, 5.0)]  # fmt: skip
     square = view.Drawing("Stone", "x", "y", polygons=[np.array([[0, 0], [1, 0], [1, 1.0]])],

@@ -1,6 +1,5 @@
 """One order for all pictures: what is drawn, then the path, then words by name."""
 
-import ast
 import inspect
 from base64 import b64encode
 from functools import cache
@@ -8,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
+from cases.refusals import refuses
 
 pytest.importorskip("pyvista", reason="pictures need pyvista")
 pytest.importorskip("matplotlib", reason="pictures need matplotlib")
@@ -17,7 +18,6 @@ from matplotlib.figure import Figure
 from cases.figures.pictures import faults
 from cases.long import few
 from cases.mbs.drawn import lattice_bar, squeezed, swinging
-from cases.paths import ROOT
 from cases.solid import block
 from rom import view
 from rom.errors import ConfigError
@@ -75,33 +75,19 @@ FILMS = {
 }  # fmt: skip
 # seconds each; "mesh" and "start" are drawn by a child process in `make test`, too
 DRAWN_BY_A_CHILD = "faces instants mesh mode_shapes start updating wheel_modes".split()
-WRITERS = ("io/programs", "io/matrices", "io/sid", "io/fields", "io/native.py", "io/bodies.py",
-           "io/export.py", "io/history.py", "io/fmu/body.py", "fmu/export.py", "report/html.py",
-           "mbs/results/state.py", "view/scenes")  # fmt: skip
 
 
 def parameters(name):
     return inspect.signature(getattr(view, name)).parameters
 
 
-def test_every_function_of_view_that_takes_a_path_is_tried_here():
+def test_every_function_of_view_that_takes_a_path_or_axes_is_tried_here():
     functions = [name for name in view.__all__ if inspect.isfunction(getattr(view, name))]
     assert {name for name in functions if "path" in parameters(name)} == {*PICTURES, *FILMS}
-
-
-@pytest.mark.parametrize("name", [*PICTURES, *FILMS])
-def test_things_come_first_then_the_path_then_words_by_name(name):
-    names, kinds = [*parameters(name)], [p.kind for p in parameters(name).values()]
-    place = names.index("path")
-    things = len({**PICTURES, **FILMS}[name]()[0])
-    assert place == things > 0
-    assert set(kinds[: place + 1]) == {inspect.Parameter.POSITIONAL_OR_KEYWORD}
-    assert set(kinds[place + 1 :]) <= {inspect.Parameter.KEYWORD_ONLY}
-    assert parameters(name)["path"].default is None
+    assert {name for name in (*PICTURES, *FILMS) if "ax" in parameters(name)} == set(AXES)
 
 
 def each(names):
-    """Those that take seconds where there is time only."""
     return [pytest.param(n, marks=[pytest.mark.long] * (n in DRAWN_BY_A_CHILD)) for n in names]
 
 
@@ -119,7 +105,6 @@ def test_a_picture_is_the_same_seen_and_written(name, tmp_path):
 
 @pytest.mark.parametrize("name", each(AXES))
 def test_curves_are_drawn_into_axes_of_the_caller(name, tmp_path):
-    """His figure comes back, holds what is drawn, and is written where he says only."""
     (things, words), draw = PICTURES[name](), getattr(view, name)
     words = {key: word for key, word in words.items() if key != "caption"}
     figure = Figure(figsize=(12, 4))
@@ -135,10 +120,6 @@ def test_curves_are_drawn_into_axes_of_the_caller(name, tmp_path):
             draw(*things, **words, ax=wrong)
 
 
-def test_whatever_draws_curves_takes_axes():
-    assert {name for name in (*PICTURES, *FILMS) if "ax" in parameters(name)} == set(AXES)
-
-
 @pytest.mark.parametrize("name", few(0, FILMS))
 def test_a_film_is_the_same_seen_and_written(name, tmp_path):
     (things, words), draw, file = FILMS[name](), getattr(view, name), tmp_path / "a.gif"
@@ -152,22 +133,6 @@ def test_a_film_is_the_same_seen_and_written(name, tmp_path):
 
 def test_a_picture_is_no_path_before_it_is_saved_which_is_refused_in_the_same_words(tmp_path):
     seen = view.history(*PICTURES["history"]()[0], **WORDS)
-    with pytest.raises(ConfigError, match=r"picture was not written yet.*picture\.save"):
-        Path(seen)
-    with pytest.raises(ConfigError, match=r"ending '\.jpg' is unknown"):
-        seen.save(tmp_path / "a.jpg")
+    refuses(ConfigError, r"picture was not written yet.*picture\.save", Path, seen)
+    refuses(ConfigError, r"ending '\.jpg' is unknown", seen.save, tmp_path / "a.jpg")
     assert not list(tmp_path.iterdir())
-
-
-def test_whatever_writes_a_file_takes_the_thing_before_the_path():
-    """Public functions of all modules that write files of ours and of other programs."""
-    files = [file for name in WRITERS for path in [ROOT / "rom" / name]
-             for file in (sorted(path.glob("*.py")) if path.is_dir() else [path])]  # fmt: skip
-    orders = {
-        node.name: [argument.arg for argument in node.args.args]
-        for file in files
-        for node in ast.parse(file.read_text()).body
-        if isinstance(node, ast.FunctionDef) and node.name.startswith(("write", "save", "export"))
-    }
-    assert len(orders) > 15
-    assert {name for name, order in orders.items() if order.index("path") == 0} == set()

@@ -24,7 +24,6 @@ def diagram(**names):
 
 
 def bare(axes):
-    """A picture of a thin thing in space, which needs no more than its box."""
     axes.set_axis_off()
     picture = np.full((400, 400, 3), 255)
     picture[:, 190:210] = 0
@@ -89,15 +88,20 @@ def test_a_fault_is_found(said):
     assert said in found[0]
 
 
-def test_two_dozen_curves_all_look_different():
+def test_many_curves_are_told_apart_and_those_without_a_name_stay_thin():
     figure, axes = diagram()
     for k in range(24):
         axes.plot(X, X * k, label=f"curve {k}", **line_look(k))
     assert not faults(figure)
+    curves = {f"curve {k}": (X, X) for k in range(5)}
+    assert not faults(view.panels([[view.Panel("Five", "x [m]", "y [m]", curves)]]))
+    curves = {f"_blade {k}": (X, 0 * X) for k in range(11)} | {"short": (X, X)}
+    figure = view.panels([[view.Panel("Tips", "f [Hz]", "u [m]", curves)]])
+    assert max(line.get_linewidth() for line in figure.axes[0].lines) < 3.0
+    assert not faults(figure)
 
 
 def test_names_of_rays_stand_in_the_diagram_and_on_no_line():
-    """Where the rays end, modes and the mark of a speed are."""
     speeds = np.linspace(0.0, 1.5, 15)
     f = np.array([0.32, 0.5, 0.62, 0.68, 1.05, 1.2]) + np.outer(speeds, [0, -0.05, 0, 0.1, -0.1, 0])
     diagram = Campbell(speeds, 2j * np.pi * f, np.ones((14, 6)))
@@ -130,13 +134,7 @@ def test_what_is_compared_has_one_scale(draw):
     assert not faults(figure)
 
 
-def test_curves_that_coincide_are_all_seen():
-    curves = {f"curve {k}": (X, X) for k in range(5)}
-    assert not faults(view.panels([[view.Panel("Five", "x [m]", "y [m]", curves)]]))
-
-
 def test_windows_with_nothing_in_common_keep_their_own_range():
-    """Side by side in one range, each would leave most of the other empty."""
     panels = [view.Panel(f"{x:g}", "f [Hz]", "u [m]", {"one": (x + X, X)}) for x in (0.0, 9.0)]
     figure = view.panels([panels])
     (first, second) = (axes.get_xlim() for axes in figure.axes)
@@ -145,20 +143,11 @@ def test_windows_with_nothing_in_common_keep_their_own_range():
     assert not faults(figure)
 
 
-def test_curves_without_a_name_stay_thin():
-    """Eleven of them on one line once were a grey block; they are no curves to be told apart."""
-    curves = {f"_blade {k}": (X, 0 * X) for k in range(11)} | {"short": (X, X)}
-    figure = view.panels([[view.Panel("Tips", "f [Hz]", "u [m]", curves)]])
-    assert max(line.get_linewidth() for line in figure.axes[0].lines) < 3.0
-    assert not faults(figure)
-
-
 def box_at(x, **more):
     return view.Thing(*view.box((1.0, 1.0, 1.0), (x, 0.0, 0.0)), **more)
 
 
 def test_the_same_things_from_the_same_side_have_one_scale(monkeypatch):
-    """A scene that needs less room is not drawn larger; one from another side is."""
     seen, real = [], things.seen
     monkeypatch.setattr(things, "seen", lambda *a, **k: seen.append(real(*a, **k)) or seen[-1])
     blank = lambda self, **_: np.full((1, *self.camera.size[::-1], 3), 128, np.uint8)  # noqa: E731

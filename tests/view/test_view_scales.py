@@ -10,40 +10,20 @@ from rom import view
 from rom.view.canvas import scales
 from rom.view.canvas.scales import clock_texts, prefixed, readable, without_round_off, written
 
+READ_AS = """
+0.00012 m = 120 µm, 2.1e11 Pa = 210 GPa, 1500 N = 1.5 kN, 0.02 N m = 20 mN m, 5e3 N/m = 5 kN/m,
+2.5e4 Hz = 25 kHz, 0.05 s = 50 ms, 5e4 s = 5e4 s, 7e6 m = 7000 km, 3e6 W = 3 MW, 4e-7 J = 400 nJ,
+1e-15 m = 1e-3 pm, 1000 m = 1 km, 999 m = 999 m, 3.141592653589793 rad = 180 deg, 400 rad = 400 rad,
+1e-5 rad = 10 µrad, 0 m = 0 m, 1e-6 1 = 1e-6 1, 1e6 % = 1e6 %, 1e6 mm = 1e6 mm, 1e6 m^2 = 1e6 m^2,
+1e6 min = 1e6 min, 1e6 kg = 1e6 kg, 1e6 1/min = 1e6 1/min
+"""
 
-@pytest.mark.parametrize(
-    ("size", "unit", "factor", "shown"),
-    [
-        (0.00012, "m", 1e6, "µm"),
-        (2.1e11, "Pa", 1e-9, "GPa"),
-        (1500.0, "N", 1e-3, "kN"),
-        (0.02, "N m", 1e3, "mN m"),
-        (5e3, "N/m", 1e-3, "kN/m"),
-        (2.5e4, "Hz", 1e-3, "kHz"),
-        (0.05, "s", 1e3, "ms"),
-        (5e4, "s", 1.0, "s"),
-        (7e6, "m", 1e-3, "km"),
-        (3e6, "W", 1e-6, "MW"),
-        (4e-7, "J", 1e9, "nJ"),
-        (1e-15, "m", 1e12, "pm"),
-        (1000.0, "m", 1e-3, "km"),
-        (999.0, "m", 1.0, "m"),
-        (np.pi, "rad", 180 / np.pi, "deg"),
-        (1e-5, "rad", 1e6, "µrad"),
-        (400.0, "rad", 1.0, "rad"),
-        (0.0, "m", 1.0, "m"),
-        (1e-6, "1", 1.0, "1"),
-        (1e6, "%", 1.0, "%"),
-        (1e6, "mm", 1.0, "mm"),
-        (1e6, "m^2", 1.0, "m^2"),
-        (1e6, "min", 1.0, "min"),
-        (1e6, "kg", 1.0, "kg"),
-        (1e6, "1/min", 1.0, "1/min"),
-    ],
-)
-def test_sizes_are_read_between_one_and_a_thousand(size, unit, factor, shown):
-    found = prefixed(size, unit)
-    assert found == (pytest.approx(factor, rel=1e-12), shown)
+
+@pytest.mark.parametrize("row", READ_AS.split(","))
+def test_sizes_are_read_between_one_and_a_thousand(row):
+    (size, unit), (value, shown) = (side.split(maxsplit=1) for side in row.split(" = "))
+    factor, found = prefixed(float(size), unit)
+    assert found == shown.strip() and float(size) * factor == pytest.approx(float(value), rel=1e-12)
 
 
 def labels(axis):
@@ -61,7 +41,7 @@ def drawn(x, y, xlabel, ylabel):
     return axes
 
 
-def test_ticks_are_round_in_the_unit_that_is_read():
+def test_ticks_are_round_in_the_unit_that_is_read_but_on_logarithms_and_ratios():
     axes = drawn([0.0, 2.1e11], [-np.pi, np.pi], "stress [Pa]", "angle of the crank [rad]")
     readable(axes)
     assert axes.get_xlabel() == "stress [GPa]"
@@ -74,22 +54,24 @@ def test_ticks_are_round_in_the_unit_that_is_read():
     for at, text in upwards.items():
         assert float(text) == pytest.approx(np.rad2deg(at), abs=1e-6)
         assert float(text) % 5 == 0
-
-
-def test_ticks_that_are_near_each_other_have_digits_that_tell_them_apart():
-    axes = drawn([0.0, 1.0], [2.10001e11, 2.10002e11], "x", "E [Pa]")
-    readable(axes)
-    texts = labels(axes.yaxis).values()
-    assert len(set(texts)) == len(texts) > 3
-
-
-def test_logarithms_and_plain_ratios_are_left_alone():
     axes = drawn([1e-3, 1e3], [1e-6, 1e-3], "frequency [Hz]", "relative error")
     axes.set_xscale("log")
     before = labels(axes.xaxis), labels(axes.yaxis)
     readable(axes)
     assert (labels(axes.xaxis), labels(axes.yaxis)) == before
     assert axes.get_xlabel() == "frequency [Hz]"
+
+
+def test_axes_of_one_scale_have_one_unit_and_near_ticks_digits_that_tell_them_apart():
+    axes = drawn([0.0, 1.0], [2.10001e11, 2.10002e11], "x", "E [Pa]")
+    readable(axes)
+    texts = labels(axes.yaxis).values()
+    assert len(set(texts)) == len(texts) > 3
+    axes = drawn([0.0, 2.0], [0.0, 0.02], "x [m]", "y [m]")
+    readable(axes, alike=True)
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("x [m]", "y [m]")
+    readable(axes)
+    assert axes.get_ylabel() == "y [mm]"
 
 
 @pytest.mark.parametrize(
@@ -102,15 +84,7 @@ def test_labels_that_do_not_end_with_one_unit_of_the_axis_are_left_alone(label):
     assert axes.get_ylabel() == label and labels(axes.yaxis) == before
 
 
-def test_axes_of_one_scale_have_one_unit():
-    axes = drawn([0.0, 2.0], [0.0, 0.02], "x [m]", "y [m]")
-    readable(axes, alike=True)
-    assert (axes.get_xlabel(), axes.get_ylabel()) == ("x [m]", "y [m]")
-    readable(axes)
-    assert axes.get_ylabel() == "y [mm]"
-
-
-def test_round_off_is_drawn_as_a_constant_and_what_is_larger_as_it_is():
+def test_round_off_is_flat_also_in_a_panel_and_what_is_larger_as_it_is():
     noise = 1e-16 * np.array([1.0, -2.0, 3.0])
     signal = np.array([0.0, 1.0, 2.0])
     flat, kept, gap = without_round_off([noise, signal, np.array([3.0, np.nan, 3.0 + 1e-12])])
@@ -124,10 +98,6 @@ def test_round_off_is_drawn_as_a_constant_and_what_is_larger_as_it_is():
     one, two = without_round_off([np.full(3, 5.0), np.full(3, 5.0 + 1e-12)])
     assert set(one) == set(two) and len(set(one)) == 1
     assert without_round_off([]) == []
-
-
-def test_a_panel_of_round_off_shows_it_as_flat():
-    """The figure the whole way: limits around the constant that hold no digit of the noise."""
     t = np.linspace(0.0, 0.01, 50)
     wave = 2.1e11 * (1 + 1e-13 * np.sin(900 * t))
     axes = Figure().subplots()
@@ -140,13 +110,10 @@ def test_a_panel_of_round_off_shows_it_as_flat():
     np.testing.assert_array_equal(line.get_xdata(), t)  # data stays in SI
 
 
-def test_clocks_of_a_film_have_one_unit():
+def test_clocks_have_one_unit_and_lengths_are_round():
     assert clock_texts(np.array([0.0, 5e-7, 2e-6])) == ["t = 0.000 µs", "t = 0.500 µs",
                                                         "t = 2.000 µs"]  # fmt: skip
     assert clock_texts(np.array([10.0, 30.0])) == ["t = 10.00 s", "t = 30.00 s"]
     assert clock_texts(np.zeros(1)) == ["t = 0.000 s"]
-
-
-def test_lengths_and_sizes_in_words():
     assert [scales.round_length(x) for x in (1.0, 1.9, 4.99, 0.051, 730.0)] == [1, 1, 2, 0.05, 500]
     assert written(0.02, "m") == "20 mm" and written(-3e5, "N") == "-300 kN"

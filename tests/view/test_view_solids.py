@@ -70,7 +70,7 @@ def test_solids_are_closed_and_face_outwards(name):
     assert volume(mesh) == pytest.approx(expected, rel=1e-3 if name == "ellipsoid" else 2e-5)
 
 
-def test_a_coil_has_the_volume_of_its_wire():
+def test_wires_of_coils_and_springs_have_the_volume_of_their_length():
     """Section times length of the helix (Pappus), sections being polygons of 12 sides."""
     mesh = view.coil((0, 0, 0), (0, 0, 1), 0.5, 0.05, turns=4)
     section = 12 / 2 * (0.05 / 2) ** 2 * np.sin(2 * np.pi / 12)
@@ -79,10 +79,7 @@ def test_a_coil_has_the_volume_of_its_wire():
     points = mesh[0]
     assert np.hypot(*points[:, :2].T).max() == pytest.approx(0.275, rel=1e-2)
     assert points[:, 2].min() > -0.05 and points[:, 2].max() < 1.05
-
-
-def test_a_spring_is_wound_about_a_bent_line():
-    """A quarter of a circle of radius 1: the wire is as long as a helix on a torus."""
+    # A quarter of a circle of radius 1: the wire is as long as a helix on a torus
     u = np.linspace(0.0, np.pi / 2, 60)
     line = np.column_stack([np.cos(u), np.sin(u), 0 * u])
     points, triangles = view.wound(line, 0.2, 0.01, turns=8)
@@ -96,13 +93,16 @@ def test_a_spring_is_wound_about_a_bent_line():
     assert abs(volume((points, triangles)) / (np.pi / 4 * 0.01**2 * length) - 1) < 0.06
 
 
-def test_a_tube_round_a_corner_keeps_its_ends():
+def test_a_tube_round_a_corner_keeps_its_ends_and_joined_meshes_their_triangles():
     points, triangles = view.tube([(0, 0, 0), (1, 0, 0), (1, 1, 0)], 0.1)
     assert is_closed((points, triangles))
     np.testing.assert_allclose(points[-2:], [(0, 0, 0), (1, 1, 0)])
+    one, two = view.box((1, 1, 1)), view.box((1, 1, 2), (5, 0, 0))
+    both = view.joined([one, two])
+    assert is_closed(both) and volume(both) == pytest.approx(3.0)
 
 
-def test_teeth_are_as_thick_as_half_a_pitch_on_the_pitch_circle():
+def test_teeth_are_half_a_pitch_thick_and_a_bore_shows_its_rim_alone():
     outline = gear_outline(18, MODULE, ANGLE, 2000)
     radius, angle = np.linalg.norm(outline, axis=1), np.arctan2(*outline.T[::-1])
     crossing = np.flatnonzero(np.diff(np.sign(radius - 9 * MODULE)))
@@ -110,21 +110,11 @@ def test_teeth_are_as_thick_as_half_a_pitch_on_the_pitch_circle():
     np.testing.assert_allclose(np.diff(at), np.pi / 18, rtol=2e-3)
     assert np.abs(at).min() == pytest.approx(np.pi / 36, rel=2e-3)  # a space is on the x axis
     assert (radius.max(), radius.min()) == pytest.approx((10 * MODULE, 7.75 * MODULE))
-
-
-def test_a_bore_shows_its_rim_and_no_other_line_across_the_face():
-    """Edges that are drawn lie on the outline, on the bore, or run from face to face."""
     points, triangles = view.gear(12, MODULE, WIDTH, bore=0.006)
     ends = points[sharp_edges(points, triangles)]
     radii = np.linalg.norm(ends[..., :2], axis=2)
     inner = np.isclose(radii, 0.003)
     assert (inner[:, 0] == inner[:, 1]).all() and inner.any() and not inner.all()
-
-
-def test_meshes_are_joined_with_their_own_triangles():
-    one, two = view.box((1, 1, 1)), view.box((1, 1, 2), (5, 0, 0))
-    both = view.joined([one, two])
-    assert is_closed(both) and volume(both) == pytest.approx(3.0)
 
 
 test_shapes_that_cannot_be_are_refused = refused(

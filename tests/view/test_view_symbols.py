@@ -10,9 +10,9 @@ from numpy.testing import assert_allclose
 import rom
 from cases.mbs.drawn import lattice_bar, swinging
 from cases.mbs.parts import ORIGIN, on_guide, on_hinge
+from cases.refusals import refuses
 from rom import view
 from rom.components.gear_mesh import RackPair
-from rom.errors import ConfigError
 from rom.view.canvas import symbols
 from rom.view.canvas.scene import HEIGHTS, aimed
 from rom.view.figures.things import BAR_SIZE, scale, seen
@@ -62,7 +62,6 @@ KINDS = {
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("turned", [False, True])
 def test_a_joint_is_drawn_at_its_point_and_along_its_axis(kind, turned):
-    """Between two bodies, also where both frames are turned; the axis is the world's y."""
     A = rom.rotation.matrix(rom.rotation.exp(np.array([0.4, -0.3, 0.8]))) if turned else np.eye(3)
     mech = rom.Mechanism()
     one, two = (rod(mech, name, at=at, orientation=A)
@@ -79,7 +78,6 @@ def test_a_joint_is_drawn_at_its_point_and_along_its_axis(kind, turned):
 
 
 def test_a_hinge_on_the_ground_stands_on_it_and_one_that_carries_hangs_from_it():
-    """Supports are below the joint, above it for a body that hangs; all else has none."""
     for at, side in (((0.5, 0, 0), -1), ((0, 0, -0.5), 1)):
         mech = rom.Mechanism()
         on_hinge(mech, at, inertia=(1e-3, 0.1, 0.1))
@@ -101,7 +99,7 @@ def test_what_slides_on_the_ground_has_a_rail_below_all_of_its_way():
     assert (low[1], high[1]) == pytest.approx((-0.15, 0.15))
 
 
-def test_the_bearing_of_a_shaft_is_around_its_nearer_end():
+def test_bearings_are_around_the_nearer_end_and_walls_behind_the_foot():
     mech = rom.Mechanism()
     on_hinge(mech, ORIGIN, "shaft", inertia=(1e-2,) * 3)
     shaft = view.cylinder((0, -0.3, 0), (0, 0.8, 0), 0.1)[0]
@@ -109,9 +107,6 @@ def test_the_bearing_of_a_shaft_is_around_its_nearer_end():
     bush = next(a for a in of(actors, JOINT_COLOUR) if abs(middle(a)[2]) < 1e-6)
     assert middle(bush)[1] < -0.3 < bush.points[0][:, 1].max()
     assert np.ptp(bush.points[0][:, 0]) > 0.1
-
-
-def test_the_wall_of_a_clamped_body_is_wider_than_its_foot_and_behind_it():
     mech = rom.Mechanism()
     part = rod(mech)
     mech.fixed("j", mech.ground.marker(ORIGIN), part.marker("a"))
@@ -121,7 +116,7 @@ def test_the_wall_of_a_clamped_body_is_wider_than_its_foot_and_behind_it():
     assert min(high[1] - 0.2, high[2] - 0.1, -0.2 - low[1], -0.1 - low[2]) > 0.02
 
 
-def test_springs_stretch_between_their_markers():
+def test_springs_stretch_between_their_markers_and_stay_right_handed():
     mech = rom.Mechanism(gravity=(0, 0, -9.81))
     ball = mech.add_rigid("ball", mass=1.0, inertia=(1e-3,) * 3, at=(0, 0, -0.5))
     ends = mech.ground.marker(ORIGIN), ball.marker(ORIGIN)
@@ -134,9 +129,6 @@ def test_springs_stretch_between_their_markers():
     wide = np.linalg.norm(coil.points[..., :2], axis=2).max(axis=1)
     assert_allclose(wide, wide[0])  # it grows longer, not wider
     assert coil.points[2, -1, 2] < coil.points[0, -1, 2] - 0.05
-
-
-def test_a_stretched_symbol_keeps_its_axes_right_handed():
     ends = np.zeros((2, 3)), np.array([[0.0, 2, 0], [1, 1, 1]])
     local = np.array([[0.1, 0, 0], [0, 0.1, 0], [0, 0, 1.0]])
     x, y, z = np.moveaxis(stretched((local, np.array([[0, 1]])), ends, "#000000").points, 1, 0)
@@ -162,7 +154,7 @@ def test_a_plane_of_contact_holds_all_that_moves_on_it():
     assert np.abs(way).max() + 0.1 < half < np.abs(way).max() + 0.5
 
 
-def test_a_block_of_inertia_has_the_edges_of_the_block_it_came_from():
+def test_bodies_without_a_shape_are_blocks_of_their_inertia_with_tubes_to_joints():
     """m / 12 (b^2 + c^2) and so on, turned into other axes."""
     size, mass = np.array([0.3, 0.2, 0.5]), 7.0
     R = rom.rotation.matrix(rom.rotation.exp(np.array([0.2, 0.9, -0.4])))
@@ -170,9 +162,6 @@ def test_a_block_of_inertia_has_the_edges_of_the_block_it_came_from():
     assert_allclose(edges, np.sort(size), rtol=1e-12)
     assert np.linalg.det(axes) == pytest.approx(1.0)
     assert_allclose(np.abs(R.T @ axes)[[1, 0, 2], [0, 1, 2]], 1.0, rtol=1e-12)
-
-
-def test_tubes_lead_to_points_that_only_joints_know():
     mech = rom.Mechanism()
     part = mech.add_rigid("body", mass=1.0, inertia=(1e-2,) * 3, at=ORIGIN)
     assert ends_of(mech, "body") == []
@@ -181,23 +170,18 @@ def test_tubes_lead_to_points_that_only_joints_know():
     assert np.ptp(bars(part, ends_of(mech, "body"))[0][:, 1]) > 0.4
 
 
-def test_a_picture_without_symbols_has_bodies_only():
+def test_symbols_and_traces_are_drawn_where_they_are_asked_for():
     for wanted in (False, True):
         actors = _stage(*swinging(lattice_bar()), np.array([0]), Look({}, symbols=wanted)).actors
         assert [bool(of(actors, c)) for c in (JOINT_COLOUR, GROUND_COLOUR)] == [wanted] * 2
-
-
-def test_a_trace_is_the_whole_way_of_a_body():
     mech, sol = swinging(lattice_bar())
     stage = _stage(mech, sol, np.array([0]), Look({}, traces=("bar",)))
     line = stage.actors[-1]
     assert_allclose(line.points[0], sol.position("bar"), atol=1e-12)
-    with pytest.raises(ConfigError, match="traces: no body 'baar'"):
-        view.animate(mech, sol, traces=("baar",))
+    refuses(rom.ConfigError, "traces: no body 'baar'", view.animate, mech, sol, traces=("baar",))
 
 
 def test_instants_that_are_chosen_differ():
-    """A pendulum over two periods: its start, and places far from it and from each other."""
     mech = rom.Mechanism()
     on_hinge(mech, (0.5, 0, 0), "rod", mass=1.0, inertia=(1e-3, 0.1, 0.1))
     sol = rom.simulate(mech, t_end=3.4, dt=0.01)
@@ -211,16 +195,7 @@ def test_instants_that_are_chosen_differ():
     assert different(rom.simulate(still, t_end=1.0, dt=0.1), 4).tolist() == [0.0]
 
 
-def test_the_length_beside_a_picture_is_true_and_the_axes_are_those_of_the_camera():
-    camera = aimed(np.array([[0.0, 0, 0], [0.9, 0.5, 0.2]]), 700, view=(0, -1, 0), up=(0, 0, 1))
-    length, wide = scale(camera)
-    assert wide == pytest.approx(length * camera.size[1] / camera.height)
-    assert BAR_SIZE / 2.6 < wide <= BAR_SIZE and length == pytest.approx(0.1)
-    assert_allclose(camera.axes, [[1, 0, 0], [0, 0, -1], [0, 1, 0]], atol=1e-12)
-
-
-def test_the_camera_of_a_film_holds_all_instants_and_wastes_little():
-    """The arm sweeps a half circle; its way fills the frame in one direction at least."""
+def test_the_camera_holds_all_instants_wastes_little_and_has_a_true_length():
     mech, sol = swinging(lattice_bar())
     stage = _stage(mech, sol, np.arange(0, 101, 5), Look({}, symbols=False))
     camera = seen(stage.scene("", (0, 0, 1), (0, 1, 0)), 900).camera
@@ -230,6 +205,11 @@ def test_the_camera_of_a_film_holds_all_instants_and_wastes_little():
     half = 0.5 * camera.height * np.array([camera.size[0] / camera.size[1], 1.0])
     assert (reach < half).all() and (reach > 0.9 * half).any()
     assert HEIGHTS[0] <= camera.size[1] / camera.size[0] <= HEIGHTS[1]
+    camera = aimed(np.array([[0.0, 0, 0], [0.9, 0.5, 0.2]]), 700, view=(0, -1, 0), up=(0, 0, 1))
+    length, wide = scale(camera)
+    assert wide == pytest.approx(length * camera.size[1] / camera.height)
+    assert BAR_SIZE / 2.6 < wide <= BAR_SIZE and length == pytest.approx(0.1)
+    assert_allclose(camera.axes, [[1, 0, 0], [0, 0, -1], [0, 1, 0]], atol=1e-12)
 
 
 def test_ground_is_hatched_all_around():
@@ -247,11 +227,10 @@ def test_ground_is_hatched_all_around():
 def test_a_plotter_is_had_where_dolfinx_is_not_loaded_only(monkeypatch):
     pytest.importorskip("pyvista", reason="pyvista is not installed")
     monkeypatch.setitem(sys.modules, "dolfinx", ModuleType("dolfinx"))
-    with pytest.raises(ConfigError, match="dolfinx is loaded in this process"):
-        view.plotter(lattice_bar())
+    refuses(rom.ConfigError, "dolfinx is loaded in this process", view.plotter, lattice_bar())
 
 
-def test_a_cable_runs_along_tangents_and_arcs_at_all_instants():
+def test_cables_pinions_and_bearings_are_lines_and_circles_at_all_instants():
     mech = rom.Mechanism(gravity=ORIGIN)
     wheel = rom.mbs.Pulley(mech.ground.marker(ORIGIN), 0.2, (0, 1, 0))
     place = {"at": (0.2, 0, -1.0), "velocity": (0, 0, 1.0)}
@@ -269,10 +248,6 @@ def test_a_cable_runs_along_tangents_and_arcs_at_all_instants():
         assert_allclose(x[f, [1, -2]], [[-0.2, 0, 0], [0.2, 0, 0]], atol=1e-12)
         assert_allclose(x[f, len(x[f]) // 2], [0, 0, 0.2], atol=1e-12)
     assert_allclose(np.linalg.norm(circle.points, axis=2), 0.2)
-
-
-def test_the_circle_of_a_pinion_touches_the_line_of_its_rack_at_all_instants():
-    """Off its reference line by the profile shift; the line moves with the rack."""
     pair = RackPair(26, 4e-3, 0.03, shift=0.3)
     r, where = 0.052, (0.2 + pair.distance, 0, 0)
     mech = rom.Mechanism(gravity=ORIGIN)
@@ -286,9 +261,6 @@ def test_the_circle_of_a_pinion_touches_the_line_of_its_rack_at_all_instants():
     for f, y in enumerate((0.0, 0.04)):
         ends = [[0.2 + r, y + side * np.pi * r, 0] for side in (-1, 1)]
         assert_allclose(line.points[f], ends, atol=1e-6)
-
-
-def test_bearings_are_circles_of_their_balls_and_of_journal_and_bush():
     mech = rom.Mechanism(gravity=ORIGIN)
     shaft = mech.add_rigid("shaft", mass=1.0, inertia=(1e-3,) * 3, at=(0.1, 0, 0))
     ends = mech.ground.marker((0.1, 0, 0)), shaft.marker(ORIGIN)

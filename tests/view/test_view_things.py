@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose
 
 from cases.figures.pictures import crowded, written_in
 from cases.mbs.drawn import volume
-from cases.refusals import refused
+from cases.refusals import refused, refuses
 from cases.solid import block
 from rom import view
 from rom.errors import ConfigError
@@ -37,7 +37,7 @@ def no_words_overlap_or_leave_the_page(figure):
     return {text.get_text() for text in (*written_in(figure), *corners)}
 
 
-def test_legends_stand_above_the_curves_and_hide_nothing():
+def test_legends_stand_above_the_curves_hide_nothing_and_stand_once():
     curves = {name: (X, X**k) for k, name in enumerate(LONG_NAMES)}
     panels = [[view.Panel("Many names", "x [m]", "y [m]", curves),
                view.Panel("One name", "x", "y", {"short": (X, X)})],
@@ -53,9 +53,6 @@ def test_legends_stand_above_the_curves_and_hide_nothing():
         assert np.ptp(values) > 0.85 * (high - low)  # no room is kept for a legend
     many, one, _ = figure.axes
     assert many._left_title.get_window_extent().y0 == one._left_title.get_window_extent().y0
-
-
-def test_equal_legends_of_curves_over_time_stand_once():
     same = {"one": X, "two": X**2}
     figure = view.history(
         X, [("a [m]", same), ("b [m]", same), ("c [m]", {"third": X})], title="T", caption="C"
@@ -67,15 +64,12 @@ def test_equal_legends_of_curves_over_time_stand_once():
     no_words_overlap_or_leave_the_page(figure)
 
 
-def test_thin_lines_without_a_name_take_no_colour():
+def test_thin_lines_take_no_colour_and_names_of_bars_stay_on_the_page():
     guides = {f"_{k}": (X, k * X) for k in range(4)}
     figure = view.panels([[view.Panel("P", "x", "y", {**guides, "first": (X, X)})]])
     (axes,) = figure.axes
     assert to_hex(axes.lines[-1].get_color()) == LINES[0]
     assert axes.lines[-1].get_linestyle() == "-"
-
-
-def test_names_of_bars_stay_on_the_page_and_leave_the_neighbour_alone():
     bars = {"a parameter with a long name": (-1.0, 2.0), "b": (-0.5, 0.5)}
     left = view.Panel("Left", "x", "y", {"one": (X, X)})
     figure = view.panels([[left, view.Panel("Bars", "change [%]", bars=bars)]])
@@ -84,17 +78,22 @@ def test_names_of_bars_stay_on_the_page_and_leave_the_neighbour_alone():
     assert label.x0 > figure.axes[0].get_window_extent().x1
 
 
-def test_things_have_their_edges_and_colours_in_turn():
+def test_things_have_edges_and_colours_in_turn_and_cameras_look_at_nothing_else():
     scene = view.Scene("Two", {"a": BOX, "mine": view.Thing(*BOX, colour="#123456"), "b": BOX,
                                "_line": view.Thing(BOX[0], [[0, 1], [1, 2]])})  # fmt: skip
     actors = actors_of(scene)
     assert [actor.cells.shape for actor in actors] == [(12, 3), (12, 2)] * 3 + [(2, 2)]
     assert [actors[k].colour for k in (0, 2, 4, 6)] == [
         COLOURS[0], "#123456", COLOURS[1], COLOURS[2]]  # fmt: skip
+    points, triangles = BOX
+    beside = np.vstack([points, [[9.0, 9.0, 9.0]]])
+    alone, more = (_seen(actors_of(view.Scene("A box", {"_a": (X, triangles)})))
+                   for X in (points, beside))  # fmt: skip
+    assert np.abs(more).max() == np.abs(alone).max() < 1.0
 
 
 @pytest.mark.long
-def test_a_scene_stands_beside_curves_with_its_names_axes_and_length():
+def test_a_scene_stands_beside_curves_or_in_axes_of_the_caller():
     scene = view.Scene("Body", {"steel": BOX, "loaded": view.Thing(*BOX, values=np.arange(8.0))},
                        "stress [MPa]")  # fmt: skip
     panel = view.Panel("Curve", "x [m]", "y [m]", {"one": (X, X)})
@@ -113,10 +112,6 @@ def test_a_scene_stands_beside_curves_with_its_names_axes_and_length():
         box = picture.get_window_extent()  # a pixel of the picture is one of the page
         assert abs(width - box.width) < 2
         assert abs(height / np.ptp(picture.get_ylim()) - height / box.height) < 0.01
-
-
-@pytest.mark.long
-def test_a_scene_is_drawn_into_axes_of_the_caller():
     scene = view.Scene("Body", {"steel": BOX})
     figure = Figure(figsize=(12, 4))
     one, two = figure.subplots(1, 2)
@@ -151,7 +146,6 @@ test_wrong_things_and_films_of_nothing_are_refused_by_name = refused(
 
 
 def test_a_film_shows_what_moves_from_one_place_and_leaves_the_rest():
-    """A box goes to the right: the mean place of its colour does, too; the ground stays."""
     way = np.array([0.0, 0.2, 0.4])[:, None, None] * [1.0, 0, 0]
     scene = view.Scene(
         "S", {"ground": view.box((1.0, 0.02, 0.3), (0.2, -0.2, 0)),
@@ -178,10 +172,8 @@ def test_plates_are_their_outlines_made_thick_and_move_with_them():
     assert_allclose(step[second], [(0.0, 0.3, 0.0)] * second.sum(), atol=1e-15)
     np.testing.assert_array_equal(step[~second], 0.0)
     assert np.ptp(thing.points[..., 2]) == pytest.approx(0.5)
-    with pytest.raises(ConfigError, match=r"1 values for 2 plates"):
-        view.plates(frames, 0.5, values=[1.0])
-    with pytest.raises(ConfigError, match="at least one plate"):
-        view.plates([[square], [square, other]], 0.5)
+    refuses(ConfigError, r"1 values for 2 plates", view.plates, frames, 0.5, values=[1.0])
+    refuses(ConfigError, "at least one plate", view.plates, [[square], [square, other]], 0.5)
 
 
 @pytest.mark.long
@@ -223,14 +215,6 @@ def test_an_interface_on_the_far_side_is_said_to_be_turned_away():
     assert f"{far} (turned away)" in [text.get_text() for text in figure.texts]
 
 
-def test_cameras_do_not_look_at_points_between_which_nothing_is():
-    points, triangles = BOX
-    beside = np.vstack([points, [[9.0, 9.0, 9.0]]])
-    alone, more = (_seen(actors_of(view.Scene("A box", {"_a": (X, triangles)})))
-                   for X in (points, beside))  # fmt: skip
-    assert np.abs(more).max() == np.abs(alone).max() < 1.0
-
-
 WORDS = {"title": "Wheel", "caption": "A test.", "hidden": ("root", "tip")}
 
 
@@ -240,7 +224,6 @@ def sector():
 
 @pytest.mark.long
 def test_a_wheel_is_drawn_from_one_sector():
-    """Waves that differ give pictures that differ; faces inside the wheel are left out."""
     model = sector()
     nodes, triangles = _outside(model, WORDS["hidden"])
     inside = np.concatenate([model.interfaces[name].nodes for name in WORDS["hidden"]])
@@ -285,15 +268,13 @@ def test_a_wheel_and_its_sectors_are_things_with_their_displacements():
         "one mode of the wheel": lambda: view.wheel_modes(model, {}, **WORDS),
         f"needs {model.n_dofs} numbers per": lambda: view.wheel_modes(model, wheel, **WORDS),
     }.items():
-        with pytest.raises(ConfigError, match=words):
-            draw()
+        refuses(ConfigError, words, draw)
 
 
 BAR = view.box((1.0, 0.1, 0.08))
 
 
-def test_a_bar_points_along_its_channel():
-    """From its point, nine hundredths of the body long; what lies on the surface has no gap."""
+def test_a_bar_points_along_its_channel_and_a_line_leads_to_a_point_off_the_body():
     x = BAR[0][[0]]
     scene = view.channels(BAR, {"sensors": (x, [[0, 3, 4]])}, title="plan")
     assert list(scene.things) == ["body", "sensors"] and len(actors_of(scene)) == 4
@@ -302,17 +283,11 @@ def test_a_bar_points_along_its_channel():
     assert_allclose(along.max(), 0.09, rtol=1e-6)
     far = points[along > 0.05]
     assert np.linalg.norm(far - along[along > 0.05, None] * [0, 0.6, 0.8], axis=1).max() < 0.005
-
-
-def test_a_point_off_the_body_is_led_to_the_one_that_is_taken():
     x = BAR[0][[1]] + [0.0, 0.0, 0.2]
     scene = view.channels(BAR, {"test": (x, [[0, 0, 1]])})
     line = scene.things["test, off the surface"][0]
     ends = np.linalg.norm(line - x, axis=1).min(), np.linalg.norm(line - BAR[0][1], axis=1).min()
     assert max(ends) < 0.005
-
-
-def test_wrong_groups_are_named():
     for along, words in (([[0, 0, 1]] * 2, r"\(1, 3\) points, \(2, 3\)"), ([[0, 0, 0]], "")):
         with pytest.raises(ConfigError, match=f"'sensors': {words}"):
             view.channels(BAR, {"sensors": ([[0, 0, 0]], along)})

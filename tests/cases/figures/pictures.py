@@ -1,13 +1,7 @@
 """What a reader trips over in a figure of matplotlib, found from what is drawn.
 
-- two curves of one diagram that are named differently and look the same, or of which one lies
-  hidden under the other;
-- a diagram of which what is drawn takes less than half the width or half the height, or a picture
-  of things in space that is nearly empty; of diagrams that are compared, all together count;
-- two diagrams whose axes have the same names and other limits;
-- words that leave the page, lie on other words or on curves, or stand outside of their own diagram
-  or away from all that is drawn there;
-- axes without a name, but those of sketches, colour bars and things in space.
+Curves that cannot be told apart, diagrams that are nearly empty or compared on two scales, words
+that leave the page or lie on others, on curves or away from all that is drawn, axes without a name.
 """
 
 from collections.abc import Sequence
@@ -18,7 +12,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
-from matplotlib.text import Annotation, Text
+from matplotlib.text import Text
 from matplotlib.ticker import FixedFormatter, FuncFormatter
 from matplotlib.transforms import Bbox
 
@@ -182,9 +176,7 @@ def _words(axes: Axes) -> list[Text]:
 
 def _extent(text: Text) -> Bbox:
     """Of the words alone, without an arrow."""
-    return (
-        Text.get_window_extent(text) if isinstance(text, Annotation) else text.get_window_extent()
-    )
+    return Text.get_window_extent(text)
 
 
 def _strays(axes: Axes) -> list[str]:

@@ -34,12 +34,7 @@ LAUNCHER = (
 
 
 class Browser:
-    """One page of a browser; what it complains about and asks for is kept.
-
-    Attributes:
-        complaints: errors of the console, and errors nobody caught.
-        requests: addresses asked for.
-    """
+    """One page of a browser; its complaints and the addresses that it asks for are kept."""
 
     def __init__(self, pipe_out, pipe_in):
         self.out, self.inward, self.buffer = pipe_out, pipe_in, b""
@@ -99,7 +94,6 @@ class Browser:
         self.settle()
 
     def window(self, size):
-        """Make the window so many pixels wide and high."""
         self.ask("Emulation.setDeviceMetricsOverride", width=size[0], height=size[1],
                  deviceScaleFactor=1, mobile=False)  # fmt: skip
 
@@ -149,7 +143,6 @@ class Browser:
         self.ask("Input.dispatchMouseEvent", type="mouseReleased", x=x, y=y, **press)
 
     def key(self, key):
-        """Press and leave a key."""
         text = {"text": key} if len(key) == 1 else {}
         self.ask("Input.dispatchKeyEvent", type="keyDown", key=key, **text)
         self.ask("Input.dispatchKeyEvent", type="keyUp", key=key)
@@ -162,10 +155,6 @@ class Browser:
             "one.dispatchEvent(new Event('input')); one.dispatchEvent(new Event('change')); })()"
         )
         self.settle()
-
-    def shot(self, **options):
-        """The bytes of a picture of the window."""
-        return base64.b64decode(self.ask("Page.captureScreenshot", **options)["data"])
 
     def pixels(self, selector="canvas"):
         """(h, w, 4) what a canvas shows, as integers."""

@@ -49,7 +49,6 @@ def solid(kind="tet4", counts=(3, 2, 2), size=(3.0, 1.0, 1.0)):
 
 
 def side(points, cells, kind, x):
-    """Facets in the plane at x."""
     faces = cells[:, np.array(CELL_TYPES[kind].faces)].reshape(-1, 3 if kind == "tet4" else 4)
     return faces[np.abs(points[faces, 0] - x).max(axis=1) < 1e-9]
 

@@ -8,7 +8,6 @@ import pytest
 
 import rom
 from cases.solid import block
-from rom.errors import FileFormatError, RomError
 from rom.mbs.results.state import Memory, State
 
 NUMBER = re.compile(rb"[-+]?\d+(\.\d*)?([EDed][-+]?\d+)?")
@@ -56,15 +55,11 @@ def misnumbered(data, rng):
 WAYS = (flipped, cut, grown, shuffled, misnumbered)
 
 
-def changed(text, name, read, *rows, error=FileFormatError):
+def changed(text, name, read, *rows, error=rom.FileFormatError):
     """A test that a file is refused by its name when a part of its text is another one.
 
-    Args:
-        text: of a file that is read, or a function without arguments that gives it.
-        name: of the file.
-        read: takes its path.
-        rows: the part, what stands in its first place, the class, and what the message must match.
-        error: the class, where rows leave it out.
+    Rows are the part, what stands in its first place, the class unless it is that of all, and what
+    the message must match; the text may be a function that gives it.
     """
 
     @pytest.mark.parametrize("row", rows)
@@ -92,7 +87,7 @@ def outcome(read, path, memory=MEMORY):
         tracemalloc.start()
     try:
         read(path)
-    except RomError as error:
+    except rom.RomError as error:
         assert str(path.parent) in str(error) and error.message, error
         assert error.exit_code in (2, 3, 4, 5), error
         return error

@@ -1,19 +1,16 @@
-"""What is public, with its docstrings in parts and the errors that its code raises."""
+"""What is public, with its docstrings in parts; pages, demos and their commands."""
 
 import ast
-import builtins
 import importlib.util
 import inspect
 import re
 import shlex
-import textwrap
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
 import rom
 from cases.paths import ROOT
-from rom import errors
 
 # fronts that only other packages read, for they hold parts of what others show
 INSIDE = {"rom.fe.mesh", "rom.io.sid", "rom.mbs.integrate", "rom.mbs.parts", "rom.report"}
@@ -21,7 +18,7 @@ MODULES = ("rom.rotation", "rom.units")  # whose functions are public without a 
 SECTION = re.compile(r"^(Args|Attributes|Returns|Raises|Warns|Source|Example):$", re.M)
 
 
-@dataclass
+@dataclass(eq=False)
 class Callable:
     """What is public, with its docstring in parts."""
 
@@ -38,34 +35,9 @@ class Callable:
         return dict(zip(["", *parts[1::2]], [parts[0], *parts[2::2]], strict=True))
 
     @property
-    def entries(self):
-        """{name: what Args or Attributes say of it}, of classes it is derived from too."""
-        found = {}
-        for text in (*self.inherited, self.text):
-            parts = SECTION.split(text)
-            for key, part in zip(parts[1::2], parts[2::2], strict=True):
-                for entry in re.split(r"\n(?=\S)", textwrap.dedent(part.strip("\n"))):
-                    names, _, about = entry.partition(":")
-                    if key in ("Args", "Attributes"):
-                        found |= {n.strip(" *`"): about for n in names.split(",")}
-        return found
-
-    def said_of(self, name):
-        about = self.entries.get(name)
-        return " ".join((self.sections[""] if about is None else about).split())
-
-    @property
-    def raises_said(self):
-        """What it says of errors, and the classes it is derived from."""
-        texts = (*self.inherited, self.text)
-        return [one.sections.get("Raises", "") for text in texts for one in [Callable("", 0, text)]]
-
-    @property
-    def said_of_result(self):
-        return " ".join((self.sections.get("Returns", "") or self.sections[""]).split())
-
-
-# --- what is public ---
+    def whole(self):
+        """Its docstring and those of the classes it is derived from."""
+        return "\n".join((*self.inherited, self.text))
 
 
 @cache
@@ -172,36 +144,6 @@ def definitions(path):
 
     enter(ast.parse(path.read_text()), "")
     return found
-
-
-# --- errors ---
-
-
-def bodies(thing):
-    """Functions whose bodies run when a thing is called."""
-    if not inspect.isclass(thing):
-        return [inspect.unwrap(thing)]
-    return [inspect.unwrap(vars(base)[name]) for base in thing.__mro__
-            if base.__module__.startswith("rom.")
-            for name in ("__init__", "__post_init__", "__new__")
-            if inspect.isfunction(vars(base).get(name))
-            and "rom" in inspect.unwrap(vars(base)[name]).__code__.co_filename]  # fmt: skip
-
-
-@cache
-def raised(thing):
-    """Names of the errors that the body of a function, or of what makes an object, raises."""
-    names = {
-        getattr(made, "id", "")
-        for body in bodies(thing) if not body.__code__.co_filename.startswith("<")
-        for line in ast.walk(tree(body)) if isinstance(line, ast.Raise) and line.exc
-        for made in ast.walk(line.exc)
-    }  # fmt: skip
-    kinds = {name: getattr(errors, name, getattr(builtins, name, None)) for name in names}
-    return {n for n, kind in kinds.items() if inspect.isclass(kind) and issubclass(kind, Exception)}
-
-
-# --- what users read ---
 
 
 PAGES = [path for path in (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))

@@ -74,7 +74,6 @@ def rack(path):
 
 
 def united(occ, first, *others):
-    """One solid of several."""
     return occ.fuse([(3, first)], [(3, tag) for tag in others])[0][0][1]
 
 
@@ -95,7 +94,6 @@ def round_block(occ, box, radius):
 
 
 def rounded(occ, solid, radius, low, high):
-    """A solid with a fillet at the edges within a box."""
     return occ.fillet([solid], edges_within(occ, low, high), [radius])[0][1]
 
 

@@ -12,13 +12,6 @@ import numpy as np
 from cases.files.cells import solid
 
 SIZE = (0.4, 0.05, 0.03)
-BARS, UPS = ((0, 1), (1, 2), (2, 3), (3, 0)), ((0, 4), (1, 5), (2, 6), (3, 7))
-TOPS = ((4, 5), (5, 6), (6, 7), (7, 4))
-TETRA = ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3))
-MIDDLES = {
-    "bdf": {"tet10": TETRA, "hex20": BARS + UPS + TOPS},
-    "inp": {"tet10": TETRA, "hex20": BARS + TOPS + UPS},
-}
 # that would be lost, by the name they are to be refused with
 CARDS = {
     card.partition(",")[0]: card
@@ -110,33 +103,17 @@ def on_axes(origin, axes):
 def random_deck(seed, form):
     """The deck of a seed, "bdf" or "inp"; four of ten have a card that is to be refused."""
     rng = np.random.default_rng([seed, form == "inp"])
-    kind = rng.choice(["hex8", "hex8", "tet4", "tet10", "hex20"])
-    mesh = solid("hex27" if kind == "hex20" else kind, tuple(rng.integers(1, 4, 3)), SIZE)
+    mesh = solid(str(rng.choice(["hex8", "hex8", "tet4"])), tuple(rng.integers(1, 4, 3)), SIZE)
     origin, turn = rng.uniform(-0.5, 0.5, 3), frame(rng)
-    points = origin + mesh.points @ turn.T
-    corners = mesh.cells[:, : 4 if kind[0] == "t" else 8]
-    cells = with_middles(points, corners, MIDDLES[form].get(kind, ()))
-    used, cells = np.unique(cells, return_inverse=True)
-    cells = cells.reshape(len(corners), -1)
-    root = np.flatnonzero(np.abs(mesh.points[used, 0]) < 1e-9)
-    writer = (Bulk if form == "bdf" else Keywords)(rng, points[used], cells, root, kind)
+    points, kind = origin + mesh.points @ turn.T, mesh.cell_type
+    root = np.flatnonzero(np.abs(mesh.points[:, 0]) < 1e-9)
+    writer = (Bulk if form == "bdf" else Keywords)(rng, points, mesh.cells, root, kind)
     refused = rng.random() < 0.4
     table = CARDS if form == "bdf" else KEYWORDS
     name = str(rng.choice(list(table))) if refused else ""
     extra = [str(card) for card in rng.choice(HARMLESS[form], 2, replace=False)]
     files = writer.write([*extra, *([table[name]] if refused else [])])
-    return Deck(files, name, origin, turn, kind, len(cells), writer.digits)
-
-
-def with_middles(points, corners, edges):
-    """Cells with the nodes that lie amid these edges, in this order."""
-    cells = [corners]
-    for edge in edges:
-        middle = points[corners[:, list(edge)]].mean(axis=1)
-        distance = np.linalg.norm(points[None] - middle[:, None], axis=2)
-        assert distance.min(axis=1).max() < 1e-9
-        cells.append(distance.argmin(axis=1)[:, None])
-    return np.column_stack(cells)
+    return Deck(files, name, origin, turn, kind, len(mesh.cells), writer.digits)
 
 
 class Bulk:
@@ -144,11 +121,10 @@ class Bulk:
 
     def __init__(self, rng, points, cells, root, kind):
         self.rng, self.points, self.cells, self.root, self.kind = rng, points, cells, root, kind
-        self.form = rng.choice(["small", "left", "wide", "free"])
-        self.digits = 5 if self.form in ("small", "left") else 10
-        self.mark = rng.choice(["plus", "blank", "named", "none"])
+        self.form = rng.choice(["small", "wide", "free"])
+        self.digits = 5 if self.form == "small" else 10
+        self.mark = "*" if self.form == "wide" else str(rng.choice(["+", ""]))  # of further lines
         self.small = rng.random() < 0.3  # letters
-        self.n_marks = 0
 
     def number(self, value):
         if isinstance(value, str | int | np.integer):
@@ -167,27 +143,18 @@ class Bulk:
         words = [self.number(f) for f in fields]
         while not words[-1]:
             words.pop()
-        n = 4 if self.form == "wide" else 8
+        wide = self.form == "wide"
+        n = 4 if wide else 8
         rows = [words[k : k + n] for k in range(0, len(words), n)]
-        if self.form == "wide" and len(rows) % 2:
+        if wide and len(rows) % 2:
             rows.append([])  # wide cards have an even number of lines
-        star = "*" if self.form == "wide" else ""
-        lines, head = [], name + star
-        for k, row in enumerate(rows):
-            self.n_marks += 1
-            mark = {"plus": "+", "named": f"+A{self.n_marks}"}.get(self.mark, "")
-            mark = mark.replace("+", star or "+") if k + 1 < len(rows) else ""
-            row = row + [""] * (n - len(row))
-            if self.form == "free":
-                lines.append(",".join([head, *row, *([mark] if mark else [])]))
-            else:
-                width, side = (16 if star else 8), ">" if self.form == "small" else "<"
-                lines.append(f"{head:<8}" + "".join(f"{w:{side}{width}}" for w in row) + mark)
-            # wide lines need their star
-            plus = self.form == "free" and self.mark not in ("blank", "none")
-            head = mark or star or "+" * plus
-            if self.form != "free" and not star and self.mark == "blank":
-                head = "+"
+        heads = [name + "*" * wide] + [self.mark] * (len(rows) - 1)
+        if self.form == "free":
+            lines = [",".join([head, *row]) for head, row in zip(heads, rows, strict=True)]
+        else:
+            width = 16 if wide else 8
+            lines = [f"{head:<8}" + "".join(f"{word:>{width}}" for word in row)
+                     for head, row in zip(heads, rows, strict=True)]  # fmt: skip
         text = "\n".join(line.rstrip() for line in lines)
         return text.lower() if self.small else text
 
@@ -269,7 +236,7 @@ class Keywords:
             files["points.txt"] = "** points\n" + "\n".join(rows) + "\n"
             source = rng.choice([", INPUT=points.txt", "\n*Include, input=points.txt"])
             nodes = [f"*NODE{option}{source}"]
-        kind = {"hex8": "C3D8R", "tet4": "C3D4", "tet10": "C3D10", "hex20": "C3D20"}[self.kind]
+        kind = {"hex8": "C3D8R", "tet4": "C3D4"}[self.kind]
         element = f"*Element, type={self.change(kind)}, elset={self.change('All')}"
         cells = [element, *self.rows_of_cells()]
         held = [f"*NSET, NSET={self.change('Root')}", *(f"{k + 1}," for k in self.root)]
@@ -292,8 +259,7 @@ class Keywords:
         made = self.generated(rows) if self.kind == "hex8" else None
         if made and self.rng.random() < 0.7:
             return [", ".join(map(str, rows[0])), "*ELGEN, ELSET=ALL", made]
-        cut = 5 if self.kind == "hex8" else 16
-        parts = [filter(None, (row[:cut], row[cut:])) for row in rows]
+        parts = [filter(None, (row[:5], row[5:])) for row in rows]
         return [",\n".join(", ".join(map(str, part)) for part in row) for row in parts]
 
     def generated(self, rows):

@@ -26,22 +26,32 @@ def bar_that_bends():
 
 
 class Reader(HTMLParser):
-    """Collects tags that do not close, attributes, and text."""
+    """Collects tags, text, links, scripts and styles with their attributes, and the policy."""
 
     def __init__(self):
         super().__init__()
-        self.open, self.links, self.text = [], [], ""
+        self.open, self.tags, self.links, self.found = [], [], [], []
+        self.text, self.policy = "", None
 
     def handle_starttag(self, tag, attrs):
+        given = dict(attrs)
+        self.tags.append(tag)
         if tag not in ("meta", "img"):
             self.open.append(tag)
-        self.links += [value for key, value in attrs if key in ("src", "href")]
+        if tag in ("script", "style"):
+            self.found.append((tag, given, ""))
+        if given.get("http-equiv") == "Content-Security-Policy":
+            self.policy = given["content"]
+        self.links += [given[key] for key in ("src", "href") if key in given]
 
     def handle_endtag(self, tag):
         assert self.open.pop() == tag
 
     def handle_data(self, data):
         self.text += data
+        if self.cdata_elem:
+            tag, given, text = self.found[-1]
+            self.found[-1] = tag, given, text + data
 
 
 def read(path):

@@ -97,6 +97,7 @@ markers = { p = [0, 0, 0], q = [0, 0, 1] }
 mass = 1
 inertia = [1, 1, 1]
 at = [4, 2, 3]
+spin = [0, 0, 500]
 markers = { p = [0, 0, 0] }
 [joints]
 gear = { kind = "gear", joint1 = "turn", joint2 = "slide", ratio = 0.1 }
@@ -150,44 +151,6 @@ between = ["ground.o", "c.p"]
 normal = [0, 0, 1]
 radius = "5 cm"
 stiffness = 1e6
-[simulation]
-t_end = 1
-"""
-
-MORE = """\
-gravity = [0, 0, 0]
-[bodies.a]
-mass = 1
-inertia = [1, 1, 1]
-at = [0, 0, 0]
-markers = { p = [0, 0, 0] }
-[rods.wire]
-points = [[0, 0, 0], ["1 m", 0, 0], [2, "10 cm", 0]]
-section = { kind = "tube", diameter = "10 mm", thickness = "1 mm" }
-material = { E = "210 GPa", nu = 0.3, rho = 7850 }
-elements = 4
-[joints.turn]
-kind = "revolute"
-between = ["wire.end", "a.p"]
-axis = [0, 0, 1]
-[drives.d]
-joint = "turn"
-law = { expression = "30*sin(2*pi*t/0.5)", unit = "deg" }
-[motors.m]
-joint = "turn"
-law = { expression = "-k*(x - 0.3*step(t, 0, 0.2)) - 5*v", constants = { k = "200 N m/rad" } }
-[laws.spring]
-between = ["wire.start", "a.p"]
-expression = "-1e3*max(0, x - 1)^1.5 - 2*v*abs(v)"
-[laws.bump]
-between = ["wire.2", "a.p"]
-x = ["1 m", 2, 3]
-values = ["1 kN", 0, 0]
-interpolation = "cubic"
-[events]
-far = { kind = "distance", between = ["wire.start", "a.p"], value = "9 m", terminal = true }
-turned = { kind = "coordinate", joint = "turn", value = "90 deg", direction = "rising" }
-low = { kind = "position", marker = "a.p", axis = [0, 0, 1], expression = "x + 0.1*v - sin(t)" }
 [simulation]
 t_end = 1
 """

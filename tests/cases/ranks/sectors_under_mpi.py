@@ -10,7 +10,6 @@ import numpy as np
 
 import rom
 from rom.components.wheels.sector import each_diameter
-from rom.errors import ModesMissedError, RomError
 
 
 def wheel():
@@ -84,7 +83,7 @@ def _in_a_megabyte(model):
 
 def _alone(diameter):
     if diameter == 3:
-        raise ModesMissedError("3 modes were found.")
+        raise rom.ModesMissedError("3 modes were found.")
     return diameter
 
 
@@ -92,7 +91,7 @@ def said(call):
     """Kind and text of the error of a call."""
     try:
         call()
-    except (RomError, IndexError) as error:
+    except (rom.RomError, IndexError) as error:
         return f"{type(error).__name__}: {error}"
     return ""
 

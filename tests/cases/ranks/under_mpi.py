@@ -13,7 +13,6 @@ from dolfinx.mesh import meshtags
 import rom
 from cases.boxes import box
 from cases.solid import STEEL
-from rom.errors import MaterialError, ParallelError
 from rom.fe.elasticity import assemble
 from rom.fe.parallel import collective, install_abort_hook, on_root
 
@@ -50,7 +49,7 @@ def fail(kind):
     install_abort_hook()
     if kind == "one":
         if COMM.rank == COMM.size - 1:
-            raise MaterialError("rho = 0 on one rank.")
+            raise rom.MaterialError("rho = 0 on one rank.")
         COMM.Barrier()
     elif kind == "bug":
         if COMM.rank == COMM.size - 1:
@@ -59,15 +58,15 @@ def fail(kind):
     elif kind == "together":
         with collective(COMM):
             if COMM.rank == COMM.size - 1:
-                raise MaterialError("rho = 0 on the last rank.")
+                raise rom.MaterialError("rho = 0 on the last rank.")
     elif kind == "all":
         try:
             with collective(COMM):
                 assert [0.0][COMM.rank] == 0.0
-        except ParallelError as error:
+        except rom.ParallelError as error:
             n = COMM.allreduce(1)
             if COMM.rank == 0:
-                raise MaterialError(f"{n} ranks met: {error}") from error
+                raise rom.MaterialError(f"{n} ranks met: {error}") from error
             COMM.Barrier()
     elif kind == "root":
         on_root(COMM, lambda: 1 / 0)

@@ -1,6 +1,4 @@
-"""Faults generated from tables.
+"""Faults from tables, each a line in a `cases_*.py`: what is done, and what may come of it.
 
-A case is one line in a `cases_*.py`: a name, what is done, what may come of it, and the words that
-name the culprit. What is done is a command line behind ``rom``, or a function of the folder it runs
-in; the folder is a fresh copy of the stock of valid files in `stock.py`.
+It is done in a fresh copy of the folder of valid files in `stock.py`.
 """

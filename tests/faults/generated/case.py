@@ -7,25 +7,15 @@ from pathlib import Path
 from typing import Any
 
 CLASSES = {  # number of the class: its module
-    "3": "geometry",  # geometries as programs
-    "4": "motion",  # what is kept of one
     "6": "files",  # and lines, also of several mistakes at once
     "7": "bounds",
-    "8": "together",  # alone, and beside others
-    "R": "reliability",  # odd cases of the table
+    "8": "together",  # alone, beside others, and where something is full
+    "R": "models",
 }
 
 
 class Works:
     """The fault does no harm: the call returns, and what the case itself requires holds."""
-
-
-class Warned:
-    """The call returns, with a `RomWarning` that has the words."""
-
-
-class Silent:
-    """The call returns, and warns of nothing."""
 
 
 def require(holds: object, what: object) -> None:
@@ -39,11 +29,9 @@ class Case:
 
     name: str  # what is wrong, unique in its class
     act: str | Callable[[Path], Any]  # a command line behind ``rom``, or a function of the folder
-    accept: tuple[type, ...]  # error classes, `Works`, `Warned` or `Silent`
+    accept: tuple[type, ...]  # error classes or `Works`
     words: tuple[str | tuple[str, ...], ...] = ()  # all stand in the message, of a tuple one
-    given: tuple[Callable[[Path], object], ...] = field(
-        default=(), repr=False
-    )  # prepare the folder
+    given: tuple[Callable[[Path], object], ...] = field(default=(), repr=False)  # before it
     fe: bool = False  # needs FEniCSx
     leaves: bool = False  # files may stay although an error is raised
 
@@ -70,11 +58,6 @@ def write(name: str, content: str | bytes) -> Callable[[Path], object]:
     """Writes a file."""
     data = content if isinstance(content, bytes) else content.encode()
     return lambda folder: (folder / name).write_bytes(data)
-
-
-def geometry(line: str) -> Callable[[Path], object]:
-    """One more statement in the geometry of the stock."""
-    return edit("box.geo", "Mesh.MeshSizeMin", f"{line}\nMesh.MeshSizeMin")
 
 
 def all_cases() -> dict[str, Case]:

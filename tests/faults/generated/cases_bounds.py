@@ -5,28 +5,24 @@ import zipfile
 import numpy as np
 
 import rom
-from generated.case import Silent, Warned, Works, case, edit, write
-from generated.stock import MATRICES, STEEL, body, model, pendulum
+from generated.case import case, write
+from generated.stock import MATRICES, body, pendulum
 from rom.errors import ConfigError, FileFormatError, InterfaceError, MeshError, ResourceError
 
 HUGE = 10**12
 SIZES = (ConfigError, ResourceError, rom.ModelError)
 REDUCE = f"reduce {MATRICES} -o a.npz"
-TOLD = str(HUGE)
 LINES = {
-    "modes": (REDUCE.replace("-m 4", f"-m {HUGE}"), TOLD),
+    "modes": (REDUCE.replace("-m 4", f"-m {HUGE}"), f"{HUGE}"),
     "modes of five thousand digits": (REDUCE.replace("-m 4", "-m " + 5000 * "9"), "999"),
-    "nodes in a set": (f"{REDUCE} --set root=1-{HUGE}", f"1-{HUGE}"),
     "labels beyond integers": (f"{REDUCE} --set root={10**30}", "1000000"),
-    "characteristic modes": (f"{REDUCE} --characteristic {HUGE}".replace("rbe2", "full"), TOLD),
+    "characteristic modes": (f"{REDUCE} --characteristic {HUGE}".replace("rbe2", "full"), f"{HUGE}"),
     "polynomials": (REDUCE.replace("rbe2", f"polynomial:{HUGE}"), f"order {HUGE} on interface 'root'"),
     "harmonics": (REDUCE.replace("rbe2", f"fourier:{HUGE},1"), f"{HUGE} harmonics"),
     "steps": ("simulate pendulum.toml --t-end 1e9 --dt 1e-9 -o out", "1e+18"),
     "an end beyond numbers": ("simulate pendulum.toml --t-end 1e308 -o out", "t_end"),
 }  # fmt: skip
 CALLS = {
-    "modes": (lambda: rom.modes(model(), HUGE), TOLD),
-    "modes of free-free": (lambda: body(method=rom.FreeFree(HUGE)), TOLD),
     "orders of a polynomial": (
         lambda: body(interfaces={"root": rom.Polynomial(10**6), "tip": "rbe2"}), "1000000"),
     "mass": (lambda: moved(mass=1e308), ("bob", "mass", "t = ")),
@@ -54,19 +50,18 @@ def falling(g):
 
 
 def bomb(folder):
-    """Four gigabytes of zeros in four megabytes."""
+    """A gigabyte of zeros in a megabyte."""
     with zipfile.ZipFile(folder / "good.npz", "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive, \
             archive.open("K.npy", "w", force_zip64=True) as file:  # fmt: skip
         np.lib.format.write_array_header_1_0(
-            file, {"descr": "<f8", "fortran_order": False, "shape": (2**29 // 4,)}
+            file, {"descr": "<f8", "fortran_order": False, "shape": (2**27,)}
         )
-        zeros = bytes(2**24)
         for _ in range(2**6):
-            file.write(zeros)
+            file.write(bytes(2**24))
 
 
 def members(folder):
-    """A body of a hundred thousand arrays."""
+    """A body of twenty thousand arrays."""
     with zipfile.ZipFile(folder / "good.npz", "w") as archive:
         for k in range(20_000):
             archive.writestr(f"a{k}.npy", b"")
@@ -97,16 +92,4 @@ CASES = [
                          "pendulum.toml": "simulate pendulum.toml -o out",
                          "K.mtx": REDUCE, "box.msh": "mesh box.msh",
                          "deck.inp": REDUCE}.items()),
-    *(case(f"a scale of {x}", f"modes box.msh {STEEL} --degree 1 --scale {x} -n 7",
-           (Works, Warned, ConfigError, MeshError), ("scale", "0 m", "size", "locks"), fe=True)
-      for x in ("1e-9", "1e6", "1e-300", "1e300")),
-    *(case(f"{name} of {x}", f"modes box.msh --degree 1 -n 7 --E {E} --nu 0.3 --rho {rho}",
-           (Warned, ConfigError, rom.errors.MaterialError, rom.errors.SolverError), ("m/s", "E", "rho"), fe=True)
-      for name, x, E, rho in (("E", "1e300", "1e300", "7850"), ("E", "1e-300", "1e-300", "7850"),
-                              ("rho", "1e300", "210e9", "1e300"), ("rho", "1e-300", "210e9", "1e-300"))),
-    case("a time without a step", "simulate pendulum.toml --t-end 1e-300 --dt 1e-301 -o out",
-         (*SIZES, rom.errors.SolverError, Silent, Warned), ("dt", "t_end", "e-30"),
-         leaves=True),
-    case("a mass without unit prefix", "simulate pendulum.toml -o out", (*SIZES, FileFormatError), "mass",
-         given=edit("pendulum.toml", "mass = 1.0", 'mass = "1e400 kg"')),
 ]  # fmt: skip

@@ -1,34 +1,33 @@
 """Without the libraries one lacks, in circumstances one does not choose, and beside others."""
 
 import os
+import re
+import resource
+import signal
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import numpy as np
 
 import rom
 from cases.command import python, ran
 from generated.case import Works, case, require
-from generated.stock import KINDS, STEEL, body, model, pendulum
+from generated.stock import body, pendulum
 from rom.cli.main import main
-from rom.errors import ConfigError, ResourceError, RomError
 
-MISSING = {  # a library, a command that needs it, and a word of the refusal
+MISSING = {  # a library, and a command that needs it
     "h5py": "simulate pendulum.toml --history h5 -o out",
     "pyvista": "view good.npz -o a.png",
     "matplotlib": "view good.npz -o a.png",
-    "dolfinx": f"modes box.geo {STEEL}",
+    "dolfinx": "modes box.geo --E 210e9 --nu 0.3 --rho 7850",
 }
-LIGHT = {
-    "check": ["check", "good.npz"],
-    "export": ["export", "good.npz", "a.vtu"],
-    "simulate": ["simulate", "pendulum.toml", "-o", "out", "-q"],
-    "reduce": ["reduce", "part.toml", "-o", "a.npz"],
-}
+NO = "/proc/none"
 CIRCUMSTANCES = {  # of the environment: none of them changes what is computed
     "no HOME": {"HOME": None},
     "a HOME that is not there": {"HOME": "/nowhere"},
+    "places nobody can write": {"HOME": NO, "XDG_CACHE_HOME": NO, "NUMBA_CACHE_DIR": NO},
     "a German locale": {"LC_ALL": "de_DE.UTF-8", "LANG": "de_DE.UTF-8"},
     "the locale C": {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONIOENCODING": "ascii"},
     "a TMPDIR that is not there": {"TMPDIR": "/nowhere"},
@@ -42,12 +41,8 @@ CIRCUMSTANCES = {  # of the environment: none of them changes what is computed
 def started(*words, **environment):
     """A finished process of rom, with some variables changed or taken away."""
     env = {k: v for k, v in (os.environ | environment).items() if v is not None}
-    return python("-m", "rom", *words, env=env, stdin=subprocess.DEVNULL)
-
-
-def beginning(*words):
-    return subprocess.Popen([sys.executable, "-m", "rom", *words], stdout=subprocess.PIPE,
-                            stderr=subprocess.PIPE)  # fmt: skip
+    done = python("-m", "rom", *words, env=env, stdin=subprocess.DEVNULL)
+    require(done.returncode == 0, f"exit code {done.returncode}: {done.stderr[-500:]!r}")
 
 
 def without(library, words):
@@ -61,29 +56,7 @@ def without(library, words):
         done = ran(sys.executable, "-P", "-c", code)
         require("Traceback" not in done.stderr, done.stderr[-500:])
         require(done.returncode == 6, f"exit code {done.returncode}: {done.stderr[-300:]}")
-        raise ResourceError(done.stderr)
-
-    return act
-
-
-def in_circumstances(environment, words):
-    def act(folder):
-        done = started(*words, **environment)
-        require(done.returncode == 0, f"exit code {done.returncode}: {done.stderr[-500:]!r}")
-
-    return act
-
-
-def several(n, words, output):
-    """The same command at the same time: each ends well, or says what is in its way."""
-
-    def act(folder):
-        runs = [beginning(*words) for _ in range(n)]
-        ended = [(*run.communicate(timeout=60), run.returncode) for run in runs]
-        codes = [code for *_, code in ended]
-        require(set(codes) <= {0, 2, 6} and 0 in codes, f"{codes}: {ended[0][1][-300:]!r}")
-        require(not [err for _, err, _ in ended if b"Traceback" in err], "a traceback")
-        output(folder)
+        raise rom.ResourceError(done.stderr)
 
     return act
 
@@ -93,21 +66,13 @@ def threads(work, n=4):
 
     def act(folder):
         with ThreadPoolExecutor(n) as pool:
-            found = list(pool.map(lambda k: work(folder, k), range(n)))
+            found = list(pool.map(lambda _: work(folder), range(n)))
         require(all(np.array_equal(found[0], x) for x in found), "threads disagree")
 
     return act
 
 
-def motion(folder, k):
-    return rom.simulate(pendulum(), t_end=0.05, dt=0.01).q
-
-
-def frequencies(folder, k):
-    return body().frequencies(8)
-
-
-def written(folder, k):
+def written(folder):
     rom.save(body(), folder / "same.npz")
     return rom.load(folder / "same.npz").K
 
@@ -132,40 +97,72 @@ def in_a_gone_folder(call, wanted):
 def same_bits(folder):
     """Two processes of different hash seeds compute the same bits."""
     for name, seed in (("a", "1"), ("b", "2")):
-        done = started("simulate", "pendulum.toml", "-o", name, "-q", PYTHONHASHSEED=seed)
-        require(done.returncode == 0, done.stderr[-300:])
+        started("simulate", "pendulum.toml", "-o", name, "-q", PYTHONHASHSEED=seed)
     one, other = ((folder / name / "motion.csv").read_bytes() for name in "ab")
     require(one == other, "bits")
 
 
-def again(folder):
-    """An error in one call leaves the next one alone."""
-    for _ in range(3):
+def locked(folder):
+    """A mechanism that locks leaves the motion until then."""
+    code = main(["simulate", "lock.toml", "-o", "out", "-q"])
+    require(code == 5, f"exit code {code}")
+    rows = (folder / "out/motion.csv").read_text().splitlines()[1:]
+    require(len(rows) >= 15, "most of the motion is lost")
+
+
+def full(write):
+    """A disk that takes no more than a kilobyte: the old limit holds again afterwards."""
+
+    def act(folder):
+        before = resource.getrlimit(resource.RLIMIT_FSIZE)
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (1000, before[1]))
         try:
-            rom.reduce(model(), method=rom.CraigBampton(99), interfaces=KINDS)
-        except RomError:
-            pass
-    require(np.isfinite(body().frequencies(8)).all(), "no frequencies")
+            write()
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+    return act
+
+
+def peak():
+    """Most memory that was resident [kB]."""
+    return int(re.search(r"VmHWM:\s*(\d+)", Path("/proc/self/status").read_text())[1])
+
+
+def growth(folder):
+    """Memory of many steps of which few are kept: below a kilobyte a step."""
+    rom.simulate(pendulum(), t_end=1.0, dt=1e-3, save_every=100)
+    Path("/proc/self/clear_refs").write_text("5")  # the peak begins anew
+    before = peak()
+    rom.simulate(pendulum(), t_end=50.0, dt=1e-3, save_every=10_000)
+    grown = (peak() - before) / 50_000
+    require(grown < 1, f"{grown} kB a step")
 
 
 CASES = [
     # two of them need others, which the light environment has not either and names first
-    *(case(f"without {name}", without(name, words), ResourceError, name, leaves=True,
+    *(case(f"without {name}", without(name, words), rom.ResourceError, name, leaves=True,
            fe=name in ("pyvista", "dolfinx"))
       for name, words in MISSING.items()),
-    *(case(f"{what} with {name}", in_circumstances(environment, LIGHT[what]), Works)
-      for name, environment in CIRCUMSTANCES.items()
-      for what in (("simulate",) if name in ("no HOME",) else ("check",))),
-    case("a German locale and a geometry", in_circumstances(CIRCUMSTANCES["a German locale"], ["mesh", "box.geo"]),
-         Works, fe=True),
-    case("three meshes at once", several(3, ["mesh", "box.geo"], lambda folder: None), Works, fe=True),
-    case("motions in threads", threads(motion), Works),
-    case("reductions in threads", threads(frequencies), Works),
+    *(case(f"check with {name}", lambda folder, env=env: started("check", "good.npz", **env), Works)
+      for name, env in CIRCUMSTANCES.items()),
+    case("a German locale and a geometry",
+         lambda folder: started("mesh", "box.geo", **CIRCUMSTANCES["a German locale"]), Works, fe=True),
+    case("motions in threads", threads(lambda folder: rom.simulate(pendulum(), t_end=0.05, dt=0.01).q), Works),
+    case("reductions in threads", threads(lambda folder: body().frequencies(8)), Works),
     case("one file from several threads", threads(written), Works),
     case("a folder that is gone", in_a_gone_folder(
         lambda folder: main(["check", str(folder / "good.npz"), "-q"]), 0), Works),
     case("a folder that is gone as output",
-         in_a_gone_folder(lambda folder: rom.save(body(), "a.npz"), None), (ConfigError, ResourceError), ("a.npz", "folder")),
+         in_a_gone_folder(lambda folder: rom.save(body(), "a.npz"), None), (rom.ConfigError, rom.ResourceError), ("a.npz", "folder")),
     case("two processes, the same bits", same_bits, Works),
-    case("a call after an error", again, Works),
+    case("a mechanism that locks", locked, Works),
+    case("a mechanism that locks, by name", "simulate lock.toml -o out", rom.SolverError, "rod", leaves=True),
+    case("a full disk for a table",
+         full(lambda: rom.write_history(rom.simulate(pendulum(), t_end=0.5, dt=0.001), "a.csv")),
+         rom.ResourceError, "a.csv"),
+    case("a full disk for a body", full(lambda: rom.save(rom.load("good.npz"), "a.npz")),
+         rom.ResourceError, "a.npz"),
+    case("many steps", growth, Works),
 ]  # fmt: skip

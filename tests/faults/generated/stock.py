@@ -9,58 +9,24 @@ import rom
 from cases.boxes import BOX_GEO
 from cases.files import damage
 from cases.files.cells import blocks_of, solid, write_msh
+from cases.files.toml_files import PENDULUM
 from cases.solid import block
 
 PLANTED = "pwned"  # part of the name of every file that planted code makes
 KINDS = {"root": "rbe2", "tip": "rbe2"}
-STEEL = "--E 210e9 --nu 0.3 --rho 7850"
 MATRICES = "K.mtx --mass M.mtx --nodes deck.inp -i root=rbe2 -i tip=rbe2 --no-certificate -m 4"
-GEO = 'DefineConstant[ lc = {1, Name "lc"} ];\n' + BOX_GEO.replace("= 1;", "= lc;")
-BUILDER = """def build(gmsh, lc=1.0):
-    gmsh.model.occ.addBox(0, 0, 0, 1, 1, 1)
-    gmsh.model.occ.synchronize()
-    gmsh.model.addPhysicalGroup(3, [1], 1)
-    gmsh.option.setNumber("Mesh.MeshSizeMax", lc)
-"""
-REDUCED = """[interfaces]
+PART = """name = "part"
+[matrices]
+stiffness = "K.mtx"
+mass = "M.mtx"
+nodes = "deck.inp"
+[interfaces]
 root = "rbe2"
 tip = "rbe2"
 [reduction]
 modes = 4
 reference = "root"
 certificate = false
-"""
-PART = f"""name = "part"
-[matrices]
-stiffness = "K.mtx"
-mass = "M.mtx"
-nodes = "deck.inp"
-{REDUCED}[damping]
-ratio = 0.01
-"""
-SOLID = f"""name = "solid"
-[geometry]
-file = "box.msh"
-degree = 1
-[material]
-E = "210 GPa"
-nu = 0.3
-rho = 7850.0
-{REDUCED}"""
-PENDULUM = """name = "pendulum"
-gravity = [0, -9.81, 0]
-[bodies.bob]
-mass = 1.0
-inertia = [1e-3, 1e-3, 1e-3]
-at = [0.2, 0, 0]
-markers.pin = [-0.2, 0, 0]
-[joints.hinge]
-kind = "revolute"
-between = [{ ground = [0, 0, 0] }, "bob.pin"]
-axis = [0, 0, 1]
-[simulation]
-t_end = 0.05
-dt = 0.01
 """
 LOCK = """gravity = [0, 0, 0]
 [bodies]
@@ -81,8 +47,8 @@ dt = 0.005
 def fill(folder: Path) -> None:
     """Write the stock."""
     folder.mkdir()
-    texts = {"box.geo": GEO, "build.py": BUILDER, "part.toml": PART, "solid.toml": SOLID,
-             "pendulum.toml": PENDULUM, "lock.toml": LOCK}  # fmt: skip
+    geo = 'DefineConstant[ lc = {1, Name "lc"} ];\n' + BOX_GEO.replace("= 1;", "= lc;")
+    texts = {"box.geo": geo, "part.toml": PART, "pendulum.toml": PENDULUM, "lock.toml": LOCK}
     for name, content in texts.items():
         (folder / name).write_text(content)
     box = solid()
@@ -110,25 +76,14 @@ def pendulum(**bob: Any) -> Any:
     mech = rom.Mechanism(gravity=(0, -9.81, 0))
     numbers = {"mass": 1.0, "inertia": (1e-3,) * 3, "at": (0.2, 0, 0)}
     part = mech.add_rigid("bob", **(numbers | {"markers": {"pin": (-0.2, 0, 0)}} | bob))
-    mech.revolute("hinge", origin(mech), part.marker("pin"), axis=(0, 0, 1))
+    mech.revolute("hinge", mech.ground.marker((0, 0, 0)), part.marker("pin"), axis=(0, 0, 1))
     return mech
 
 
 def compile_kernels() -> None:
     """Compile what cases call, where nothing is compiled yet: that is no hang."""
-    mech = pendulum()
-    mech.drive("motor", "hinge", lambda t: 0.0 * t)
-    still = rom.equilibrium(pendulum())
-    for method in ("generalized-alpha", "bdf", "dop853"):
+    for method in ("generalized-alpha", "dop853"):
         rom.simulate(pendulum(), t_end=0.02, dt=0.01, method=method)
-    rom.simulate(mech, t_end=0.02, dt=0.01)
-    rom.linearize(pendulum(), still)
-    rom.transmissibility(mech, None, [1.0], drive="motor", motion=mech.part("bob").marker("pin"))
-
-
-def origin(mech: Any) -> Any:
-    """The origin, on the ground."""
-    return mech.ground.marker((0, 0, 0))
 
 
 def matrices(folder: Path) -> None:
