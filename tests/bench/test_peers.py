@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+import rom
 from benchmarks.benchmarks import motion
 from benchmarks.models import bar
 from benchmarks.peers import compare, films, reference, rods
@@ -23,8 +24,6 @@ from rom.components.cosserat import body, straight
 from rom.components.journal_bearing import equilibrium
 from rom.components.transmission import Shaft, rest
 from rom.components.wind.wind_turbine import RATED_SPEED, blade, ramp, run_up
-from rom.errors import ConfigError
-from rom.mbs.integrate.simulation import simulate
 
 STORED = json.loads((TESTS / "reference" / "exudyn_motion.json").read_text())
 
@@ -52,7 +51,7 @@ def test_paths_differ_from_those_of_exudyn_by_the_error_of_the_step(mesh, name):
 def test_no_joint_of_the_mechanisms_is_redundant(mesh, name):
     body, runs = reference.case(name, mesh)
     mech = built(runs[0].mechanism, body)
-    sol = simulate(mech, t_end=1e-3, dt=1e-4)
+    sol = rom.simulate(mech, t_end=1e-3, dt=1e-4)
     assert sol.statistics["redundant"] == 0
     assert np.abs(sol.gap).max() < 1e-9
     # they start as they are described: no velocity is corrected
@@ -91,7 +90,7 @@ def test_figures_say_rates_ratio_and_difference(monkeypatch):
 
 def test_samples_that_do_not_divide_the_steps_are_refused(mesh):
     body = peer.reduced(mesh, 2)
-    with pytest.raises(ConfigError, match="20 samples do not divide 30 steps"):
+    with pytest.raises(rom.ConfigError, match="20 samples do not divide 30 steps"):
         peer.Run(pendulum(body), 1e-2, 30)
 
 
@@ -103,7 +102,7 @@ def test_steps_leave_no_memory_behind(mesh):
     def held(steps):
         tracemalloc.start()
         before = sys.getallocatedblocks()
-        sol = simulate(mech, t_end=steps * 1e-5, dt=1e-5, save_every=steps // 4)
+        sol = rom.simulate(mech, t_end=steps * 1e-5, dt=1e-5, save_every=steps // 4)
         blocks, peak = sys.getallocatedblocks() - before, tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
         assert (sol.statistics["steps"], len(sol.t)) == (steps, 5)

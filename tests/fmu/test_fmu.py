@@ -18,10 +18,8 @@ from cases.mbs.mechanisms import random_body, simulate_quietly
 from cases.mbs.parts import ORIGIN, on_guide
 from cases.mbs.trusses import truss
 from cases.paths import ROOT
-from rom.errors import ConfigError, ResourceError, RomWarning
 from rom.fmu.driven import Driven
 from rom.io.fmu.description import structured
-from rom.mbs.mechanism import Mechanism
 
 # two processes of which one has just compiled the kernels and the other read them from the cache
 # differ in the last bit; of two that read them none does
@@ -128,7 +126,7 @@ def moved(step, force, dt, end=0.1):
     """Position and velocity of the slider after steps with a force held over each."""
     driven = Driven(crank_by_hand(), inputs=("gas",), outputs=("slider.b",), dt=dt)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RomWarning)
+        warnings.simplefilter("ignore", rom.RomWarning)
         driven.start(0.0)
         for k in range(round(end / step)):
             driven.set([2], [force(k * step)])
@@ -165,7 +163,7 @@ def test_a_jump_of_an_input_costs_no_order():
 
 def flywheel():
     """A wheel of 0.2 kg m^2 on an axle, a sledge of 2 kg on rails."""
-    mech, marks = Mechanism(gravity=ORIGIN), {"hub": ORIGIN, "rim": (0.5, 0, 0)}
+    mech, marks = rom.Mechanism(gravity=ORIGIN), {"hub": ORIGIN, "rim": (0.5, 0, 0)}
     solid = {"mass": 1.0, "inertia": (0.1, 0.1, 0.2), "markers": marks}
     wheel = mech.add_rigid("wheel", at=ORIGIN, **solid)
     mech.revolute("axle", mech.ground.marker(ORIGIN), wheel.marker("hub"), axis=(0, 0, 1))
@@ -221,7 +219,7 @@ def test_motors_torques_and_forces_follow_their_inputs():
 def test_a_spread_load_follows_its_amplitude():
     """Its weight is taken from a body that would fall otherwise."""
     body = random_body(np.random.default_rng(3))
-    mech = Mechanism()
+    mech = rom.Mechanism()
     part = mech.add_flexible("one", body)
     load = rom.mass_load(body, (0.0, 0.0, 9.81))
     mech.spread_load("lift", part, load, lambda t: 5.0, frame="world")
@@ -423,7 +421,7 @@ def test_a_mechanism_that_cannot_start_says_why(tmp_path, monkeypatch):
     ],
 )
 def test_what_cannot_be_written_is_refused(tmp_path, script, options, message):
-    with pytest.raises(ConfigError, match=message):
+    with pytest.raises(rom.ConfigError, match=message):
         written(tmp_path, script, **options)
     assert not (tmp_path / "m.fmu").exists()
 
@@ -437,15 +435,15 @@ def test_what_cannot_be_written_is_refused(tmp_path, script, options, message):
     ],
 )
 def test_unknown_names_are_refused(inputs, outputs, message):
-    with pytest.raises(ConfigError, match=message):
+    with pytest.raises(rom.ConfigError, match=message):
         Driven(crank_by_hand(), inputs=inputs, outputs=outputs, dt=1e-3)
 
 
 def test_an_fmu_ends_in_fmu_and_needs_a_compiler(tmp_path, monkeypatch):
-    with pytest.raises(ConfigError, match=r"is written as \.fmu"):
+    with pytest.raises(rom.ConfigError, match=r"is written as \.fmu"):
         rom.write_fmu("m.py", tmp_path / "m.zip", dt=1.0)
     monkeypatch.setenv("PATH", str(tmp_path))
-    with pytest.raises(ResourceError, match="needs a C compiler"):
+    with pytest.raises(rom.ResourceError, match="needs a C compiler"):
         written(tmp_path, CRANK)
 
 

@@ -15,7 +15,6 @@ from cases.mbs.fmu_instance import Instance, fmpy
 from cases.mbs.mechanisms import random_body, simulate_quietly
 from cases.solid import block, reduced
 from rom.errors import ConfigError, InterfaceError
-from rom.mbs.mechanism import Mechanism
 
 pytestmark = pytest.mark.usefixtures("no_python")
 MOTION = ("displacement", "rotation", "velocity", "angular_velocity")
@@ -122,7 +121,7 @@ def test_small_motions_are_those_of_the_multibody_integrator(body, free, tmp_pat
     """Its equations are not linear and its signs are its own."""
     small = 1e-5
     force, torque = np.array([1.0, -2.0, 0.5]) * small, np.array([0.3, 0.2, -0.4]) * small
-    mech = Mechanism(gravity=(0.0, 0.0, 0.0))
+    mech = rom.Mechanism(gravity=(0.0, 0.0, 0.0))
     part = mech.add_flexible("one", body)
     mech.force("f", part.marker("b"), force)
     mech.torque("t", part.marker("b"), torque)

@@ -8,16 +8,13 @@ from numba import njit
 from scipy.integrate import solve_ivp
 from scipy.linalg import block_diag, eigh
 
+import rom
 from rom import rotation
-from rom.body.flexible import FlexibleBody
 from rom.body.records import Marker
 from rom.body.stiffening import elastic_loads, known_loads
-from rom.errors import RomWarning
 from rom.mbs.equations.equations import element_energy, evaluate, residual, tangents
 from rom.mbs.equations.packing import pack
-from rom.mbs.integrate.simulation import simulate
 from rom.mbs.kernels.work import workspace
-from rom.mbs.mechanism import Mechanism
 
 
 @njit
@@ -50,7 +47,7 @@ def nodal_body(x, Ms, phi, K=None, D=None, markers=None, name="body"):
     M = np.einsum("kia,ij,lja->kl", phi, Ms, phi)
     K = np.zeros((r, r)) if K is None else K
     omega = np.sqrt(np.maximum(np.linalg.eigvals(np.linalg.solve(M, K)).real, 0)) if r else K[0]
-    return FlexibleBody(
+    return rom.FlexibleBody(
         name=name,
         mass=float(Ms.sum()),
         first_moment=Ms.sum(axis=0) @ x,
@@ -124,7 +121,7 @@ def random_pose(rng):
 
 def two_soft(rng, gravity=(0, 0, 0), *, damped=True, stiffened=False):
     """A mechanism of two flexible bodies, anywhere and in any motion, and both of them."""
-    mech = Mechanism(gravity=gravity)
+    mech = rom.Mechanism(gravity=gravity)
     bodies = (("one", {"stiffened": stiffened}), ("two", {"r": 3}))
     return mech, *(
         mech.add_flexible(name, random_body(rng, damped=damped, **kind), **random_pose(rng))
@@ -183,7 +180,7 @@ def simeon_rod(axial_mass_divisor=1.0):
     S_kl[1, 0, :2, 2:], S_kl[0, 1, 2:, :2] = -B[:2, 2:], -B[:2, 2:].T
     tip, zero = np.zeros((2, 3, 4))
     tip[0, 3] = 1.0
-    return FlexibleBody(
+    return rom.FlexibleBody(
         name="rod",
         mass=m,
         first_moment=np.array([m * l / 2, 0, 0]),
@@ -209,7 +206,7 @@ def simeon_crank(axial_mass_divisor=1.0, start=None):
         [0.0, 0.0, 1.03339863e-5, 1.69327969e-5],
         [0.444896112581599, 4.634339319238670e-3, -1.78591076e-6, -2.68938672e-6],
     )
-    mech, speed, l1 = Mechanism(gravity=(0, 0, 0)), c["speed"], c["l1"]
+    mech, speed, l1 = rom.Mechanism(gravity=(0, 0, 0)), c["speed"], c["l1"]
     half, across = np.array([l1 / 2, 0, 0]), c["J1"] - c["m1"] * l1**2 / 4
     solid = {"mass": c["m1"], "inertia": (1e-4, across, across), "at": half}
     moving = {"velocity": (0, speed * l1 / 2, 0), "omega": (0, 0, speed)}
@@ -236,13 +233,13 @@ def joined_crank(mech, crank, rod, slider, speed):
 def simulate_quietly(mechanism, **options):
     """Simulate a mechanism whose redundant constraints, and start beside its joints, are known."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RomWarning)
-        return simulate(mechanism, **{"assemble": True} | options)
+        warnings.simplefilter("ignore", rom.RomWarning)
+        return rom.simulate(mechanism, **{"assemble": True} | options)
 
 
 def slider_crank(l1=0.1, l2=0.3, speed=50.0, gravity=0.0, rod=None):
     """Driven slider-crank in the xy plane with a rigid rod, or a flexible one in the rod frame."""
-    mech = Mechanism(gravity=(0, -gravity, 0))
+    mech = rom.Mechanism(gravity=(0, -gravity, 0))
     start = {"velocity": (0, speed * l1, 0), "omega": (0, 0, -speed * l1 / l2)}
     solid = {"mass": 1.0, "inertia": (1e-3, 1e-3, 2e-3), "at": (0, 0, 0), "omega": (0, 0, speed)}
     crank = mech.add_rigid("crank", **solid, markers={"o": (0, 0, 0), "a": (l1, 0, 0)})
@@ -340,7 +337,7 @@ def lattice_motion(lattice_data, times, y0, v0, outer, held=()):
 
 def rotor(speed, *, across=0.3, along=0.5, kx=300.0, ky=500.0):
     """A disc on a ball joint, turning about z, two springs against its tilt."""
-    mech = Mechanism(gravity=(0, 0, 0))
+    mech = rom.Mechanism(gravity=(0, 0, 0))
     marks = {"c": (0, 0, 0), "tip": (0, 0, 1)}
     disc = mech.add_rigid("disc", mass=4.0, inertia=(across, across, along), at=(0, 0, 0),
                           omega=(0, 0, speed), markers=marks)  # fmt: skip

@@ -5,7 +5,6 @@ import pytest
 
 import rom
 from rom.components.cosserat import body, straight
-from rom.errors import ConfigError
 
 ORIGIN = (0.0, 0.0, 0.0)
 X, Y, Z = np.eye(3)
@@ -90,7 +89,7 @@ def boxed():
     return mech, mech.ground.marker(ORIGIN), box.marker(ORIGIN)
 
 
-def refused_on(build, rows, error=ConfigError):
+def refused_on(build, rows, error=rom.ConfigError):
     """A test that each call names its culprit, and leaves a mechanism as it was.
 
     Args:

@@ -11,7 +11,6 @@ from cases.mbs.parts import ORIGIN, X, Y, Z, held_rod, on_guide, on_hinge
 from cases.refusals import refuses
 from rom.components.cosserat import along, body
 from rom.components.orbits import equilibria
-from rom.errors import ConfigError, ModelError, SolverError
 
 
 def column(mech, name="column", x=0.0, half=1.0):
@@ -260,15 +259,15 @@ def test_what_makes_no_path_is_named():
             "joint coordinates that forces act on",
         ),
     ):
-        refuses(ConfigError, why, rom.continuation, mech, **wish)
+        refuses(rom.ConfigError, why, rom.continuation, mech, **wish)
     for ask in (rom.equilibrium, rom.linearize):
-        with pytest.raises(ConfigError, match="joint coordinates that forces act on"):
+        with pytest.raises(rom.ConfigError, match="joint coordinates that forces act on"):
             ask(mech, rom.equilibrium(truss()[0]))
     free = rom.Mechanism(gravity=(0, 0, 0))
     free.add_rigid("stone", mass=1, inertia=(1, 1, 1), at=(0, 0, 0))
-    refuses(ModelError, "there is no unique equilibrium", rom.continuation, free, (0.0, 1.0))
+    refuses(rom.ModelError, "there is no unique equilibrium", rom.continuation, free, (0.0, 1.0))
     stray = rom.Mechanism().ground.marker((0, 0, 7))
-    with pytest.raises(ConfigError, match="must be a marker"):
+    with pytest.raises(rom.ConfigError, match="must be a marker"):
         rom.continuation(mech, (0.0, 1.0)).position(stray)
 
 
@@ -276,7 +275,7 @@ def test_a_path_that_is_lost_leaves_what_was_found():
     """A law that ends: no finite force behind t = 1."""
     mech, top = hinged_column()
     mech.force("end", top, lambda t: (0, 0, 0.0 if t < 1.0 else np.nan))
-    with pytest.raises(SolverError) as caught:
+    with pytest.raises(rom.SolverError) as caught:
         rom.continuation(mech, (0.0, 3.0))
     path = caught.value.solution
     assert 0.9 < path.t[-1] < 1.0

@@ -15,14 +15,12 @@ from cases.mbs.parts import ORIGIN, X, Y, Z, below, on_guide, on_hinge
 from cases.refusals import refuses
 from rom.errors import ConfigError, ModelError, RomWarning, SolverError
 from rom.mbs.analysis.tangent import Tangent
-from rom.mbs.elements.contact.impact import Impact
-from rom.mbs.mechanism import Mechanism
 
 g = 9.81
 
 
 def pendulum(angle, length=0.7):
-    mech = Mechanism(gravity=(0, 0, -g))
+    mech = rom.Mechanism(gravity=(0, 0, -g))
     on_hinge(mech, below(angle, length), inertia=(0.1, 0.2, 0.2))
     return mech
 
@@ -85,7 +83,7 @@ def test_a_cantilever_sags_by_its_weight():
     """rho A g L^4 / 8 E I at the tip, less what 20 modes do not see."""
     length, EI, rhoA = 2.0, 30.0, 0.5
     body = stiffened_beam(length, EI, rhoA, stiffened=False)
-    mech = Mechanism(gravity=(0, -1e-2, 0))
+    mech = rom.Mechanism(gravity=(0, -1e-2, 0))
     beam = mech.add_flexible("beam", body)
     mech.fixed("clamp", mech.ground.marker((0, 0, 0)), beam.marker("root"))
     state = rom.equilibrium(mech)
@@ -112,7 +110,7 @@ def test_the_torque_that_holds_a_slider_crank():
 @pytest.mark.once
 def test_statics_are_where_a_damped_motion_ends():
     """Two links, a spring across, a flexible arm at the end."""
-    mech = Mechanism(gravity=(0, 0, -g))
+    mech = rom.Mechanism(gravity=(0, 0, -g))
     link = on_hinge(mech, X / 4, "link", mass=1.0, inertia=(0.01, 0.02, 0.02))
     end = link.marker(X / 4)
     body = stiffened_beam(0.5, 40.0, 1.0, n_modes=2)
@@ -135,7 +133,7 @@ def test_statics_are_where_a_damped_motion_ends():
 def test_a_pendulum_on_a_turning_shaft(speed):
     """cos(angle) = g / (L W^2) of a point mass, and omega^2 = W^2 sin^2: Watt's governor."""
     length = 0.7
-    mech = Mechanism(gravity=(0, 0, -g))
+    mech = rom.Mechanism(gravity=(0, 0, -g))
     shaft = mech.add_rigid("shaft", mass=1.0, inertia=(1, 1, 1), at=ORIGIN).marker(ORIGIN)
     mech.revolute("axle", mech.ground.marker(ORIGIN), shaft, axis=Z)
     mech.drive("motor", "axle", lambda t: speed * t, rate=lambda t: speed)
@@ -148,7 +146,7 @@ def test_a_pendulum_on_a_turning_shaft(speed):
 
 
 def test_what_nothing_holds_is_named():
-    mech = Mechanism(gravity=(0, 0, -g))
+    mech = rom.Mechanism(gravity=(0, 0, -g))
     cart = on_guide(mech, "cart")
     with pytest.raises(ModelError, match=r"'cart' slides along \(1, 0, 0\) and no force opposes"):
         rom.equilibrium(mech)
@@ -170,7 +168,7 @@ def test_a_search_that_leads_nowhere_is_given_up(law, error, said, most, monkeyp
         return found(cls, *arguments)
 
     monkeypatch.setattr(Tangent, "of", classmethod(counted))
-    mech = Mechanism(gravity=(0, 0, 0))
+    mech = rom.Mechanism(gravity=(0, 0, 0))
     cart = on_guide(mech, "cart", at=0.1 * X)
     mech.user_force("push", lambda t, a: (law(a.position[0]) * X, 0 * X), cart)
     refuses(error, said, rom.equilibrium, mech)
@@ -189,9 +187,9 @@ def test_wrong_arguments_are_named():
 @pytest.mark.parametrize("height", [-1e-5, 0.0, 0.5])
 def test_a_ball_falls_on_a_floor_and_rests_on_hertzs_contact(height):
     """depth = (m g / k)^(2/3), and small vibrations with 3/2 k sqrt(depth)."""
-    mech, k = Mechanism(gravity=(0, 0, -g)), 1e8
+    mech, k = rom.Mechanism(gravity=(0, 0, -g)), 1e8
     ball = on_guide(mech, "ball", mass=2.0, at=(0, 0, 0.1 + height), axis=Z)
-    law = Impact(stiffness=k, exponent=1.5)
+    law = rom.mbs.Impact(stiffness=k, exponent=1.5)
     mech.sphere_on_plane("floor", mech.ground.marker(ORIGIN), ball, law, normal=Z, radius=0.1)
     state, depth = rom.equilibrium(mech), (2.0 * g / k) ** (2 / 3)
     assert_allclose(0.1 - state.q[2], depth, rtol=1e-9)
@@ -202,7 +200,7 @@ def test_a_ball_falls_on_a_floor_and_rests_on_hertzs_contact(height):
 @pytest.mark.once
 def test_a_body_sags_in_its_bushing():
     """m g / k down, m g a / k_r about y; the overhang turns with it."""
-    mech, k, turn, arm = Mechanism(gravity=(0, 0, -g)), 5e3, 400.0, 0.2
+    mech, k, turn, arm = rom.Mechanism(gravity=(0, 0, -g)), 5e3, 400.0, 0.2
     box = mech.add_rigid("box", mass=2.0, inertia=(0.1,) * 3, at=(arm, 0, 0))
     foot, stiffness = box.marker((-arm, 0, 0)), (k, k, k, turn, turn, turn)
     mech.bushing("rubber", mech.ground.marker(ORIGIN), foot, stiffness=stiffness)

@@ -13,12 +13,11 @@ from cases.mbs.parts import ORIGIN, Z
 from cases.refusals import refused, refuses
 from rom.components.gear_mesh import Correction, GearPair
 from rom.errors import ModelError
-from rom.mbs import BallBearing
 
 EXACT = {"rtol": 1e-11, "atol": 1e-13, "method": "DOP853"}
 PAIR = GearPair((26, 40), 4e-3, 0.03, thinning=5e-5)
 TURNS = {"pinion axle": 2 * np.pi / 26, "gear axle": -2 * np.pi / 40}
-BALLS = BallBearing(9, 12.7e-3, 65e-3, clearance=20e-6)
+BALLS = rom.mbs.BallBearing(9, 12.7e-3, 65e-3, clearance=20e-6)
 
 
 def geared(speed, inertia=((1e-3, 1e-3, 2e-3), (5e-3, 5e-3, 9e-3)), torque=80.0, **more):

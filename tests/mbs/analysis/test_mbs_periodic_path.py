@@ -15,7 +15,6 @@ from cases.mbs.parts import ORIGIN, X, Z, on_guide, on_hinge
 from cases.refusals import refused, refuses
 from rom.components.orbits.family import Family
 from rom.components.orbits.flow import Flow
-from rom.errors import ConfigError, ModelError, SolverError
 
 FORCE, DAMPING, SPRING, FREE = 0.3, 0.1, 2.5, 0.8
 
@@ -227,7 +226,7 @@ def test_a_step_that_halves_or_doubles_an_unknown_period_is_refused(change):
     step[-1] = 0.1
     assert family.moved(at, step, 1.0).period == pytest.approx(1.1 * motion.period)
     step[-1] = change
-    refuses(SolverError, "period changes by too much", family.moved, at, step, 1.0)
+    refuses(rom.SolverError, "period changes by too much", family.moved, at, step, 1.0)
 
 
 def test_a_step_that_no_joint_allows_is_one_that_is_too_long(monkeypatch):
@@ -236,10 +235,10 @@ def test_a_step_that_no_joint_allows_is_one_that_is_too_long(monkeypatch):
     at = family.member(motion, 3.0)
 
     def torn(*_):
-        raise ModelError("joints contradict each other.")
+        raise rom.ModelError("joints contradict each other.")
 
     monkeypatch.setattr(Flow, "moved", torn)
-    with pytest.raises(SolverError, match="no start satisfies the joints: joints contradict"):
+    with pytest.raises(rom.SolverError, match="no start satisfies the joints: joints contradict"):
         family.moved(at, np.zeros(2 * family.scale.size + 1), 3.0)
 
 
@@ -261,7 +260,7 @@ def test_which_of_two_stable_motions_is_followed_the_start_says(exact, x, which)
 test_wrong_arguments_of_a_path_are_named = refused(
     (lambda: rom.periodic_path(across, (1.0, 1.0), period=6.0), "needs two values"),
     (lambda: rom.periodic_path(across, (1.0, 2.0), period=lambda w: -w), "period"),
-    error=ConfigError,
+    error=rom.ConfigError,
 )
 
 
@@ -272,7 +271,7 @@ def test_another_number_of_bodies_is_refused_and_what_was_found_is_kept():
             mech.add_rigid("more", mass=1.0, inertia=(1, 1, 1), at=(9, 0, 0))
         return mech
 
-    with pytest.raises(ConfigError, match=r"the bodies at 0.8") as caught:
+    with pytest.raises(rom.ConfigError, match=r"the bodies at 0.8") as caught:
         rom.periodic_path(build, (0.8, 1.2), period=lambda w: 2 * np.pi / w, steps=60)
     assert caught.value.solution.p.size >= 1
 
@@ -280,9 +279,9 @@ def test_another_number_of_bodies_is_refused_and_what_was_found_is_kept():
 def test_the_error_of_a_lost_path_holds_it():
     def build(w):
         if w > 1.0:
-            raise SolverError("no such mechanism.")
+            raise rom.SolverError("no such mechanism.")
         return across(w)
 
-    with pytest.raises(SolverError, match=r"lost behind 1: no such mechanism") as caught:
+    with pytest.raises(rom.SolverError, match=r"lost behind 1: no such mechanism") as caught:
         rom.periodic_path(build, (0.8, 1.2), period=lambda w: 2 * np.pi / w, steps=60)
     assert caught.value.solution.p[-1] <= 1.0

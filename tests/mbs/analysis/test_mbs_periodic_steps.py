@@ -11,12 +11,10 @@ import rom
 from benchmarks.units import as_mechanism
 from cases.gear_unit import rigid_unit
 from cases.mbs.parts import ORIGIN, Y, Z
-from rom.components.journal_bearing import iso_vg
 from rom.components.orbits import motion as search
 from rom.components.orbits.derivatives import by_differences, by_steps, confirmed, follows
 from rom.components.orbits.flow import Flow
 from rom.components.orbits.shooting import Return, Turns, turns_of
-from rom.errors import ModelError
 
 
 def swung(mechanism, period, steps=40, turns=None):
@@ -121,8 +119,8 @@ def test_films_that_remember_are_refused_by_name():
     """Their filling goes around with the oil, over revolutions; heat takes longer still."""
     unit = rigid_unit(speed=500.0)
     for mech in (as_mechanism(unit_with(cavitation="jfo")),
-                 as_mechanism(unit, oil=iso_vg(46), inlet=50.0)):  # fmt: skip
-        with pytest.raises(ModelError, match="'pinion low' remembers its oil, its heat"):
+                 as_mechanism(unit, oil=rom.mbs.iso_vg(46), inlet=50.0)):  # fmt: skip
+        with pytest.raises(rom.ModelError, match="'pinion low' remembers its oil, its heat"):
             rom.periodic_motion(mech, period=unit.mesh_period, start=rom.equilibrium(mech))
 
 
@@ -132,7 +130,7 @@ def test_a_period_of_parts_of_teeth_is_refused(teeth):
     unit = rigid_unit(speed=600.0, torque=30.0)
     mech = as_mechanism(unit)
     begin = {"period": teeth * unit.mesh_period, "start": rom.equilibrium(mech)}
-    with pytest.raises(ModelError, match=r"does not repeat|has gone on by 1\.1 teeth"):
+    with pytest.raises(rom.ModelError, match=r"does not repeat|has gone on by 1\.1 teeth"):
         rom.periodic_motion(mech, **begin)
 
 
@@ -219,7 +217,7 @@ def limited(longest):
     def move(found, y):
         lengths.append(float(np.abs(y).max()))
         if lengths[-1] > longest:
-            raise ModelError("too far.")
+            raise rom.ModelError("too far.")
         return moved_by(found, y)
 
     return lengths, move

@@ -10,14 +10,13 @@ from cases.mbs.parts import ORIGIN, X, Y, Z, on_guide, on_hinge
 from cases.refusals import refuses
 from rom.errors import ConfigError, ModelError, RomWarning, SolverError
 from rom.mbs.analysis.campbell import Campbell
-from rom.mbs.mechanism import Mechanism
 
 M1, M2, K1, K2, C1, C2 = 3.0, 1.0, 400.0, 150.0, 2.0, 0.5
 
 
 def absorber(*, damped=1.0, shaken=False):
     """A mass on springs that carries a second one, along x; on a base that a drive may shake."""
-    mech = Mechanism(gravity=(0, 0, 0))
+    mech = rom.Mechanism(gravity=(0, 0, 0))
     base = mech.ground.marker(ORIGIN)
     if shaken:
         base = on_guide(mech, "table", mass=7.0, guide="slide")
@@ -55,7 +54,7 @@ def test_response_of_two_masses_to_a_force():
 
 def test_the_response_to_a_couple_and_of_an_angle():
     """An undamped pendulum: angle per moment 1 / (J (w0^2 - w^2)), its bob L times as far."""
-    mech = Mechanism(gravity=(0, 0, -9.81))
+    mech = rom.Mechanism(gravity=(0, 0, -9.81))
     bob = on_hinge(mech, -Z / 2, inertia=(0.2, 0.3, 0.2))
     f, J = np.array([0.0, 0.4, 1.7]), 0.3 + 2.0 * 0.25
     ends = {"force": bob.marker("c"), "motion": bob.marker("c")}
@@ -131,7 +130,7 @@ def test_campbell_diagram_of_a_rotor_with_its_critical_speeds():
 
 def crossing(speed):
     """Two bobs on a turning shaft, one swings outwards, one sideways with a coil."""
-    mech = Mechanism(gravity=(0, 0, 0))
+    mech = rom.Mechanism(gravity=(0, 0, 0))
     turn = np.array([0, 0, speed])
     marks, solid = {"pin": (-0.5, 0, 0)}, {"mass": 1.0, "inertia": (1, 1, 1)}
     shaft = mech.add_rigid("shaft", **solid, at=ORIGIN, omega=turn).marker(ORIGIN)
@@ -170,7 +169,7 @@ def test_a_mechanism_as_a_whole_takes_its_equilibrium_at_each_speed():
     The slot turns freely: at constant momentum omega^2 = k / m - W^2 + 4 W^2 m r^2 / (J + m r^2).
     """
     k, m, rest, J = 200.0, 0.5, 0.4, 0.3
-    mech = Mechanism(gravity=(0, 0, 0))
+    mech = rom.Mechanism(gravity=(0, 0, 0))
     slot = mech.add_rigid("slot", mass=1.0, inertia=(J, J, J), at=ORIGIN).marker(ORIGIN)
     ball = mech.add_rigid("ball", mass=m, inertia=(1e-6,) * 3, at=(rest, 0, 0)).marker(ORIGIN)
     mech.revolute("axle", mech.ground.marker(ORIGIN), slot, axis=Z)

@@ -11,7 +11,6 @@ import rom
 from cases.mbs.parts import ORIGIN, Y, Z
 from cases.refusals import refused
 from rom import rotation
-from rom.errors import ConfigError, RomWarning
 from rom.mbs.analysis.local_equations import instant
 from rom.mbs.analysis.rotors.spins import Spins
 
@@ -195,7 +194,7 @@ test_spins_and_blades_that_are_none_are_refused = refused(
     (counted(["blade 0", "blade 1", "hub"]), "alike"),
     (counted([["blade 0", "hub"], ["blade 1"], ["blade 2"]]), "alike"),
     (counted([f"blade {k}" for k in (0, 2, 1, 3)]), "does not stand"),  # across, not around
-    error=ConfigError,
+    error=rom.ConfigError,
 )
 
 
@@ -229,6 +228,6 @@ def test_coefficients_that_stay_periodic_are_told():
     """On a support that is stiffer in one direction; blades counted together have constant ones."""
     mech = leaning(9.0)
     state = rom.equilibrium(mech, spin={"bearing": 9.0})
-    with pytest.warns(RomWarning, match="change with time"):
+    with pytest.warns(rom.RomWarning, match="change with time"):
         rom.linearize(mech, state)
     rom.linearize(mech, state, frame="world", blades=blades(3))

@@ -6,7 +6,6 @@ from numpy.testing import assert_allclose
 
 import rom
 from cases.mbs.parts import ORIGIN, X, Y, Z, on_guide
-from rom.errors import RomWarning
 
 G, R, MASS = 9.81, 0.3, 2.0
 SHARES = {"disc": (0.25, 0.5), "hoop": (0.5, 1.0)}  # of m r^2: about a diameter, about the axle
@@ -96,5 +95,5 @@ def test_a_motion_that_is_not_steady_is_named():
     mech = wheel("disc", 2.0)
     mech.force("push", mech.part("wheel").marker((0, 0, 0)), (50.0, 0, 0))
     mech.torque("turn", mech.part("wheel").marker((0, 0, 0)), (3.0, 0, 0))
-    with pytest.warns(RomWarning, match="is not steady"):
+    with pytest.warns(rom.RomWarning, match="is not steady"):
         rom.steady_motion(mech)

@@ -12,13 +12,10 @@ from cases.mbs.mechanisms import prepared, tangents_at
 from cases.mbs.parts import ORIGIN, X, Y, Z, on_guide
 from cases.mbs.tangents import forces_at
 from cases.refusals import refused, refuses
-from rom.errors import ConfigError
-from rom.mbs.elements.contact.impact import Impact
-from rom.mbs.mechanism import Mechanism
 from rom.rotation import exp, matrix, multiply
 
 g, MASS, HEIGHT, MU, STIFFNESS = 9.81, 2.0, 0.05, 0.5, 2e4
-LAW = Impact(1e5, exponent=1.0, damping=30.0, mu=MU, tangential_stiffness=STIFFNESS,
+LAW = rom.mbs.Impact(1e5, exponent=1.0, damping=30.0, mu=MU, tangential_stiffness=STIFFNESS,
              tangential_damping=100.0)  # fmt: skip
 FEET = {f"foot {k}": (0.1 * np.cos(a), 0.1 * np.sin(a), -HEIGHT)
         for k, a in enumerate(2 * np.pi / 3 * np.arange(3))}  # fmt: skip
@@ -26,7 +23,7 @@ FEET = {f"foot {k}": (0.1 * np.cos(a), 0.1 * np.sin(a), -HEIGHT)
 
 def block(angle, law=LAW, speed=0.0):
     """A block on three points, on an incline down along x."""
-    mech = Mechanism(gravity=(g * np.sin(angle), 0, -g * np.cos(angle)))
+    mech = rom.Mechanism(gravity=(g * np.sin(angle), 0, -g * np.cos(angle)))
     sink = MASS * g * np.cos(angle) / 3 / law.stiffness
     part = mech.add_rigid("block", mass=MASS, inertia=(0.01,) * 3, at=(0, 0, HEIGHT + 1e-6 - sink),
                           velocity=(speed, 0, 0), markers=FEET)  # fmt: skip
@@ -103,7 +100,7 @@ def test_a_block_that_slides_sticks_after_its_braking_way():
 
 def sled(law, load, x=0.0):
     """A ball that slides along x, pressed on a plane by ``load``."""
-    mech = Mechanism(gravity=(0, 0, 0))
+    mech = rom.Mechanism(gravity=(0, 0, 0))
     sink = (load / law.stiffness) ** (1.0 / law.exponent)
     place = (x, 0, 0.01 - sink)
     made = on_guide(mech, "sled", mass=MASS, at=place, base=place, guide="way")
@@ -169,7 +166,7 @@ def test_a_mass_on_a_spring_loses_two_limits_of_its_amplitude_each_half_swing():
 def test_a_ball_rolls_down_an_incline_with_five_sevenths():
     """Friction is 2/7 m g sin(a), which stretches the spring; the touching point runs around."""
     m, radius, angle = 0.5, 0.05, 0.2
-    mech = Mechanism(gravity=(g * np.sin(angle), 0, -g * np.cos(angle)))
+    mech = rom.Mechanism(gravity=(g * np.sin(angle), 0, -g * np.cos(angle)))
     law = replace(LAW, tangential_damping=5.0)
     sink = m * g * np.cos(angle) / law.stiffness
     J = 0.4 * m * radius**2
@@ -190,7 +187,7 @@ def test_a_ball_rolls_down_an_incline_with_five_sevenths():
 
 def pair(law, shove=0.0, spin=(0.0, 0.0, 0.0)):
     """Two bars across each other, free in space, drawn together by a spring of no length."""
-    mech = Mechanism(gravity=(0, 0, 0))
+    mech = rom.Mechanism(gravity=(0, 0, 0))
     turning = np.array(spin)
     for name, z, v in (("one", 0.0, 0.0), ("two", 0.0199, shove)):
         mech.add_rigid(name, mass=0.1, inertia=(1e-5,) * 3, at=(0, 0, z), omega=turning,
@@ -283,7 +280,7 @@ def test_the_limit_is_that_of_the_whole_pressure_while_bodies_meet():
 test_wrong_springs_are_refused = refused(
     (lambda: replace(LAW, tangential_stiffness=None), "tangential_damping = 100 needs a tang"),
     (lambda: replace(LAW, mu=0.0), "without friction holds nothing"),
-    error=ConfigError,
+    error=rom.ConfigError,
 )
 
 

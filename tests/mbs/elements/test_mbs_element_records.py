@@ -7,9 +7,7 @@ from numpy.testing import assert_allclose
 import rom
 from cases.refusals import refuses
 from rom.components import cosserat
-from rom.errors import ConfigError
 from rom.io.history import channels
-from rom.mbs.elements.contact.impact import Impact
 
 STIFFNESS, DAMPING, LOAD, LEVEL, MU = 100.0, 3.0, 1.0, 0.5, 0.1
 X_AXIS, Z_AXIS = (1, 0, 0), (0, 0, 1)
@@ -38,7 +36,7 @@ def slide():
     mech.motor("asked", "guide", lambda t, x, rate: -float(str(x)), compiled=False)
     mech.force("load", hook, lambda t: np.array([np.cos(5 * t), LOAD, 0]))
     mech.friction("friction", "guide", transition_speed=1e-2, coulomb=LEVEL, mu=MU)
-    mech.stop("stop", "guide", Impact(stiffness=1e4, exponent=1.0), upper=0.02)
+    mech.stop("stop", "guide", rom.mbs.Impact(stiffness=1e4, exponent=1.0), upper=0.02)
     mech.law("slipping", slipping, wall, hook, memory=[0.0], energy=True)
     mech.user_force("pushed", lambda t, a: (np.array([0, 0, 2.0]), np.zeros(3)), hook)
     return mech
@@ -143,5 +141,5 @@ def test_what_has_no_markers_is_refused():
     mech.force("push", rod.marker("end"), (0.05, 0, 0))
     sol = rom.simulate(mech, t_end=2e-3, dt=1e-3)
     assert sol.elements == ("push",)
-    refuses(ConfigError, r"'rod' .* acts on whole bodies, not on markers", sol.element, "rod")
-    refuses(ConfigError, r"no element 'pull'; there are \['push', 'rod'\]", sol.element, "pull")
+    refuses(rom.ConfigError, r"'rod' .* acts on whole bodies, not on markers", sol.element, "rod")
+    refuses(rom.ConfigError, r"no element 'pull'; there are \['push', 'rod'\]", sol.element, "pull")

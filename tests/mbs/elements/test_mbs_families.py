@@ -16,7 +16,6 @@ from rom.mbs.kernels.algebra import row, sub
 from rom.mbs.kernels.constraints import pair_stiffness, place_relative
 from rom.mbs.kernels.element_calls import energy, residuals, tangents
 from rom.mbs.kernels.tables import Array2, Index1, Table, table
-from rom.mbs.parts.bodies import Marker
 
 K, C, MASS, LENGTH = 200.0, 3.0, 2.0, 0.3
 
@@ -25,8 +24,8 @@ K, C, MASS, LENGTH = 200.0, 3.0, 2.0, 0.3
 class Cord:
     """Pulls one marker to another in all directions, with a force proportional to the gap."""
 
-    i: Marker
-    j: Marker
+    i: rom.mbs.Marker
+    j: rom.mbs.Marker
     stiffness: float
     damping: float
 

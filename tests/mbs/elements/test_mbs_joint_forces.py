@@ -6,21 +6,18 @@ from numba import njit
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
+import rom
 from cases.mbs import mechanisms
 from cases.mbs.mechanisms import simulate_quietly, slider_crank
 from cases.mbs.parts import X, Y, Z, on_axle, on_guide, refused_on
 from cases.mbs.tangents import by_position, by_velocity, difference, forces_at
 from cases.refusals import refuses
 from rom.errors import ConfigError, ModelError, SolverError
-from rom.mbs.analysis.equilibrium import equilibrium
-from rom.mbs.analysis.linearize import linearize
 from rom.mbs.elements import motors
 from rom.mbs.elements.contact.impact import Impact
 from rom.mbs.equations.equations import load_columns
 from rom.mbs.integrate.simulation import simulate
 from rom.mbs.kernels.constraints import constraint_gradient
-from rom.mbs.mechanism import Mechanism
-from rom.mbs.results.audit import audit
 
 
 @njit
@@ -35,13 +32,13 @@ g = 9.81
 
 
 def wheel(J=0.5, omega=0.0):
-    mech = Mechanism(gravity=(0, 0, 0))
+    mech = rom.Mechanism(gravity=(0, 0, 0))
     on_axle(mech, inertia=(J, J, J), omega=(0, 0, omega))
     return mech
 
 
 def block(mass=2.0, speed=0.0, gravity=g):
-    mech = Mechanism(gravity=(0, 0, -gravity))
+    mech = rom.Mechanism(gravity=(0, 0, -gravity))
     on_guide(mech, "block", mass=mass, velocity=(speed, 0, 0))
     return mech
 
@@ -56,7 +53,7 @@ def test_a_motor_with_a_straight_characteristic_runs_up_exponentially(method, co
     exact = 20.0 * (1 - np.exp(-3.0 / (0.5 * 20.0) * sol.t))
     assert_allclose(sol.omega("wheel")[:, 2], exact, atol=1e-5)
     assert_allclose(sol.energy.drives[-1], 0.25 * exact[-1] ** 2, rtol=1e-5)
-    assert audit(sol).ok, audit(sol)
+    assert rom.audit(sol).ok, rom.audit(sol)
 
 
 def test_a_law_of_time_and_angle_is_compiled_when_it_can_be_and_agrees_with_python():
@@ -109,7 +106,7 @@ WAYS = {
 def controlled_arm(way):
     """Two light links that bend, hinged to the ground and to each other, both hinges controlled."""
     body = mechanisms.lattice_body(mechanisms.lattice(stiffness=4e4, length=0.4, mass=0.02))
-    mech = Mechanism(gravity=(0, -g, 0))
+    mech = rom.Mechanism(gravity=(0, -g, 0))
     upper = mech.add_flexible("upper", body)
     lower = mech.add_flexible("lower", body, at=(0.4, 0, 0))
     pin = mech.ground.marker(mech.design_point(upper.marker("n0")))
@@ -137,7 +134,7 @@ def test_controllers_in_python_choose_steps_and_small_motions_as_compiled_ones_d
     for way in WAYS:
         mech = controlled_arm(way)
         sizes.append(simulate(mech, t_end=0.01).statistics["steps"])
-        around = linearize(mech, equilibrium(mech, t=0.0))
+        around = rom.linearize(mech, rom.equilibrium(mech, t=0.0))
         modes.append(around.eigenvalues)
     assert len(set(sizes)) == 1
     for found in modes[1:]:
@@ -183,7 +180,7 @@ def test_a_sliding_block_stops_after_v_over_mu_g(method):
     assert np.interp(0.9 * stop, sol.t, v) > 0.09 * v0
     assert_allclose(sol.position("block")[-1, 0], v0**2 / (2 * mu * g), rtol=2e-3)
     assert_allclose(sol.energy.damping[-1], 0.5 * 2.0 * v0**2, rtol=1e-4)
-    assert audit(sol).ok, audit(sol)
+    assert rom.audit(sol).ok, rom.audit(sol)
 
 
 def loaded(rng):
@@ -308,12 +305,12 @@ def test_friction_with_a_constant_level_is_welcome_there():
     mech.friction("shoes", "guide", coulomb=1.0, transition_speed=0.1)
     sol = simulate_quietly(mech, t_end=0.05, dt=1e-4)
     assert sol.energy.damping[-1] > 0.01
-    assert audit(sol).ok, audit(sol)
+    assert rom.audit(sol).ok, rom.audit(sol)
 
 
 def spatial_crank():
     """Motor, drive, load-dependent friction, a screw and a bushing, nothing redundant."""
-    mech = Mechanism()
+    mech = rom.Mechanism()
     crank = mech.add_rigid("crank", mass=1.0, inertia=(0.01, 0.01, 0.02), at=(0, 0, 0),
                            omega=(0, 0, 10.0),
                            markers={"o": (0, 0, 0), "a": (0.1, 0, 0)})  # fmt: skip
@@ -346,7 +343,7 @@ def test_the_power_balance_closes_with_friction_motors_and_screws():
     assert e.damping[-1] > 0.2 * turnover > 0.1
     assert np.abs(e.balance).max() < 1e-8 * turnover
     coarse = simulate(spatial_crank(), t_end=1.0, dt=5e-4)
-    assert audit(coarse).ok, audit(coarse)
+    assert rom.audit(coarse).ok, rom.audit(coarse)
     assert_allclose(coarse.q[-1], sol.q[-1], atol=1e-3)
     assert_allclose(coarse.energy.damping[-1], e.damping[-1], rtol=1e-3)
 

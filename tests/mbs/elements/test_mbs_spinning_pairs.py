@@ -6,7 +6,6 @@ from numpy.testing import assert_allclose
 
 import rom
 from rom.components.gear_mesh import Correction, GearPair
-from rom.errors import ConfigError, RomError
 from rom.mbs import Groove, JournalBearing
 from rom.mbs.analysis.equilibrium import _Search
 
@@ -54,11 +53,11 @@ def test_speeds_that_teeth_cannot_have_are_named():
     mech = rom.Mechanism()
     ends = [mech.add_rigid(name, mass=1, inertia=(1, 1, 1), at=(x, 0, 0), spin=(0, 0, speed))
             for name, x, speed in (("a", 0, 30.0), ("b", PAIR.distance, 19.5))]  # fmt: skip
-    with pytest.raises(ConfigError, match=r"teeth 26 and 40 need 30 and -19.5"):
+    with pytest.raises(rom.ConfigError, match=r"teeth 26 and 40 need 30 and -19.5"):
         mech.gear_mesh("mesh", *(end.marker(ORIGIN) for end in ends), axis=Z, pair=PAIR,
                        stiffness=1e10)  # fmt: skip
     balls, rings = rom.mbs.BallBearing(9, 0.01, 0.05), (ends[0].marker(ORIGIN), mech.ground)
-    with pytest.raises(ConfigError, match="both must be one"):
+    with pytest.raises(rom.ConfigError, match="both must be one"):
         mech.rolling_bearing("bearing", rings[0], rings[1].marker(ORIGIN), axis=(1, 0, 0),
                              bearing=balls)  # fmt: skip
 
@@ -109,7 +108,7 @@ def test_a_rotor_that_nothing_holds_against_its_drag_is_named_soon(build, most, 
     """Once around it has met all forces there are."""
     tangents, count = _Search.tangent, []
     monkeypatch.setattr(_Search, "tangent", lambda *x: count.append(1) or tangents(*x))
-    with pytest.raises(RomError, match=r"'rotor' turns about its own axis \(0, 0, 1\)"):
+    with pytest.raises(rom.RomError, match=r"'rotor' turns about its own axis \(0, 0, 1\)"):
         rom.equilibrium(build())
     assert len(count) < most
 

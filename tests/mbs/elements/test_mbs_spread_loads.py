@@ -14,7 +14,6 @@ from cases.refusals import refuses
 from cases.solid import block
 from rom import rotation
 from rom.body.records import Surface
-from rom.errors import ConfigError, ModelError
 from rom.reduction.full_model import operators
 from rom.reduction.interfaces.connection import connect
 
@@ -160,14 +159,14 @@ def test_messages():
     inside_out = replace(body, surface=replace(body.surface, triangles=TETRAHEDRON[:3]))
     box = mech.add_rigid("box", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0))
     for error, words, on, given in (
-        (ConfigError, "exactly one of pressure, traction and forces", body,
+        (rom.ConfigError, "exactly one of pressure, traction and forces", body,
          {"pressure": 1.0, "traction": (0, 0, 1)}),
-        (ConfigError, "chooses no triangle of the 4", body,
+        (rom.ConfigError, "chooses no triangle of the 4", body,
          {"pressure": 1.0, "where": lambda points: points[:, 0] > 1e9}),
-        (ConfigError, "no deformable interface 'top'", body, {"pressure": 1.0, "where": "top"}),
-        (ConfigError, r"needed is \(7, 3\)", body, {"forces": np.zeros(3)}),
-        (ModelError, "do not tell its inside from its outside", inside_out, {"pressure": 1.0}),
-        (ModelError, "carries no surface", replace(body, surface=None), {"pressure": 1.0}),
+        (rom.ConfigError, "no deformable interface 'top'", body, {"pressure": 1.0, "where": "top"}),
+        (rom.ConfigError, r"needed is \(7, 3\)", body, {"forces": np.zeros(3)}),
+        (rom.ModelError, "do not tell its inside from its outside", inside_out, {"pressure": 1.0}),
+        (rom.ModelError, "carries no surface", replace(body, surface=None), {"pressure": 1.0}),
     ):  # fmt: skip
         refuses(error, words, rom.surface_load, on, **given)
-    refuses(ConfigError, "is not one of body 'box'", mech.spread_load, "pull", box, load)
+    refuses(rom.ConfigError, "is not one of body 'box'", mech.spread_load, "pull", box, load)

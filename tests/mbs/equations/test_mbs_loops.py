@@ -13,9 +13,6 @@ from cases.refusals import refuses
 from rom.errors import ConfigError, ModelError, RomWarning
 from rom.mbs.equations import packing
 from rom.mbs.equations.equations import linearize_constraints
-from rom.mbs.integrate.simulation import simulate
-from rom.mbs.mechanism import Mechanism
-from rom.mbs.results.audit import audit
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*constraints repeat others")
 # crank, coupler, rocker, distance of the pivots [m]; start angle [rad], speed [rad/s]
@@ -35,7 +32,7 @@ def elbow(phi):
 
 def four_bar(*, repeated=True):
     """Four hinges, or hinges, a ball and a Cardan joint that only just hold it in its plane."""
-    mech = Mechanism(gravity=(0, -9.81, 0))
+    mech = rom.Mechanism(gravity=(0, -9.81, 0))
     pin, knee = elbow(np.array(START))
     crank = slender(mech, "crank", (0, 0), pin, 0.4)
     coupler = slender(mech, "coupler", pin, knee, 1.0)
@@ -54,7 +51,7 @@ def four_bar(*, repeated=True):
 
 def test_four_bar_of_hinges_warns_by_name_and_moves_as_its_closed_form():
     with pytest.warns(RomWarning, match="3 of 21 constraints .* joints O, A, B, C share"):
-        sol = simulate(four_bar(), t_end=0.4, dt=1e-3)
+        sol = rom.simulate(four_bar(), t_end=0.4, dt=1e-3)
     pin, knee = elbow(START + SPEED * sol.t)
     assert_allclose(sol.position("crank", "b")[:, :2], pin, atol=1e-9)
     assert_allclose(sol.position("rocker", "b")[:, :2], knee, atol=1e-9)
@@ -66,7 +63,7 @@ def test_four_bar_of_hinges_warns_by_name_and_moves_as_its_closed_form():
 def test_loads_of_the_repeated_four_bar_are_those_of_the_one_that_repeats_nothing():
     """In the plane equilibrium decides; out of it the least loads are none at all."""
     repeated = simulate_quietly(four_bar(), t_end=0.2, dt=1e-3)
-    single = simulate(four_bar(repeated=False), t_end=0.2, dt=1e-3)
+    single = rom.simulate(four_bar(repeated=False), t_end=0.2, dt=1e-3)
     assert single.statistics["redundant"] == 0
     for joint in "OABC":
         force, wanted = repeated.reaction(joint), single.reaction(joint)
@@ -79,7 +76,7 @@ def test_loads_of_the_repeated_four_bar_are_those_of_the_one_that_repeats_nothin
 
 def tumbling_door():
     """A leaf on two hinges of a frame; both tumble across the line of the hinges."""
-    mech = Mechanism(gravity=(0, 0, 0))
+    mech = rom.Mechanism(gravity=(0, 0, 0))
     points = {"low": (0, 0, -0.8), "high": (0, 0, 0.8)}
     frame = mech.add_rigid("frame", mass=30.0, inertia=(9.0, 8.0, 4.0), at=(0, 0, 0),
                            markers=points, omega=(2.0, 1.0, 0.5))  # fmt: skip
@@ -108,7 +105,7 @@ def test_multipliers_stay_those_of_least_norm_while_the_hinges_tumble(method):
 
 def hinge_and_ball(*drives):
     """A box on a hinge with every given drive, and a flexible body at rest on a ball joint."""
-    mech = Mechanism(gravity=(0, 0, 0))
+    mech = rom.Mechanism(gravity=(0, 0, 0))
     box = mech.add_rigid("box", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0),
                          markers={"a": (0, 0, 0), "b": (1, 0, 0)})  # fmt: skip
     body = random_body(np.random.default_rng(1))
@@ -128,17 +125,17 @@ def hinge_and_ball(*drives):
 )  # fmt: skip
 def test_drives_of_different_speed_or_position_are_refused_by_name(drives, words):
     """Rows of the ball joint are at rest: their round-off must not hide the drives."""
-    refuses(ModelError, words, simulate, hinge_and_ball(*drives), t_end=0.01, dt=1e-3)
+    refuses(ModelError, words, rom.simulate, hinge_and_ball(*drives), t_end=0.01, dt=1e-3)
 
 
 def test_drives_that_part_on_the_way_are_seen_by_the_audit():
     sol = simulate_quietly(hinge_and_ball(lambda t: t**2, lambda t: 2 * t**2), t_end=0.05, dt=1e-3)
-    assert [r.quantity for r in audit(sol).failures] == ["largest gap in a joint / size"]
+    assert [r.quantity for r in rom.audit(sol).failures] == ["largest gap in a joint / size"]
 
 
 def coil():
     """A wheel on a coil that turns several times."""
-    mech = Mechanism(gravity=(0, 0, 0))
+    mech = rom.Mechanism(gravity=(0, 0, 0))
     on_axle(mech, omega=(0, 0, 40.0))
     mech.rotational_spring("coil", "axle", stiffness=2.0)
     return mech
@@ -148,20 +145,20 @@ def coil():
 def test_a_state_of_the_same_bodies_with_other_joints_is_refused(build):
     """Compiled code would write beyond the end of its arrays."""
     joined = build()
-    free = Mechanism(gravity=(0, 0, 0))
+    free = rom.Mechanism(gravity=(0, 0, 0))
     free.parts.update(joined.parts)
     for one, other in ((joined, free), (free, joined)):
-        state = simulate(one, t_end=0.01, dt=1e-3).final
+        state = rom.simulate(one, t_end=0.01, dt=1e-3).final
         with pytest.raises(ConfigError, match=r"the state has \d+ coordinates.* constraints; this"):
-            simulate(other, t_end=0.02, dt=1e-3, state=state)
+            rom.simulate(other, t_end=0.02, dt=1e-3, state=state)
 
 
 def test_a_state_without_the_coil_is_refused():
     bare, wound = coil(), coil()
     bare.turns.clear()
-    state = simulate(bare, t_end=0.01, dt=1e-3).final
+    state = rom.simulate(bare, t_end=0.01, dt=1e-3).final
     words = "0 followed joint coordinates and remembered numbers; this mechanism has 1"
-    refuses(ConfigError, words, simulate, wound, t_end=0.02, dt=1e-3, state=state)
+    refuses(ConfigError, words, rom.simulate, wound, t_end=0.02, dt=1e-3, state=state)
 
 
 GRAVITY = (3.0, 0.0, -9.81)
@@ -255,7 +252,7 @@ def test_joints_that_share_loads_are_named_in_large_mechanisms():
 @pytest.mark.parametrize("others", [0, LOOPS])
 def test_a_start_in_line_is_refused(others):
     """A parallelogram folded flat, alone or among others: it could go on either way."""
-    mech = ladder(others) if others else Mechanism(gravity=(0, 0, 0))
+    mech = ladder(others) if others else rom.Mechanism(gravity=(0, 0, 0))
     arm, far, bar = (
         mech.add_rigid(name, mass=1.0, inertia=(0.1,) * 3, at=(x, 0, 0))
         for name, x in (("arm", 5.5), ("far", 7.5), ("bar", 6.5))

@@ -17,10 +17,8 @@ from rom.mbs.equations.equations import linearize_constraints
 from rom.mbs.equations.linear_solve import factorise_bordered, solve_bordered
 from rom.mbs.equations.packing import pack
 from rom.mbs.integrate.consistent_start import factorised, initial_state
-from rom.mbs.integrate.simulation import simulate
 from rom.mbs.integrate.step_memory import across
 from rom.mbs.kernels.work import workspace
-from rom.mbs.mechanism import Mechanism
 
 Z, GRAVITY = (0, 0, 1), 9.81
 
@@ -43,7 +41,7 @@ def add_link(mech, name, at, flexible=True, **moving):
 
 def chain(n, *, flexible=True, held=True, gravity=GRAVITY, moving=None):
     """Links in a row, hinged to each other and to the ground; velocities of each, if any."""
-    mech = Mechanism(gravity=(0, -gravity, 0))
+    mech = rom.Mechanism(gravity=(0, -gravity, 0))
     before = mech.ground.marker((0, 0, 0)) if held else None
     for k in range(n):
         given = moving[k] if moving else {}
@@ -70,7 +68,7 @@ def tied_chain(n=8):
 def tree(generations=3):
     """Flexible bodies that branch in space, with ball joints, universal joints and bushings."""
     rng = np.random.default_rng(11)
-    mech, body = Mechanism(gravity=(0, 0, -GRAVITY)), random_body(rng)
+    mech, body = rom.Mechanism(gravity=(0, 0, -GRAVITY)), random_body(rng)
     a, b = (np.asarray(body.markers[key].point) for key in "ab")
     tips = [mech.ground.marker((0, 0, 0))]
     places, made = [np.zeros(3)], 0
@@ -93,7 +91,7 @@ def tree(generations=3):
 
 def loops(cells=3):
     """Triangles of flexible links that close, one behind the other, each on the one before."""
-    mech = Mechanism(gravity=(0, -GRAVITY, 0))
+    mech = rom.Mechanism(gravity=(0, -GRAVITY, 0))
     before = mech.ground.marker((0, 0, 0))
     for k in range(cells):
         x = 0.6 * k
@@ -114,7 +112,7 @@ def loops(cells=3):
 def pinned(n=6):
     """A chain that hangs between two points; ball joints, so that nothing repeats."""
     rng = np.random.default_rng(5)
-    mech, body = Mechanism(gravity=(0, 0, -GRAVITY)), random_body(rng)
+    mech, body = rom.Mechanism(gravity=(0, 0, -GRAVITY)), random_body(rng)
     a, b = (np.asarray(body.markers[key].point) for key in "ab")
     before, at = mech.ground.marker((0, 0, 0)), -a
     for k in range(n):
@@ -153,7 +151,7 @@ def side_by_side(n, flexible=lambda k: True):
 
 def bridge():
     """Two bodies on universal joints of their own, and a ball joint between them."""
-    mech = Mechanism(gravity=(0, 0, -GRAVITY))
+    mech = rom.Mechanism(gravity=(0, 0, -GRAVITY))
     one = add_link(mech, "one", (0, 0, 0), flexible=False)
     two = add_link(mech, "two", (0.3, 0, 0), flexible=False)
     mech.universal("left", mech.ground.marker((0, 0, 0)), one.marker("a"), axis1=Z, axis2=(0, 1, 0))
@@ -178,7 +176,7 @@ def solved(monkeypatch):
     def run(mechanism, *, blocks, **options):
         monkeypatch.setattr(graph, "BLOCK_GAIN", 1e-12 if blocks else np.inf)
         assert pack(mechanism).by_blocks == blocks
-        return simulate(mechanism, **options)
+        return rom.simulate(mechanism, **options)
 
     return run
 
@@ -287,7 +285,7 @@ def ladder(n):
 
 def star(n):
     """Links around one hub."""
-    mech = Mechanism()
+    mech = rom.Mechanism()
     hub = mech.add_rigid("hub", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0), markers={"c": (0, 0, 0)})
     for k in range(n):
         link = add_link(mech, f"link {k}", (0, 0, 0))
@@ -413,7 +411,7 @@ def test_random_blocks_are_solved_like_their_whole_matrix(case, weak, monkeypatc
 
 def test_a_thousand_links_move():
     """Without a matrix of their size anywhere; the mass centre falls as the reaction lets it."""
-    sol = simulate(chain(1000, flexible=False), t_end=5e-3, dt=1e-3)
+    sol = rom.simulate(chain(1000, flexible=False), t_end=5e-3, dt=1e-3)
     assert sol.packed.by_blocks and sol.q.shape[1] == 7000
     packed = sol.packed
     at = packed.system.bodies.v_at

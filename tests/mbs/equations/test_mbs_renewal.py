@@ -5,7 +5,6 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
-from rom.mbs import Groove, JournalBearing
 from rom.mbs.analysis.local_equations import instant
 from rom.mbs.equations import renewal
 from rom.mbs.equations.equations import evaluate, residual, tangents
@@ -23,7 +22,7 @@ def shaft(cavitation="reynolds"):
     body = mech.add_rigid(
         "shaft", mass=40.0, inertia=(1.0, 1.05, 0.1), at=(0, 0, 0), omega=(0, 0, 300.0)
     )
-    film = JournalBearing(0.1, 0.05, 1e-4, [Groove(np.pi / 2, 0.35)], cells=(36, 4),
+    film = rom.mbs.JournalBearing(0.1, 0.05, 1e-4, [rom.mbs.Groove(np.pi / 2, 0.35)], cells=(36, 4),
                           cavitation=cavitation)  # fmt: skip
     for k, side in enumerate((-0.2, 0.3)):
         bush = mech.add_rigid(f"bush {k}", mass=5.0, inertia=(0.1,) * 3, at=(0, 0, side))

@@ -8,8 +8,6 @@ import rom
 from benchmarks.units import as_mechanism
 from cases.gear_unit import rigid_unit
 from cases.long import few
-from rom.errors import SolverError
-from rom.mbs import Impact
 
 ORIGIN, X, g = (0, 0, 0), (1, 0, 0), 9.81
 METHODS = ("generalized-alpha", "bdf")
@@ -78,7 +76,7 @@ def test_laws_in_python_are_asked_again_for_every_part_of_a_correction():
 def test_a_block_that_strikes_a_stop_in_long_steps_comes_to_rest_on_it(k, restitution, h):
     """Where a constant load and the stop balance: F = k d."""
     mech, load = block(0.01, 0.3), 0.2
-    law = Impact(k, 1.0, restitution=restitution, impact_speed=0.3)
+    law = rom.mbs.Impact(k, 1.0, restitution=restitution, impact_speed=0.3)
     mech.stop("stop", "guide", law, lower=-1e-3, upper=1e-3)
     mech.force("load", mech.part("block").marker(ORIGIN), (load, 0, 0))
     sol = rom.simulate(mech, t_end=1.0, dt=h, rho_inf=0.0)
@@ -99,6 +97,6 @@ def test_teeth_and_films_are_stepped_through_at_speeds_where_teeth_leave(rpm, st
 def test_a_force_that_jumps_has_no_balance_and_is_refused_before_the_last_correction():
     mech = block()
     mech.motor("motor", "guide", lambda t, x, v: -5.0 * np.sign(v), compiled=True)
-    with pytest.raises(SolverError, match=r"did not converge in [34]\d corrections") as caught:
+    with pytest.raises(rom.SolverError, match=r"did not converge in [34]\d corrections") as caught:
         rom.simulate(mech, t_end=1.0, dt=1e-2)
     assert caught.value.solution.t[-1] == pytest.approx(SPEED / 5.0, abs=1.1e-2)

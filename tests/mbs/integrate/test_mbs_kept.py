@@ -16,7 +16,6 @@ from cases.refusals import refuses
 from rom.errors import ConfigError, InterruptedRun, ResourceError, RomError, SolverError
 from rom.mbs.integrate import keeping, simulation
 from rom.mbs.integrate.run import Record
-from rom.mbs.mechanism import Mechanism
 
 FAULTS_EACH = 10 if ROM_LONG else 1
 
@@ -72,7 +71,7 @@ def mechanism(where, broken):
     """Two bodies on hinges, with all that a user may hand over; one of it breaks."""
     laws = dict.fromkeys(("force", "motor", "drive", "event", "load"), lambda t, value: value)
     laws[where] = broken
-    mech = Mechanism()
+    mech = rom.Mechanism()
     arm = {"mass": 1.0, "inertia": (0.1,) * 3, "markers": {"a": (-0.5, 0, 0), "b": (0.5, 0, 0)}}
     one, two = (mech.add_rigid(name, at=(x, 0, 0), **arm) for name, x in (("1", 0.5), ("2", 1.5)))
     three = mech.add_rigid("3", at=(0, 2, 0), mass=1.0, inertia=(1, 1, 1), markers={"c": (0, 0, 0)})

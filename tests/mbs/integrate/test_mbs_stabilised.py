@@ -11,7 +11,6 @@ import rom
 from cases.mbs.mechanisms import simulate_quietly, slider_crank
 from cases.mbs.motions import ball, free_crank, heavy_top, order_of, swing
 from rom import rotation
-from rom.errors import ConfigError
 from rom.mbs.equations.equations import linearize_constraints
 from rom.mbs.integrate.bdf import joined, multistep_coefficients
 from rom.mbs.kernels.work import workspace
@@ -144,5 +143,5 @@ def test_turns_join_to_the_turn_of_their_product():
     ],
 )
 def test_what_a_method_does_not_offer_is_refused(options, message):
-    with pytest.raises(ConfigError, match=message):
+    with pytest.raises(rom.ConfigError, match=message):
         rom.simulate(heavy_top(), **{"t_end": 1.0, "dt": 1e-3, **options})

@@ -16,8 +16,6 @@ from cases.mbs.tangents import forces_at, shifted
 from cases.mbs.tubes import tube
 from cases.refusals import refuses
 from rom.components.journal_bearing.films.journals import FIRST_CONTENT, KNOWN, TIME
-from rom.config.mechanism import read_mechanism
-from rom.errors import ConfigError
 from rom.mbs import Groove, JournalBearing
 
 DIAMETER, LENGTH, CLEARANCE, OUTER = 0.04, 0.04, 4e-5, 0.03
@@ -350,7 +348,7 @@ def test_what_is_no_elastic_bush_is_refused_by_name(given, words):
     shaft, _ = (mech.add_rigid(name, **solid) for name in ("shaft", "block"))
     on = given.pop("on")
     end = mech.part(on).marker("bore" if on == "bush" else ORIGIN)
-    with pytest.raises(ConfigError, match=words):
+    with pytest.raises(rom.ConfigError, match=words):
         mech.journal_bearing("mainbearing", shaft.marker(ORIGIN), end, **SOFT_FILM | given)
 
 
@@ -378,7 +376,7 @@ def test_a_file_asks_for_an_elastic_bush(tmp_path):
     body = bush(rom.FourierLegendre(1, 1), SOFT, (16, 1, 6))
     rom.save(body, tmp_path / "bush.rom.npz")
     (tmp_path / "m.toml").write_text(ENTRY)
-    made = read_mechanism(tmp_path / "m.toml").mechanism().journal_bearings["film"]
+    made = rom.read_mechanism(tmp_path / "m.toml").mechanism().journal_bearings["film"]
     mech = rom.Mechanism()
     part = mech.add_flexible("bush", body, at=ORIGIN)
     shaft = mech.add_rigid("shaft", mass=1.0, inertia=(0.1,) * 3, at=ORIGIN)
@@ -400,4 +398,4 @@ def test_a_file_that_asks_in_vain_is_told_where(kind, given, instead, words, tmp
     kind = kind or rom.FourierLegendre(1, 1)
     rom.save(bush(kind, SOFT, (16, 1, 6)), tmp_path / "bush.rom.npz")
     (tmp_path / "m.toml").write_text(ENTRY.replace(given, instead, 1) if given else ENTRY)
-    refuses(ConfigError, words, lambda: read_mechanism(tmp_path / "m.toml").mechanism())
+    refuses(rom.ConfigError, words, lambda: rom.read_mechanism(tmp_path / "m.toml").mechanism())

@@ -13,7 +13,6 @@ from cases.long import few
 from cases.mbs.films import SPEED, VISCOSITY, held_rotor, resting
 from cases.refusals import refused
 from rom.components import journal_bearing as component
-from rom.errors import ModelError
 from rom.mbs import Groove, JournalBearing, iso_vg
 
 
@@ -127,7 +126,7 @@ test_lobes_that_leave_no_room_are_named = refused(
     (lambda: rom.mbs.multilobe(0, 0.4), "must be at least 1"),
     (lambda: bearing(bore=lambda angles: 0 * angles), "bore must be > 0"),
     (lambda: bearing(bore=rom.mbs.multilobe(3, 0.4), preload=0.5), "a bore of its own"),
-    error=ModelError,
+    error=rom.ModelError,
 )
 
 

@@ -14,7 +14,6 @@ from rom.components.journal_bearing import film
 from rom.components.journal_bearing.films.cells import SPIN_COLUMN, cells_of
 from rom.components.journal_bearing.films.journals import FIRST_CONTENT, KNOWN, TIME
 from rom.components.journal_bearing.films.slopes import solve_film
-from rom.errors import ConfigError, ModelError, SolverError
 from rom.mbs import Groove, JournalBearing, iso_vg
 from rom.rotation import exp, matrix
 
@@ -266,7 +265,7 @@ test_what_no_bearing_is_is_refused_by_name = refused(
     (put(oil=-0.03), "oil of bearing 'mainbearing' .* = -0.03 must"),
     (put(oil=iso_vg(46)), "'mainbearing' has an oil; give its inlet"),
     (put(inlet=40.0), "'mainbearing' has an inlet temperature, but"),
-    error=ConfigError,
+    error=rom.ConfigError,
 )
 
 
@@ -275,19 +274,19 @@ def test_a_body_is_no_bearing_of_itself():
     end = mech.add_rigid("shaft", mass=1.0, inertia=(0.1,) * 3, at=ORIGIN).marker(ORIGIN)
     given = {"axis": (0, 0, 1), "bearing": bearing(), "oil": 0.03}
     words = "'b' connects body 'shaft' with itself"
-    refuses(ConfigError, words, mech.journal_bearing, "b", end, end, **given)
+    refuses(rom.ConfigError, words, mech.journal_bearing, "b", end, end, **given)
 
 
 def test_a_journal_that_hits_its_bush_is_named_with_the_time():
     mech = on_ground(bearing(), name="mainbearing", oil=1e-6)
     mech.force("blow", mech.parts["shaft"].marker(ORIGIN), (5e3, 0, 0))
     words = r"at t = 0\.00.*touches its bush in 'mainbearing'"
-    refuses(SolverError, words, rom.simulate, mech, t_end=0.01, dt=1e-4)
+    refuses(rom.SolverError, words, rom.simulate, mech, t_end=0.01, dt=1e-4)
 
 
 def test_no_film_carries_more_than_there_is_room_for():
     mech = held_rotor(bearing(grooves=()), (-1e12, 0), speed=SPEED, oil=1e-6)
-    errors = SolverError, ModelError
+    errors = rom.SolverError, rom.ModelError
     refuses(errors, "gap of 'film' open", rom.equilibrium, mech, spin={"turn": SPEED})
 
 
@@ -307,4 +306,4 @@ def test_steps_predicted_through_the_bush_are_shortened(more):
 
 def test_a_journal_that_is_shot_through_its_bush_is_named():
     mech = on_ground(bearing(), name="mainbearing", oil=1e-6, turning=0.0, way=(1e4, 0, 0))
-    refuses(SolverError, "'mainbearing'", rom.simulate, mech, t_end=1e-3, dt=1e-4)
+    refuses(rom.SolverError, "'mainbearing'", rom.simulate, mech, t_end=1e-3, dt=1e-4)

@@ -12,7 +12,6 @@ from cases.mbs.mechanisms import prepared
 from cases.mbs.tangents import assert_forces_are_the_gradient, by_position, by_velocity, shifted
 from rom.components.gear_mesh import Correction, GearPair, Hertz
 from rom.components.gear_mesh.gears.meshes import GEAR_MESHES_FAMILY
-from rom.components.journal_bearing.films.bearing import Groove, JournalBearing
 
 K = 1.3e10
 PAIRS = {
@@ -145,7 +144,7 @@ def test_a_pinion_in_oil_films_whose_teeth_rub_hit_and_part_keeps_the_energy():
                             omega=(0, 0, 100.0))  # fmt: skip
     gear = mech.add_rigid("gear", mass=9.0, inertia=(0.02,) * 3, at=(pair.distance, 0, 0),
                           omega=(0, 0, 3.0 - 65.0))  # fmt: skip
-    film = JournalBearing(0.04, 0.02, 8e-5, [Groove(np.pi / 2, 0.3)], cells=(24, 4))
+    film = rom.mbs.JournalBearing(0.04, 0.02, 8e-5, [rom.mbs.Groove(np.pi / 2, 0.3)], cells=(24, 4))
     for name, z in (("front", -0.03), ("back", 0.03)):
         ends = pinion.marker((0, 0, z)), mech.ground.marker((0, 0, z))
         mech.journal_bearing(name, *ends, axis=Z, bearing=film, oil=0.02)

@@ -18,7 +18,6 @@ from rom.components import gear_mesh
 from rom.components.gear_mesh import Correction, GearPair, Hertz, bending_table, contact_compliance
 from rom.components.gear_mesh.gears.meshes import GEAR_MESHES_FAMILY
 from rom.components.gear_mesh.gears.table import PHASE
-from rom.errors import ConfigError, ModelError
 
 K = 1.3e10
 SPUR = GearPair((26, 40), 4e-3, 0.03, thinning=5e-5)
@@ -146,7 +145,7 @@ def test_a_file_of_numbers_is_a_map(tmp_path):
     for text, words in (("1,2\n3\n", ""), ("1,2\n3,x\n", "'x'")):
         path.write_text(text)
         found = rf"pinion\.csv is no map of flanks: .*{words}"
-        refuses(ModelError, found, gear_mesh.flank_map, path)
+        refuses(rom.ModelError, found, gear_mesh.flank_map, path)
 
 
 @pytest.mark.parametrize("pair", [SPUR, RING], ids=["external", "internal"])
@@ -346,7 +345,7 @@ test_what_no_flank_is_like_is_refused = refused(
     (lambda: wheels(coupling=1.0), "at least 0 and at most 0.03"),
     (lambda: wheels(conservative=True), "energy of mesh 'mesh' would jump"),
     (lambda: gear_mesh.Mesh(SPUR, K, Correction(maps=(np.eye(2), None))), "are for elements"),
-    error=(ConfigError, ModelError),
+    error=(rom.ConfigError, rom.ModelError),
 )
 
 

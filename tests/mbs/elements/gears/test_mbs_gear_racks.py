@@ -15,7 +15,6 @@ from cases.mbs.tangents import assert_forces_are_the_gradient, by_position, by_v
 from cases.refusals import refuses
 from rom.components.gear_mesh import Correction, GearPair, Hertz, Mesh, RackPair, stiffness_table
 from rom.components.gear_mesh.gears.meshes import GEAR_MESHES_FAMILY
-from rom.errors import ConfigError, ModelError
 
 Y, K = (0, 1, 0), 1.3e10
 LOSSES = {"damping": 1e-6, "friction": 0.1, "transition_speed": 0.1}
@@ -207,6 +206,6 @@ def test_a_pinion_that_spins_in_its_frame_drives_its_rack():
 
 def test_what_a_rack_does_not_have_is_refused():
     off = Correction(run_out=((0, 0), (1e-6, 0)))
-    refuses(ConfigError, "rack of 'mesh' does not turn", free, SPUR, correction=off)
-    refuses(ModelError, "racks are for elements", Mesh, SPUR, K)
-    refuses(ModelError, "racks and internal teeth", stiffness_table, SPUR, force=1e5)
+    refuses(rom.ConfigError, "rack of 'mesh' does not turn", free, SPUR, correction=off)
+    refuses(rom.ModelError, "racks are for elements", Mesh, SPUR, K)
+    refuses(rom.ModelError, "racks and internal teeth", stiffness_table, SPUR, force=1e5)
