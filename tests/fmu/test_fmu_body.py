@@ -16,11 +16,10 @@ from cases.mbs.mechanisms import random_body, simulate_quietly
 from cases.solid import block, reduced
 from rom.errors import ConfigError, InterfaceError
 
-pytestmark = pytest.mark.usefixtures("no_python")
 MOTION = ("displacement", "rotation", "velocity", "angular_velocity")
 
 
-@pytest.fixture
+@pytest.fixture(autouse=True)
 def no_python(monkeypatch):
     monkeypatch.setenv("ROM_PYTHON", "/nowhere/python")
 
@@ -96,7 +95,6 @@ def test_the_library_needs_the_c_library_only(free, tmp_path):
 
 @pytest.mark.parametrize("steps", [(0.02,) * 4, (3.0,) * 4, (0.25, 0.25, 0.4, 0.1)])
 def test_a_free_body_moves_as_its_equations_say(body, free, tmp_path, steps):
-    """Steps far below and far above the periods of its vibrations, and some of each length."""
     rng = np.random.default_rng(1)
     history = [{name: rng.normal(size=6) for name in "ab"} for _ in range(4)]
     gravity = np.array([0.3, -0.2, 9.0])
@@ -138,7 +136,6 @@ def test_small_motions_are_those_of_the_multibody_integrator(body, free, tmp_pat
 
 
 def test_a_cantilever_comes_to_rest_where_statics_has_it(rod, tmp_path):
-    """Deflection under a force at the tip, and the sag that an accelerated ground gives."""
     path = rom.write_body_fmu(rod, tmp_path / "rod.fmu", fixed=("root",))
     one = Instance(path, tmp_path).begin()
     M, K = rod.full_matrices()

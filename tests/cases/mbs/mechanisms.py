@@ -97,9 +97,8 @@ def random_nodes(rng, n=7, r=4):
 def random_body(rng, r=4, *, damped=True, stiffened=False):
     """A body whose two markers move and turn with the elastic coordinates."""
     x, Ms, phi, K, D = random_nodes(rng, r=r)
-    markers = {
-        key: (x[i], phi[:, i].T, 0.4 * rng.normal(size=(3, r))) for i, key in ((0, "a"), (1, "b"))
-    }
+    twists = 0.4 * rng.normal(size=(2, 3, r))
+    markers = {key: (x[i], phi[:, i].T, twists[i]) for i, key in enumerate("ab")}
     body = nodal_body(x, Ms, phi, K, D if damped else 0 * D, markers)
     if not stiffened:
         return body
@@ -166,9 +165,8 @@ def simeon_rod(axial_mass_divisor=1.0):
     rAl = c["rho"] * A * l
     M = rAl * block_diag(0.5, 0.5, np.array([[8.0, 1.0], [1.0, 2.0]]) / axial_mass_divisor)
     EAl = c["E"] * A / l
-    K = EAl * block_diag(
-        pi**4 / 24 * (h / l) ** 2, 2 * pi**4 / 3 * (h / l) ** 2, np.array([[16, -8], [-8, 7]]) / 3
-    )
+    bending = pi**4 / 24 * (h / l) ** 2 * np.array([1, 16])
+    K = EAl * block_diag(*bending, np.array([[16, -8], [-8, 7]]) / 3)
     S = rAl * np.array([[0, 0, 2 / 3, 1 / 6], [2 / pi, 0, 0, 0], [0, 0, 0, 0]])
     B = np.zeros((4, 4))
     B[0, 2], B[0, 3], B[1, 3] = -16 / pi**3, 8 / pi**3 - 1 / pi, 1 / (2 * pi)
@@ -272,11 +270,7 @@ def crank_torque(angle, l1=0.1, l2=0.3, speed=50.0, gravity=0.0):
 
 
 def lattice(sections=5, stiffness=4e3, length=1.0, mass=1.0):
-    """Point masses joined by springs, three to a section: nodes, springs, masses.
-
-    Returns:
-        x (N, 3), pairs (s, 2), stiffness (s,), masses (N,).
-    """
+    """Nodes (N, 3), pairs (s, 2) on springs, stiffness (s,), point masses (N,): three a section."""
     angles = 2 * np.pi * np.arange(3) / 3
     ring = 0.15 * np.column_stack([np.zeros(3), np.cos(angles), np.sin(angles)])
     along = np.array([length / (sections - 1), 0, 0])
@@ -305,15 +299,7 @@ def lattice_body(lattice_data):
 
 
 def lattice_motion(lattice_data, times, y0, v0, outer, held=()):
-    """Positions (n_t, N, 3) of the nodes under springs that turn with their ends.
-
-    Args:
-        lattice_data: see `lattice`.
-        times: (n_t,) output times.
-        y0, v0: (N, 3) positions and velocities at the start.
-        outer: function (t, y) -> (N, 3) forces.
-        held: nodes that do not move.
-    """
+    """Positions (n_t, N, 3) of nodes under springs that turn with their ends and forces (t, y)."""
     x, pairs, k, masses = lattice_data
     n, (i, j) = x.shape[0], pairs.T
     rest = np.linalg.norm(x[j] - x[i], axis=1)

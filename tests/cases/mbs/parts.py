@@ -1,4 +1,4 @@
-"""What many mechanisms begin with: a body on a guide or a hinge, a rod held; wrong calls on one."""
+"""A body on a guide or a hinge, a rod held, a law that slips; wrong calls on a mechanism."""
 
 import numpy as np
 import pytest
@@ -58,28 +58,35 @@ def below(angle, length=1.0):
 
 
 def held_rod(n, *, joint="fixed", gravity=ORIGIN, on=None, axis=None, length=1.0, **section):
-    """A mechanism with an upright rod, its start joined to the ground or to a marker.
+    """A mechanism and an upright rod of n pieces in it, its start joined to the ground.
 
-    Args:
-        n: number of pieces.
-        joint: kind of the joint, or nothing.
-        gravity: of the mechanism.
-        on: (mechanism, marker) that it stands on instead.
-        axis: of the joint, where it has one.
-        length: of the rod [m].
-        section: as of `straight`.
-
-    Returns:
-        Mechanism and rod.
+    Or to (mechanism, marker) that it stands on, or to nothing; the section is that of `straight`.
     """
     mech, base = on or (rom.Mechanism(gravity=gravity), None)
     rod = mech.add_nonlinear("rod", body(straight(length, n, **section)))
     if joint:
-        about = {} if axis is None else {"axis": axis}
-        getattr(mech, joint)(
-            "hook", base or mech.ground.marker(ORIGIN), rod.marker("start"), **about
-        )
+        ends = base or mech.ground.marker(ORIGIN), rod.marker("start")
+        getattr(mech, joint)("hook", *ends, **({} if axis is None else {"axis": axis}))
     return mech, rod
+
+
+RECORD = {"outputs": ["slip"], "energy": True}  # what the law writes beside its forces
+
+
+def slipping(t, parameters, motion, memory, out):
+    """A spring in a row with dry friction along x; it remembers where the friction stands."""
+    k, limit = parameters
+    x = motion.position[1, 0] - motion.position[0, 0]
+    pull = k * (x - memory[0])
+    slip = 0.0
+    if abs(pull) > limit:
+        slip = (abs(pull) - limit) / k * np.sign(pull)
+        pull = np.sign(pull) * limit
+        out.lost[0] = abs(pull * (motion.velocity[1, 0] - motion.velocity[0, 0]))
+    out.memory[0] = memory[0] + slip
+    out.force[0, 0], out.force[1, 0] = pull, -pull
+    out.energy[0] = 0.5 * pull**2 / k
+    out.outputs[0] = slip
 
 
 def boxed():
@@ -92,11 +99,7 @@ def boxed():
 def refused_on(build, rows, error=rom.ConfigError):
     """A test that each call names its culprit, and leaves a mechanism as it was.
 
-    Args:
-        build: makes a mechanism, and what the calls take beside it.
-        rows: {what is wrong: (call, words of the message)}, with the class between where it is
-            another one.
-        error: that class.
+    Rows are {what is wrong: (call, words of the message)}, the class between where it is another.
     """
 
     @pytest.mark.parametrize("case", rows)

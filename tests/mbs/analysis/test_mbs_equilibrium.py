@@ -109,7 +109,6 @@ def test_the_torque_that_holds_a_slider_crank():
 @pytest.mark.long
 @pytest.mark.once
 def test_statics_are_where_a_damped_motion_ends():
-    """Two links, a spring across, a flexible arm at the end."""
     mech = rom.Mechanism(gravity=(0, 0, -g))
     link = on_hinge(mech, X / 4, "link", mass=1.0, inertia=(0.01, 0.02, 0.02))
     end = link.marker(X / 4)

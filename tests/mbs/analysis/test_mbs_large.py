@@ -361,7 +361,6 @@ def test_an_infinite_response_of_a_large_mechanism_is_named(monkeypatch):
 
 
 def test_a_campbell_diagram_of_some_modes_is_that_of_all(monkeypatch):
-    """A rod on a hub that turns as a whole, gyroscopic and stiffened."""
     mech = rom.Mechanism(gravity=(0, 0, 0))
     hub = mech.add_rigid("hub", mass=1.0, inertia=(1, 1, 1), at=ORIGIN).marker(ORIGIN)
     mech.revolute("axle", mech.ground.marker(ORIGIN), hub, axis=X)

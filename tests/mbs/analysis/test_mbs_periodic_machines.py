@@ -53,7 +53,6 @@ def deviation(motion, speed):
 
 
 def test_a_gear_pair_repeats_with_every_tooth():
-    """The same as a run over many teeth, and as the motion over three of them."""
     speed = 300.0
     one = meshing(speed)
     assert one.stable and one.gap < 1e-9

@@ -52,17 +52,6 @@ def balance(u, phase):
     return np.ravel([r.real, r.imag], order="F")
 
 
-def balanced_curve():
-    """(k, 2) frequency and amplitude of the first harmonic by its phase (k,), which falls."""
-    phases, found = np.linspace(-0.2, -3.08, 300), []
-    u = np.r_[1.0, 0.6, np.zeros(2 * ODD.size - 2)]
-    for phase in phases:
-        u, _, _, message = fsolve(balance, u, (phase,), full_output=True, xtol=1e-13)
-        assert np.abs(balance(u, phase)).max() < 1e-10, message
-        found.append(u[:2])
-    return phases, np.array(found)
-
-
 @pytest.fixture(scope="module")
 def curve():
     return rom.periodic_path(across, (1.1, 1.9), period=lambda w: 2 * np.pi / w, steps=150)
@@ -70,7 +59,13 @@ def curve():
 
 @pytest.fixture(scope="module")
 def exact():
-    phases, found = balanced_curve()
+    """Frequency and amplitude of the first harmonic by less its phase, which falls."""
+    phases, found = np.linspace(-0.2, -3.08, 300), []
+    u = np.r_[1.0, 0.6, np.zeros(2 * ODD.size - 2)]
+    for phase in phases:
+        u, _, _, message = fsolve(balance, u, (phase,), full_output=True, xtol=1e-13)
+        assert np.abs(balance(u, phase)).max() < 1e-10, message
+        found.append(u[:2])
     return CubicSpline(-phases, found)
 
 
@@ -162,7 +157,6 @@ def self_excited(mu):
 
 
 def test_limit_cycles_are_followed_with_their_periods():
-    """Van der Pol's period grows with mu, as an independent integration has it."""
     path = rom.periodic_path(self_excited, (1.0, 1.5), guess=6.6, steps=100, step=0.5)
 
     def rates(t, y):
@@ -244,7 +238,6 @@ def test_a_step_that_no_joint_allows_is_one_that_is_too_long(monkeypatch):
 
 @pytest.mark.parametrize(("x", "which"), [(0.0, 0), (1.0, -1)])
 def test_which_of_two_stable_motions_is_followed_the_start_says(exact, x, which):
-    """After some periods from there; the smallest and the largest of harmonic balance."""
     w = 1.5
     begun = rom.simulate(across(w), t_end=1e-6, dt=1e-7).final
     q = begun.q + np.array([x, 0, 0, 0, 0, 0, 0])

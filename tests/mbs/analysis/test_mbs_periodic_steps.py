@@ -57,7 +57,6 @@ def test_links_that_tumble_in_space_have_the_derivatives_of_differences(more):
 
 
 def test_a_body_that_advances_is_turned_back_with_its_small_motions():
-    """A round disc on springs that has advanced by a part of a turn."""
     mech = rom.Mechanism(gravity=(0, 0, 0))
     disc = mech.add_rigid("disc", mass=1.0, inertia=(0.2, 0.2, 0.3), at=(0.05, 0.02, 0),
                           omega=(0.1, 0.2, 9.0))  # fmt: skip
@@ -87,7 +86,6 @@ def test_films_and_teeth_have_the_derivatives_of_differences(geared):
 
 
 def lagging(t, parameters, motion, memory, out):
-    """A force that follows the place by what it remembers."""
     out.memory[0] = memory[0] + 0.2 * (motion.position[0, 0] - memory[0])
     out.force[0, 0] = -3.0 * memory[0]
 
@@ -157,9 +155,8 @@ def test_derivatives_of_a_neighbour_count_in_the_coordinates_of_a_motion():
     found = swung(chain(2), 0.5)
     right = by_steps(found)
     kept, k = right.kept, found.chart.Zq.shape[1]
-    mixed = block_diag(
-        *(np.linalg.qr(np.random.default_rng(s).normal(size=(k, k)))[0] for s in (1, 2))
-    )
+    draws = (np.random.default_rng(seed).normal(size=(k, k)) for seed in (1, 2))
+    mixed = block_diag(*(np.linalg.qr(draw)[0] for draw in draws))
     other = replace(kept, Zq=kept.Zq @ mixed[:k, :k], Zv=kept.Zv @ mixed[k:, k:],
                     B=mixed.T @ kept.B @ mixed, E=mixed.T @ kept.E @ mixed)  # fmt: skip
     again = other.around(found)

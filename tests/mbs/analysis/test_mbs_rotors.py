@@ -56,7 +56,6 @@ def blades(n):
 
 
 def turning(n, speed, **options):
-    """The mechanism and its steady motion."""
     mech = helicopter(n, speed, **options)
     return mech, rom.equilibrium(mech, spin={"bearing": speed})
 
@@ -89,7 +88,6 @@ def test_ground_resonance_has_the_rates_of_coleman_and_feingold(n, speed, dampin
 
 
 def test_ground_resonance_grows_as_fast_in_time():
-    """Blades pushed a little in their plane: the nacelle sways more and more."""
     speed = 26.0
     mech, state = turning(3, speed, hinge="lag")
     growth = rom.linearize(mech, state, frame="world", blades=blades(3)).eigenvalues.real.max()
@@ -105,9 +103,8 @@ def test_ground_resonance_grows_as_fast_in_time():
 def test_flapping_blades_whirl_at_their_own_frequency_more_and_less_than_the_speed(n):
     """Hinged blades: alike nu W, backward (nu - 1) W, forward (nu + 1) W, +- in turn nu W."""
     speeds = np.array([6.0, 6.5, 7.0])
-    found = rom.mbs.campbell(
-        lambda w: turning(n, w, hinge="flap"), speeds, frame="world", blades=blades(n)
-    )
+    given = {"frame": "world", "blades": blades(n)}
+    found = rom.mbs.campbell(lambda w: turning(n, w, hinge="flap"), speeds, **given)
     nu = np.sqrt((BLADE_INERTIA - THIN + BLADE_MASS * ARM**2 + HUB_RADIUS * S) / I)
     sway = np.sqrt(SUPPORT / (NACELLE_MASS + HUB_MASS + n * BLADE_MASS))
     rates = {"alike": nu, "backward": nu - 1, "forward": nu + 1}
@@ -154,7 +151,6 @@ def test_a_rotor_turns_steadily_about_an_axis_that_its_support_leans(speed):
 
 
 def test_what_turns_as_a_whole_may_be_told_either_way():
-    """Lagging blades on a bearing of the ground: bodies, reactions and rates are the same."""
     mech = leaning(7.0)
     for name in ("support", "push"):
         del mech.elements[name]

@@ -50,13 +50,6 @@ def test_a_block_below_the_angle_of_friction_rests(how):
     assert_allclose(sol.velocity("block")[-1], 0.0, atol=1e-6 if "rtol" in how else 1e-8)
 
 
-def block_moved(sol):
-    """The end of a run, with a speed at which it slides on."""
-    v = sol.v[-1].copy()
-    v[0] = 0.2
-    return replace(sol.final, v=v, memory=None)
-
-
 def test_equilibria_rest_where_springs_are_remembered():
     """From where bodies were added, the same place; from the end of a run, that end; pushed from
     there, further by force over stiffness."""
@@ -66,7 +59,8 @@ def test_equilibria_rest_where_springs_are_remembered():
     sol = rom.simulate(mech, t_end=0.6, dt=1e-3)
     for start in (None, sol.final):
         assert_allclose(rom.equilibrium(mech, state=start).q[:3], sol.q[-1, :3], atol=2e-9)
-    moved = rom.simulate(mech, state=block_moved(sol), t_end=1.2, dt=1e-3)
+    sliding = replace(sol.final, v=np.append(0.2, sol.v[-1][1:]), memory=None)
+    moved = rom.simulate(mech, state=sliding, t_end=1.2, dt=1e-3)
     assert_allclose([moved.energy.damping[0], moved.energy.balance[0]], 0.0, atol=1e-15)
     slid = moved.final
     again = rom.equilibrium(mech, state=slid)
@@ -109,7 +103,6 @@ def sled(law, load, x=0.0):
 
 
 def dragged(path, law, load, **how):
-    """It, drawn to and fro by a given motion."""
     mech = sled(law, load)
     mech.drive("motor", "way", path)
     return rom.simulate(mech, **how)
@@ -228,7 +221,6 @@ def looked_at(packed, W, q, *, keep=True, v=None):
 
 
 def test_springs_turn_with_the_bodies():
-    """Both bodies turned together about the origin: the forces turn with them."""
     packed, W, q = remembered(pair(LAW))
     q[7:9] += 2e-6, -1e-6  # the second one aside
     force, clamp = looked_at(packed, W, q, keep=False)[6:9], 1e3 * (0.0199 - 0.01) / 0.0199
@@ -271,10 +263,8 @@ def test_the_limit_is_that_of_the_whole_pressure_while_bodies_meet():
     load, v = 10.0, 0.1
     packed, W, q = remembered(sled(LAW, load))
     q[0] += 1e-2
-    pressure, down = load * (1 + LAW.damping * v), -v * np.eye(6)[2]
-    assert_allclose(
-        looked_at(packed, W, q, v=down)[:3], [MU * pressure, 0.0, -pressure], rtol=1e-9, atol=1e-9
-    )
+    pressure, force = load * (1 + LAW.damping * v), looked_at(packed, W, q, v=-v * np.eye(6)[2])
+    assert_allclose(force[:3], [MU * pressure, 0.0, -pressure], rtol=1e-9, atol=1e-9)
 
 
 test_wrong_springs_are_refused = refused(

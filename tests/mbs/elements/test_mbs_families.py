@@ -32,8 +32,6 @@ class Cord:
 
 @table
 class Cords(Table):
-    """All of them."""
-
     i: Index1
     j: Index1
     law: Array2
@@ -194,9 +192,8 @@ def test_it_moves_inside_an_fmu(name, tmp_path, monkeypatch):
     fmpy = pytest.importorskip("fmpy", reason="fmpy is not installed")
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT), str(ROOT / "tests")]))
     script = tmp_path / "bob.py"
-    script.write_text(
-        f"from test_mbs_families import bob, {name}\ndef mechanism():\n    return bob({name})\n"
-    )
+    text = "from test_mbs_families import bob, {0}\ndef mechanism():\n    return bob({0})\n"
+    script.write_text(text.format(name))
     archive = rom.write_fmu(script, tmp_path / "bob.fmu", outputs=["bob.c"], dt=1e-3,
                             files=[__file__])  # fmt: skip
     output = [f"bob.c.position[{k}]" for k in (1, 2, 3)]

@@ -62,7 +62,6 @@ def test_curvatures_of_a_6209_are_those_of_harris():
 
 
 def bearing(kind, loads=None, axis=Z, **more):
-    """A shaft in a bearing on the ground."""
     mech = rom.Mechanism(gravity=(0, 0, 0))
     shaft = mech.add_rigid("shaft", mass=1.0, inertia=(1e-2,) * 3, at=ORIGIN)
     mech.rolling_bearing("bearing", shaft.marker(ORIGIN), mech.ground.marker(ORIGIN), axis=axis,

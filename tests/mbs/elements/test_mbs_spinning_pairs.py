@@ -37,7 +37,6 @@ def geared(way, speed=SPEED, torque=60.0):
 
 
 def test_teeth_of_spinning_wheels_bear_as_those_of_turning_frames():
-    """Through pitch errors and friction that reverses; both balances of energy close."""
     found = []
     for way in ("omega", "spin"):
         sol = rom.simulate(geared(way), t_end=0.012, dt=4e-6, save_every=20)

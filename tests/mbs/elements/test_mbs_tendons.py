@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose
 
 import rom
 from cases.mbs.mechanisms import prepared, random_body, random_pose, stored_at, tangents_at
+from cases.mbs.parts import on_guide
 from cases.mbs.tangents import by_velocity, check_tangents, elastic_forces, forces_at, near
 from cases.refusals import refuses
 from rom.components.tendons.tendons import TENDONS_FAMILY
@@ -100,24 +101,14 @@ def test_tangents_are_derivatives_of_the_forces(kind, pulleys):
     check_tangents(packed, W, state, np.eye(v.size), 1e-6)
 
 
-def weight(mech, name, at, mass=1.0, axis=Z, **pose):
+def weight(mech, name, at, mass=1.0, axis=Z):
     """A body that slides along an axis; its marker."""
-    body = mech.add_rigid(name, mass=mass, inertia=SMALL, at=at, **pose)
-    marker = body.marker(ORIGIN)
-    mech.prismatic(f"{name} slides", mech.ground.marker(at), marker, axis=axis)
-    return marker
+    return on_guide(mech, name, mass=mass, at=at, base=at, axis=axis, guide=f"{name} slides")
 
 
 def sizes(solution, name):
     """(n_t, K) size of the force on each marker."""
     return np.linalg.norm(solution.element(name).force, axis=2)
-
-
-def stored_length(mech, EA):
-    """Length of the only tendon, from its energy with a free length of 1 m."""
-    packed, W = prepared(mech)
-    energy = stored_at(packed.system, W, packed.q, 0 * packed.v)
-    return 1.0 + np.sqrt(2 * energy / EA)
 
 
 @pytest.mark.parametrize(("sense", "shift"), [(-1, 2.0), (1, 4.0)], ids=["outer", "inner"])
@@ -136,7 +127,9 @@ def test_lengths_over_two_pulleys_are_those_of_plane_geometry(sense, shift):
     first = np.pi - np.arccos(3 / 5) - up
     second = up - np.pi / 4 if sense == -1 else np.pi - np.pi / 4 - up
     wanted = 4.0 + 3.0 * first + np.sqrt(100 - shift**2) + second + 1.0
-    assert stored_length(mech, 1.0) == pytest.approx(wanted, rel=1e-12)
+    packed, W = prepared(mech)
+    stretch = np.sqrt(2 * stored_at(packed.system, W, packed.q, 0 * packed.v))
+    assert 1.0 + stretch == pytest.approx(wanted, rel=1e-12)
 
 
 def test_a_cable_is_as_long_as_its_design_at_the_start():

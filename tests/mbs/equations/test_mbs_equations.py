@@ -28,9 +28,8 @@ def nodal_accelerations(nodes, *state):
     No inertia integral occurs in their equations, which are linear in the accelerations.
     """
     psi, n = np.zeros((4, 4, *nodes[0].shape)), 10
-    pull, *columns = (
-        mechanisms.nodal_residual(nodes, psi, state, a, GRAVITY) for a in (np.zeros(n), *np.eye(n))
-    )
+    each = np.vstack([np.zeros(n), np.eye(n)])
+    pull, *columns = (mechanisms.nodal_residual(nodes, psi, state, a, GRAVITY) for a in each)
     return np.linalg.solve(np.array(columns).T - pull[:, None], -pull)
 
 
@@ -77,7 +76,6 @@ def everything(rng, *, angles=True):
 
 @pytest.mark.parametrize("seed", range(3))
 def test_constraint_gradient_and_convective_term_are_derivatives_of_the_residual(seed):
-    """All kinds of rows, between flexible, rigid and ground markers."""
     rng = np.random.default_rng(seed)
     packed, W = prepared(everything(rng))
     s, (q, v, _, _) = packed.system, random_state(rng, packed)
@@ -140,13 +138,6 @@ def solve(A, n, pivot, x):
     return True
 
 
-def solved(A, b, n):
-    """The solution with the leading (n, n) block, and what else the array holds afterwards."""
-    work, x = A.copy(), b[:n].copy()
-    assert solve(work, n, np.zeros(n, dtype=np.int64), x)
-    return x, work
-
-
 @pytest.mark.parametrize("n", [*range(1, 3 * PANEL_WIDTH + 2), 100])
 @pytest.mark.parametrize("share", [1.0, 0.15])
 def test_solutions_are_those_of_numpy(n, share):
@@ -154,11 +145,12 @@ def test_solutions_are_those_of_numpy(n, share):
     A = rng.standard_normal((n + 3, n + 3)) * (rng.random((n + 3, n + 3)) < share)
     A[:n, :n] += np.roll(np.diag(np.full(n, 3.0)), 1, axis=0)  # pivots off the diagonal
     b = rng.standard_normal(n + 3)
-    x, work = solved(A, b, n)
+    work, x = A.copy(), b[:n].copy()
+    assert solve(work, n, np.zeros(n, dtype=np.int64), x)
     condition = np.linalg.cond(A[:n, :n])
     expected = np.linalg.solve(A[:n, :n], b[:n])
     assert_allclose(x, expected, atol=1e-13 * condition * np.abs(expected).max())
-    assert np.array_equal(work[n:], A[n:])
+    assert np.array_equal(work[n:], A[n:])  # what is beside the leading block stays
     assert np.array_equal(work[:, n:], A[:, n:])
 
 

@@ -254,7 +254,6 @@ def test_a_pendulum_of_rods_swings_as_lagrange_has_it(solved):
 
 
 def test_a_free_chain_keeps_momentum_and_energy(solved):
-    """Flexible links in a whirl without gravity: nothing pushes from outside."""
     moving = [{}] * 3 + [{"velocity": (0, 2, 0)}] + [{}] * 2 + [{"omega": (0, 0, 20)}, {}]
     mech = chain(8, held=False, gravity=0.0, moving=moving)
     sol = solved(mech, blocks=True, t_end=0.1, dt=2e-4, rho_inf=1.0, assemble=True)
@@ -284,7 +283,6 @@ def ladder(n):
 
 
 def star(n):
-    """Links around one hub."""
     mech = rom.Mechanism()
     hub = mech.add_rigid("hub", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0), markers={"c": (0, 0, 0)})
     for k in range(n):
@@ -322,7 +320,6 @@ def test_a_few_bodies_keep_whole_matrices():
 
 
 def test_joints_that_repeat_others_are_found_in_a_long_chain(solved):
-    """Planar four-bar of rigid links at the end of a chain: three constraints too many."""
     mech = chain(7, flexible=False)
     end = mech.parts["link 6"].marker("a")
     one = add_link(mech, "one", (1.8, 0.3, 0), flexible=False)
@@ -351,7 +348,6 @@ def test_a_chain_that_cannot_be_closed_is_refused(monkeypatch):
 
 
 def test_gaps_are_closed_by_the_least_motion_of_whole_matrices(monkeypatch):
-    """A chain given with gaps and wrong velocities: assembled the same way both ways."""
     starts = []
     for worth in (1e-12, np.inf):
         monkeypatch.setattr(graph, "BLOCK_GAIN", worth)

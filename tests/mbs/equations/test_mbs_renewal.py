@@ -19,9 +19,8 @@ STEP = 1e-4
 def shaft(cavitation="reynolds"):
     """A heavy shaft on two films, whose bushes hang in springs."""
     mech = rom.Mechanism(gravity=(0, -9.81, 0))
-    body = mech.add_rigid(
-        "shaft", mass=40.0, inertia=(1.0, 1.05, 0.1), at=(0, 0, 0), omega=(0, 0, 300.0)
-    )
+    solid = {"mass": 40.0, "inertia": (1.0, 1.05, 0.1), "at": (0, 0, 0)}
+    body = mech.add_rigid("shaft", **solid, omega=(0, 0, 300.0))
     film = rom.mbs.JournalBearing(0.1, 0.05, 1e-4, [rom.mbs.Groove(np.pi / 2, 0.35)], cells=(36, 4),
                           cavitation=cavitation)  # fmt: skip
     for k, side in enumerate((-0.2, 0.3)):

@@ -25,16 +25,12 @@ from rom.mbs.kernels.tables import Array1, Array3, Index2, Table, table
 
 @table
 class Inner(Table):
-    """Numbers below another table."""
-
     x: Array1
     n: int
 
 
 @table
 class Outer(Table):
-    """A table with another one."""
-
     blocks: Array3
     at: Index2
     inner: Inner | None

@@ -186,9 +186,6 @@ def test_velocities_of_drives_that_contradict_each_other_later_are_named():
         simulate_quietly(mech, t_end=1.0, rtol=1e-3)
 
 
-# ---- dop853 --------------------------------------------------------------------------------------
-
-
 def test_dop853_keeps_its_own_steps_and_ends_at_the_end():
     exact = {"method": "dop853", "rtol": 1e-10, "atol": 1e-12}
     sol = rom.simulate(pendulum(), t_end=1.3, **exact)

@@ -19,7 +19,6 @@ def crank():
 
 @pytest.fixture(scope="module")
 def free():
-    """A flexible bar thrown into empty space."""
     mech = rom.Mechanism(gravity=(0, 0, 0))
     mech.add_flexible("bar", lattice_body(lattice(stiffness=2e5)), omega=(1.0, 2.0, 5.0))
     return rom.simulate(mech, t_end=0.05, dt=1e-5, rho_inf=1.0)
@@ -40,7 +39,6 @@ def test_a_good_motion_passes(crank, free):
 
 
 def test_what_is_wrong_in_a_motion_is_seen(crank, free):
-    """Joints, energy from nowhere and its drift, momentum, quaternions, Newton that toils."""
     q, free_q, v = crank.q.copy(), free.q.copy(), free.v.copy()
     q[500, 14] += 1e-8  # the slider leaves its wrist pin
     assert failures(crank, q=q) == ["largest gap in a joint / size"]

@@ -24,9 +24,7 @@ def block(mass=1.0, speed=SPEED):
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("mass", [1.0, 1e-3])
 @pytest.mark.parametrize("transition", [1e-3, 1e-7])
-def test_a_block_stops_by_friction_in_steps_far_longer_than_its_speed_takes_to_turn(
-    method, mass, transition
-):
+def test_friction_stops_a_block_in_steps_longer_than_its_speed_turns_in(method, mass, transition):
     """At v^2 / (2 mu g), after v / (mu g); and does not go back."""
     mech, h = block(mass), 1e-2
     mech.friction("shoes", "guide", mu=MU, transition_speed=transition)
@@ -86,7 +84,6 @@ def test_a_block_that_strikes_a_stop_in_long_steps_comes_to_rest_on_it(k, restit
 
 @pytest.mark.parametrize(("rpm", "steps"), few(1, [(300, 110), (500, 80), (725, 50)]))
 def test_teeth_and_films_are_stepped_through_at_speeds_where_teeth_leave(rpm, steps):
-    """Teeth bear the torque over the base radius, in the mean."""
     unit = rigid_unit(speed=rpm * np.pi / 30)
     mech, T = as_mechanism(unit), unit.mesh_period
     sol = rom.simulate(mech, state=rom.equilibrium(mech), t_end=12 * T, dt=T / steps, rho_inf=0.6)

@@ -113,7 +113,6 @@ def flexible(gaps, fixed=("n0",)):
 
 
 def test_closing_a_gap_does_not_strain_a_body_that_can_follow():
-    """The load on the hinge is that of the rod drawn where it belongs."""
     drawn, opened = (moved(flexible([gap]), assemble=True) for gap in (0.0, 0.1))
     assert np.abs(opened.elastic("rod")[0]).max() < 1e-15
     assert_allclose(opened.reaction("n0")[0, :3], drawn.reaction("n0")[0, :3], atol=1e-9)

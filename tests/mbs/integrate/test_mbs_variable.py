@@ -9,8 +9,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 
 import rom
-from cases.mbs.mechanisms import prepared, random_body, simulate_quietly, slider_crank
-from cases.mbs.motions import G, errors, falling, four_links, free_crank, heavy_top, pendulum
+from cases.mbs.mechanisms import prepared, simulate_quietly, slider_crank
+from cases.mbs.motions import G, errors, falling, four_links, free_crank, heavy_top, pendulum, swing
 from cases.mbs.parts import on_guide
 from rom import rotation
 from rom.mbs.equations.packing import pack
@@ -24,8 +24,6 @@ IMPLICIT = ["generalized-alpha", "bdf"]
 
 
 class End(NamedTuple):
-    """Velocities and accelerations at an end of a step."""
-
     v: np.ndarray
     a: np.ndarray
 
@@ -209,18 +207,10 @@ def change(psi, delta):
     return rotation.log(rotation.multiply(rotation.exp(-psi), rotation.exp(psi + delta)))
 
 
-def hung():
-    """A flexible body on a ball joint."""
-    mech = rom.Mechanism()
-    one = mech.add_flexible("one", random_body(np.random.default_rng(5)))
-    mech.spherical("hook", mech.ground.marker(mech.design_point(one.marker("a"))), one.marker("a"))
-    return prepared(mech)
-
-
 def test_columns_of_rotations_count_in_increments_of_the_rotation_vector():
     """A wrong tangent only makes Newton slower: no motion would tell."""
     rng = np.random.default_rng(6)
-    packed, W = hung()
+    packed, W = prepared(swing())
     n, m = packed.v.size, W.value.size
     psi = rng.normal(size=n)
     vectors = [np.zeros(k) for k in (packed.q.size, n, n, n, m, packed.q.size, n, n, m)]

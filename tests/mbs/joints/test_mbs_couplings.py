@@ -240,7 +240,6 @@ def test_a_thrown_hoop_wobbles_without_loss_and_touches_the_plane():
 
 
 def jointed():
-    """A box on the ground by three joints, and both ends."""
     mech, *ends = boxed()
     mech.revolute("hinge", *ends, axis=Z)
     mech.spherical("ball", *ends)

@@ -24,13 +24,10 @@ def rod_points(a, b, mass=1.0):
     return np.sqrt(mass / 6) * np.concatenate([a, b, a + b])
 
 
-# A01: a point mass on a rod of 1 m, let go in the horizontal ------------------------------------
-
-
 @pytest.mark.parametrize(("options", "limit"), [({"method": "dop853", "dt": 0.05}, 1e-8),
                                                 ({"dt": 1e-3}, 3e-4)])  # fmt: skip
 def test_a_simple_pendulum_from_the_horizontal_for_ten_seconds(options, limit):
-    """Sin(theta / 2) = k cd(omega t, k) from an amplitude of 90 degrees: k = sin(45 degrees)."""
+    """A01: sin(theta / 2) = k cd(omega t, k) from an amplitude of 90 degrees, k = sin 45."""
     mech = rom.Mechanism(gravity=(0, -g, 0))
     bob = mech.add_rigid("bob", mass=1.0, inertia=(1, 1, 1), at=-X)
     mech.distance("rod", mech.ground.marker((0, 0, 0)), bob.marker((0, 0, 0)))
@@ -44,11 +41,8 @@ def test_a_simple_pendulum_from_the_horizontal_for_ten_seconds(options, limit):
     assert_allclose(pull, 3 * g * np.cos(theta), atol=100 * limit)
 
 
-# A02: N four-bars in a row, all links in line when they pass the horizontal ----------------------
-
-
 def four_bars(n, speed=1.0):
-    """2 n + 1 rods of 1 m and 1 kg, upright; the upper ends start with 1 m/s."""
+    """A02: 2 n + 1 rods of 1 m and 1 kg, upright; the upper ends start with 1 m/s."""
     mech = rom.Mechanism(gravity=(0, -g, 0))
     last = None
     for k in range(n + 1):
@@ -81,10 +75,8 @@ def test_four_bars_in_a_row_pass_their_singular_positions(n, dt):
     assert_allclose(sol.energy.total, sol.energy.total[0], rtol=2e-4)
 
 
-# A03: Andrews' squeezer --------------------------------------------------------------------------
-
-# Schiehlen, Multibody Systems Handbook (1990) 10; Hairer and Wanner, Solving Ordinary Differential
-# Equations II, VII.7; IVP test set, problem "andrews", whose names these are.
+# A03, Andrews' squeezer: Schiehlen, Multibody Systems Handbook (1990) 10; Hairer, Wanner, Solving
+# Ordinary Differential Equations II, VII.7; IVP test set, problem "andrews", whose names these are.
 S = {
     "m": (0.04325, 0.00365, 0.02373, 0.00706, 0.07050, 0.00706, 0.05498),
     "I": (2.194e-6, 4.410e-7, 5.255e-6, 5.667e-7, 1.169e-5, 5.667e-7, 1.912e-5),
@@ -190,11 +182,9 @@ def test_andrews_squeezer_ends_where_it_was_published():
     assert sol.base[-1, 0] == pytest.approx(SQUEEZER_END[0] - SQUEEZER_START[0], abs=2e-4)
 
 
-# A04: Bricard's linkage --------------------------------------------------------------------------
-
-# Six links of 1 m, each hinge normal to both links and to its neighbours: no degree of freedom by
-# count, one in fact. Of three-fold symmetry: the angles of hinges alternate, and the loop closes
-# where cos phi + cos theta + cos phi cos theta = 0. It starts as six edges of a cube.
+# A04, Bricard's linkage: six links of 1 m, each hinge normal to both and to its neighbours: no
+# degree of freedom by count, one in fact. Of three-fold symmetry: angles of hinges alternate, the
+# loop closes where cos phi + cos theta + cos phi cos theta = 0. It starts as six edges of a cube.
 WIDTH = 0.1  # of the square section
 TWIST = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])  # a quarter turn about x
 
@@ -246,13 +236,10 @@ def test_bricards_linkage_moves_although_it_is_overconstrained():
     assert rom.audit(sol).ok, rom.audit(sol)
 
 
-# A05: a governor whose couplers are stiff springs with dampers -----------------------------------
-
-
 @pytest.mark.long
 @pytest.mark.once
 def test_a_flyball_governor_with_stiff_couplers():
-    """Arms of 1 m at 30 degrees to the shaft, balls of 5 kg, a slider of 3 kg, 1 turn a second."""
+    """A05: arms of 1 m at 30 degrees to the shaft, balls of 5 kg, a slider of 3 kg, 1 turn/s."""
     m, ball, slide, width, k, c, rest = 0.3, 5.0, 3.0, 0.01, 8e5, 4e4, 0.5
     slim = np.sqrt(m * width**2 / 12)
     speed, lean = 2 * np.pi, np.pi / 6
@@ -313,13 +300,9 @@ def test_a_flyball_governor_with_stiff_couplers():
     assert_allclose(sol.omega("shaft")[::100, 1], q[3], atol=6e-4)
 
 
-# A chain that falls ------------------------------------------------------------------------------
-
-
 @pytest.mark.long
 @pytest.mark.once
 def test_a_folded_chain_falls():
-    """Four links hang, four stand beside them and are let go."""
     n, length = 8, 0.25
     start = np.array([0.05] * (n // 2) + [np.pi - 0.05] * (n // 2))
 

@@ -32,7 +32,6 @@ def bearing(cells=(60, 8), grooves=(), **more):
 
 @cache
 def ring(E=SOFT, cells=CELLS):
-    """A bush of this modulus."""
     material = rom.Material(E=E, nu=0.3, rho=2000.0)
     return tube(DIAMETER / 2, OUTER, LENGTH * cells[2] / (cells[2] - 2), cells, material)
 
@@ -51,9 +50,6 @@ def at_rest(body, b=None, load=LOAD, speed=SPEED, **more):
     film = rom.mbs.snapshot(mech, state).journal_bearing("film")
     at = prepared(mech)[0].system.bodies.q_at[list(mech.parts).index("shaft")]
     return state.q[at : at + 2], film
-
-
-# --- limits ---
 
 
 @pytest.mark.filterwarnings("ignore:the speed of sound")
@@ -94,15 +90,10 @@ def test_a_film_opens_by_what_nodes_under_its_cells_move_outwards():
     assert np.ptp(outwards.reshape(24, 3), axis=1).max() > 0.1 * np.abs(outwards).max()
 
 
-# --- tangents and energy ---
-
-
 def pair(law, reference="mean-axis"):
     """A journal in a soft bush, both anywhere, beside another in the ground.
 
-    Returns:
-        The system, its work, coordinates, velocities, units of motions, and where the soft film
-        remembers.
+    The last two are units of motions, and where the soft film remembers.
     """
     mech = rom.Mechanism(gravity=ORIGIN)
     own = {"mass": 0.2, "inertia": (1e-4, 2e-4, 3e-4)}
@@ -134,7 +125,6 @@ def pair(law, reference="mean-axis"):
 @pytest.mark.parametrize(("law", "passed"), [("none", 0.0), ("reynolds", 0.0), ("jfo", 0.0),
                                              ("jfo", 1e-3)])  # fmt: skip
 def test_tangents_are_the_derivatives(law, passed):
-    """Forces on bodies and bore by motions and bending, and by their rates."""
     packed, W, q, v, scale, memory = pair(law)
 
     def force(dq, dv):
@@ -187,9 +177,6 @@ def test_a_free_pair_keeps_momentum_and_energy():
     assert_allclose(L, np.tile(L[0], (len(L), 1)), atol=1e-6 * np.abs(L[0]).max())
     assert sol.energy.damping[-1] > 0.1
     assert rom.audit(sol).ok
-
-
-# --- a film and an elastic bush of another program ---
 
 
 @cache
@@ -292,9 +279,7 @@ def test_more_functions_come_closer_to_all_nodes():
     assert by_peak[0] > 0.03 and by_peak[3] < 2e-3
 
 
-# --- ROSS ---
-
-# load [N], modulus [Pa], eccentricity [1], attitude [degrees], largest pressure [MPa]
+# by ROSS: load [N], modulus [Pa], eccentricity [1], attitude [degrees], largest pressure [MPa]
 ROSS = [
     (10638.3, None, 0.45904, 49.200, 2.4443),
     (10638.3, 1e9, 0.50002, 39.915, 2.3617),
@@ -326,9 +311,6 @@ def test_a_bearing_with_a_liner_is_that_of_ross(load, E, eccentricity, attitude,
     assert np.hypot(*at) / b.clearance == pytest.approx(eccentricity, rel=3e-3)
     assert np.degrees(np.arctan2(at[0], -at[1])) == pytest.approx(attitude, abs=0.8)
     assert found.pressure[0] == pytest.approx(1e6 * largest, rel=8e-3)
-
-
-# --- what is refused ---
 
 
 @pytest.mark.parametrize(("given", "words"), [

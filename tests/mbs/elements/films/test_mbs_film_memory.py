@@ -63,7 +63,6 @@ def driven_film(b, speed, t, x, y):
 @pytest.mark.parametrize("speed", [SPEED, -SPEED, 0.0])
 @pytest.mark.parametrize("aligned", [True, False])
 def test_oil_that_comes_in_stays_or_leaves(speed, aligned):
-    """In every cell: a journal that is led around and out of its oil."""
     b = bearing([rom.mbs.Groove(1.0, 0.3, 2e4, share=0.5)], aligned=aligned)
     t = np.arange(0, 0.1, 1e-3)
     x, y = C * (0.3 + 0.4 * np.sin(80 * t)), C * 0.5 * np.sin(50 * t)
@@ -91,7 +90,6 @@ def test_a_simulated_motion_keeps_the_same_oil():
 
 
 def emptied(sol):
-    """The last state of a motion, its film without oil."""
     base, at = sol.final.base.copy(), len(sol.packed.places.coordinates) + FIRST_CONTENT
     base[at:] = 0.0
     return replace(sol.final, base=base, memory=None, algorithmic=None)
@@ -99,7 +97,6 @@ def emptied(sol):
 
 @pytest.mark.parametrize("speed", [SPEED, -SPEED])
 def test_oil_from_a_groove_travels_with_half_the_speed(speed):
-    """Around a centred journal, into an empty film: what has come in, and where it ends."""
     b = bearing([rom.mbs.Groove(np.pi, 0.1)], (240, 2), aligned=True)
     still = (lambda t: 0.0, lambda t: 0.0)
     mech = held_rotor(b, (0, 0), speed=speed, oil=VISCOSITY, moves=still)

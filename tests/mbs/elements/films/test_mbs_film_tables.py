@@ -79,7 +79,6 @@ def test_what_a_table_leaves_out_of_tilts_falls_with_their_square():
 
 
 def test_slopes_of_all_answers_are_those_of_the_table():
-    """Forces, moments and torque by motions, rates and the spin, in clearances."""
     b, rng, d = bearing(), np.random.default_rng(8), 1e-5
     for _ in range(3):
         motion, rate, spin = random_state(rng, 0.2)
@@ -118,7 +117,6 @@ def test_a_full_film_is_that_of_the_cells_up_to_the_last_node():
 
 
 def test_every_film_has_its_own_table():
-    """A wide and a narrow bearing of one mechanism, as each alone."""
     wide, narrow = bearing(), rom.mbs.JournalBearing(0.1, 0.03, CLEARANCE, SIDES, cells=(40, 3))
     found = []
     for some in ((wide,), (narrow,), (wide, narrow)):
@@ -168,7 +166,6 @@ def test_a_rotor_rests_and_is_stiff_as_on_the_film_that_is_solved():
 
 
 def test_a_motion_is_that_of_the_film_that_is_solved():
-    """A rotor that is let go beside its rest, to a thousandth of the clearance."""
     moved = []
     for tabulated in (False, True):
         mech = held_rotor(bearing(), (3000.0, 0.0), speed=SPEED, oil=OIL, tabulated=tabulated)
@@ -188,9 +185,6 @@ def test_the_temperature_is_that_of_the_film_that_is_solved():
         found.append(rom.mbs.snapshot(mech, state).journal_bearing("film"))
     assert found[0].temperature[0] > 42.0
     assert found[1].temperature[0] == pytest.approx(found[0].temperature[0], abs=0.02)
-
-
-# --- what is refused ---
 
 
 def read(elastic_bush=False, **sizes):

@@ -50,7 +50,6 @@ CASES = [("spur", "plain"), ("spur", "relieved"), ("spur", "measured"), ("helica
 
 
 def wheels(kind, options, **more):
-    """Two free wheels in mesh."""
     given = {"stiffness": TABLE, "entry": 0.1, "cells": 7} | OPTIONS[options] | more
     return free_wheels(PAIRS[kind], **given)
 
@@ -69,7 +68,6 @@ def placed(packed, pair, back, seed, tilts=3e-4):
 @pytest.mark.parametrize(("kind", "options"), CASES)
 @pytest.mark.parametrize("back", [False, True], ids=["working", "back"])
 def test_forces_are_the_gradient_of_the_energy(kind, options, back):
-    """Wherever the wheels are, whatever lies between them; no force or moment is left over."""
     packed, W = prepared(wheels(kind, options))
     pair, mesh = PAIRS[kind], packed.elements[GEAR_MESHES_FAMILY]
     for seed in range(3):
@@ -113,7 +111,6 @@ def test_tangents_without_tilts_know_how_forces_turn(kind, more):
 @pytest.mark.parametrize("kind", PAIRS)
 @pytest.mark.parametrize("losses", [{}, LOSSES], ids=["elastic", "lossy"])
 def test_wheels_that_hit_and_part_keep_energy_and_momentum(kind, losses):
-    """Fast wheels whose lines come and go under load, with relief, pitch errors and run-out."""
     pitch = (1e-6 * np.arange(PAIRS[kind].teeth[0]) % 7, ())
     flanks = Correction((15e-6, 10e-6), (4e-3, 3e-3), 2.0, 4e-6, 5e-6, pitch,
                         run_out=((2e-6, 0.4), (0.0, 0.0)))  # fmt: skip
@@ -138,7 +135,6 @@ def test_wheels_that_hit_and_part_keep_energy_and_momentum(kind, losses):
 
 
 def test_a_pinion_in_oil_films_whose_teeth_rub_hit_and_part_keeps_the_energy():
-    """Works of weight and motor, losses in films and on flanks, energy in teeth, in one balance."""
     pair, mech = GearPair((26, 40), 4e-3, 0.03, 0.2, thinning=5e-6), rom.Mechanism()
     pinion = mech.add_rigid("pinion", mass=4.0, inertia=(8e-3, 8e-3, 5e-3), at=ORIGIN,
                             omega=(0, 0, 100.0))  # fmt: skip

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.interpolate import RegularGridInterpolator
-from scipy.optimize import brentq
+from scipy.optimize import brentq, lsq_linear
 
 import rom
 from cases.components.geared import ORIGIN, free_wheels
@@ -177,7 +177,6 @@ def test_run_out_is_what_a_wheel_off_its_axis_does(pair, wheel, back):
 
 
 def test_shifts_and_tilts_alone_press_flanks():
-    """Of wheels that have not turned; by hand."""
     helical, depth, lean = replace(SPUR, helix=0.35), 1e-5, 1e-3
     phase, length = 0.5 * sum(helical.path) / helical.rb[0], helical.width / np.cos(HELIX_OF_BASE)
     for side, gap in ((1.0, 0.0), (-1.0, helical.backlash * np.cos(HELIX_OF_BASE))):
@@ -254,7 +253,7 @@ def test_bending_with_hertz_is_that_of_weber_and_banaschek_at_one_load(teeth, mo
 
 def test_helical_teeth_are_rounder_in_their_normal_section():
     """Radii of curvature are those of the transverse section over the cosine of the base helix."""
-    pair, h, F = replace(SPUR, helix=0.5), (4e-3, 3e-3), 2e5
+    pair, h, F = replace(SPUR, helix=0.5, gear_helix=-0.5), (4e-3, 3e-3), 2e5
     hertz = Hertz(h)
     found = hertz.constants(pair)
     s = np.linspace(*pair.path, len(found))
@@ -280,11 +279,10 @@ def steps(touching):
 
 @pytest.mark.parametrize("n", [2, 21])
 def test_coupling_does_nothing_to_an_even_load(n):
+    flat = np.zeros(2 * n + 1)
     for more in ({}, {"hertz": Hertz((4e-3, 3e-3))}):
-        even = pressed(np.zeros(2 * n + 1), 1e-5, **more)
-        assert pressed(np.zeros(2 * n + 1), 1e-5, coupling=6e-3, **more) == pytest.approx(
-            even, rel=1e-9
-        )
+        even = pressed(flat, 1e-5, **more)
+        assert pressed(flat, 1e-5, coupling=6e-3, **more) == pytest.approx(even, rel=1e-9)
 
 
 @pytest.mark.parametrize("length", [2e-3, 8e-3, 0.03])
@@ -313,8 +311,6 @@ def test_a_load_at_the_end_of_the_foundation():
 
 def test_slices_beside_a_ridge_lift_off():
     """What a foundation bears under a crowned flank, against its quadratic programme."""
-    from scipy.optimize import lsq_linear
-
     n, length, depth = 40, 6e-3, 1e-5
     z = (np.arange(n) + 0.5) / n - 0.5
     gap = 4e-5 * (2 * z) ** 2
@@ -329,9 +325,6 @@ def test_slices_beside_a_ridge_lift_off():
     assert load == pytest.approx((A.T @ A @ w).sum(), rel=1e-6)
 
 
-NAN = np.full((4, 3), np.nan)
-
-
 def cut(**flanks):
     return lambda: wheels(correction=Correction(**flanks))
 
@@ -339,7 +332,7 @@ def cut(**flanks):
 test_what_no_flank_is_like_is_refused = refused(
     (cut(maps=(np.zeros((25, 4, 3)), None)), r"\(25, 4, 3\).*or \(26"),
     (cut(maps=(None, np.zeros(4))), r"working flanks of the gear .*\(4,\)"),
-    (cut(back_maps=(NAN, None)), "back flanks of the pinion .* 12 values"),
+    (cut(back_maps=(np.full((4, 3), np.nan), None)), "back flanks of the pinion .* 12 values"),
     (cut(pitch=(np.full(26, np.nan), ())), "is not finite"),
     (cut(run_out=((1e-3, 0.0), (0, 0))), "run-out 0.001 m of 'mesh'"),
     (lambda: wheels(coupling=1.0), "at least 0 and at most 0.03"),
@@ -349,18 +342,12 @@ test_what_no_flank_is_like_is_refused = refused(
 )
 
 
-def test_a_hand_that_fits_is_taken():
-    assert replace(SPUR, helix=0.3, gear_helix=-0.3).gear_helix == -0.3
-
-
 def test_depths_of_teeth_are_those_of_the_compliance():
     _, hertz = bending_table(SPUR, n=3)
     middle = 0.5 * sum(SPUR.path)
     radius = float(np.hypot(SPUR.rb[0], middle))
     assert hertz.depths[1, 0] == pytest.approx(gear_mesh.tooth_compliance(SPUR, 0, radius)[2])
 
-
-# --- stiffness in a mechanism ---
 
 LOAD = 3e5  # along the line of action, over the face [N/m]
 

@@ -54,6 +54,8 @@ WRONG = {  # sizes of the pair, keys of the mesh, where the other wheel stands [
     "half a tooth on a rack": ({"teeth": [26.5, 0]}, {}, 0.053, r"teeth = 26\.5 must be"),
     "hand of a rack": ({"teeth": [26, 0], "helix": 0.3, "gear_helix": 0.3}, {}, 0.0544,
                        r"rack of helix 17\.19 degrees does not mesh.*opposite: -17\.19 degrees"),
+    "shift of a rack": ({"teeth": [26, 0], "shift": [0.1, 0.2]}, {}, 0.0524,
+                        r"rack of 'm' has a profile shift of 0\.2.*centre_dis"),
     "steep rack": ({"teeth": [26, 0], "pressure_angle": 0.67}, {}, 0.052, "the rack are pointed"),
     "rack beside its pinion": ({"teeth": [26, 0]}, {}, (0.052, 0.03, 0),
                                "marker of a rack is beside the axis of its pinion"),
@@ -78,7 +80,6 @@ between = ["a.p", {{ ground = {where} }}]
 
 
 def written(folder, where, *tables):
-    """The path of a file with a mesh of these keys and a pair of these sizes."""
     mesh, pair = ("\n".join(f"{key} = {value}" for key, value in x.items()) for x in tables)
     path = folder / "m.toml"
     path.write_text(FILE.format(where=where, mesh=mesh, pair=pair))
@@ -97,13 +98,6 @@ def test_files_with_what_does_not_mesh_are_refused_where_the_mesh_is(case, tmp_p
     texts = enumerate(path.read_text().split("\n"), 1)
     line = next(k for k, text in texts if text.startswith(begin))
     assert f"m.toml:{line}:" in str(refused.value)
-
-
-def test_a_rack_has_no_profile_shift(tmp_path):
-    sizes = {**SIZES, "teeth": [26, 0], "shift": [0.1, 0.2]}
-    path = written(tmp_path, [0.0524, 0, 0], MESH, sizes)
-    with pytest.raises(ConfigError, match=r"rack of 'm' has a profile shift of 0\.2.*centre_dis"):
-        rom.read_mechanism(path).mechanism()
 
 
 def test_a_rack_does_not_spin():

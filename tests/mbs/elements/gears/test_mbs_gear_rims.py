@@ -223,7 +223,6 @@ def test_tangents_of_rims_are_differences_of_their_forces(rub):
 
 
 def test_a_rack_presses_a_rim_as_a_gear_without_end_does():
-    """Forces and torque on the body of the pinion, as by a gear of 1e5 teeth."""
     found = []
     for pair in (RackPair(26, 3e-3, 0.06), GearPair((26, 100_000), 3e-3, 0.06)):
         body = reduced(rom.FourierLegendre(2, 2))
@@ -240,7 +239,6 @@ def test_a_rack_presses_a_rim_as_a_gear_without_end_does():
 
 
 def test_free_wheels_with_soft_rims_keep_momentum_and_energy():
-    """Their teeth hit and part again; what damping and sliding take away is counted."""
     losses = {"damping": 1e-6, "friction": 0.1, "transition_speed": 0.1}
     mech = soft_wheels(rom.Guyan(), "mean-axis", omega=(20.0, 1.0), stiffness=1e9, **losses)
     sol = rom.simulate(mech, t_end=2e-4, method="dop853", rtol=1e-8, atol=1e-10)

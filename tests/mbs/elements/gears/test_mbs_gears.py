@@ -101,19 +101,17 @@ def test_forces_of_helical_teeth_are_those_of_the_textbook(helix, turn):
     assert_allclose(found[11] / r2, along, rtol=1e-3)
 
 
-@pytest.mark.parametrize(
-    ("teeth", "helix", "width"), [((26, 40), 0.35, 0.05), ((20, 40), 0.0, 0.02)]
-)
-def test_contact_ratios_are_those_of_the_textbook(teeth, helix, width):
+@pytest.mark.parametrize(("teeth", "helix", "b"), [((26, 40), 0.35, 0.05), ((20, 40), 0.0, 0.02)])
+def test_contact_ratios_are_those_of_the_textbook(teeth, helix, b):
     """ISO 21771: paths outside both pitch points over the pitch, and b sin(beta) / (pi m_n)."""
     m, a_n = 4e-3, np.radians(20.0)
-    pair = GearPair(teeth, m, width, helix=helix)
+    pair = GearPair(teeth, m, b, helix=helix)
     a_t = np.arctan(np.tan(a_n) / np.cos(helix))
     r = np.array(teeth) * m / np.cos(helix) / 2
     beyond = np.sqrt((r + m) ** 2 - (r * np.cos(a_t)) ** 2) - r * np.sin(a_t)
     ratio = beyond.sum() * np.cos(helix) / (np.pi * m * np.cos(a_t))
     assert pair.contact_ratio == pytest.approx(ratio, rel=1e-9)
-    assert pair.overlap == pytest.approx(width * np.sin(helix) / (np.pi * m), rel=1e-9)
+    assert pair.overlap == pytest.approx(b * np.sin(helix) / (np.pi * m), rel=1e-9)
     assert 1.2 < pair.contact_ratio < 2.0  # standard teeth of twenty degrees
 
 
@@ -146,7 +144,6 @@ def test_tangents_are_derivatives_but_for_the_turning_of_forces(damping):
 
 
 def geared(pair=SPUR, inertia=(2e-3, 9e-3), **more):
-    """Two wheels on fixed axles, in mesh."""
     mech = rom.Mechanism(gravity=(0, 0, 0))
     ends = [
         on_axle(mech, name, inertia=(J, J, J), axle=f"{name} axle", at=(x, 0, 0))
@@ -176,7 +173,6 @@ def test_the_mesh_vibrates_as_a_spring_along_the_line_of_action():
 
 
 def test_many_turns_keep_the_ratio_of_the_teeth_and_the_torque():
-    """Driven at constant speed against a brake: ten turns of the pinion."""
     mech = geared(damping=2e-5, correction=Correction(relief=(1e-5, 1e-5), extent=(2e-3, 2e-3)))
     mech.drive("speed", "pinion axle", lambda t: 60.0 * t, rate=lambda t: 60.0 + 0 * t)
     mech.motor("brake", "gear axle", lambda t, x, v: 80.0 - 2.0 * (v + 60.0 * 26 / 40))
@@ -384,7 +380,6 @@ def approach_of_curves(pair, s, moved_to, turns):
 @pytest.mark.parametrize("pair", [SPUR, RING], ids=["external", "internal"])
 @pytest.mark.parametrize("seed", range(4))
 def test_the_approach_is_that_of_two_involute_curves(pair, seed):
-    """Of one pair of teeth, wherever the wheels move in their plane."""
     rng = np.random.default_rng(seed)
     A, B = pair.path
     s = A + (0.45 + 0.1 * rng.random()) * (B - A)
