@@ -49,6 +49,8 @@ def mechanism():
     mech.force("pull", one.marker("b"), (1.0, 2.0, 3.0), frame="body")
     return mech
 """
+POSITION = [f"slider.b.position[{k}]" for k in (1, 2, 3)]
+VELOCITY = [f"slider.b.velocity[{k}]" for k in (1, 2, 3)]
 
 
 @pytest.fixture(autouse=True)
@@ -83,10 +85,6 @@ def crank_by_hand(function=None):
     if function:
         mech.loads["gas"] = replace(mech.loads["gas"], function=function)
     return mech
-
-
-POSITION = [f"slider.b.position[{k}]" for k in (1, 2, 3)]
-VELOCITY = [f"slider.b.velocity[{k}]" for k in (1, 2, 3)]
 
 
 def native(motion):

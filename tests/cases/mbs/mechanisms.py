@@ -16,6 +16,11 @@ from rom.mbs.equations.equations import element_energy, evaluate, residual, tang
 from rom.mbs.equations.packing import pack
 from rom.mbs.kernels.work import workspace
 
+# Simeon, Modelling a flexible slider crank mechanism by a mixed system of DAEs and PDEs,
+# Math. Modelling of Systems 2 (1996) 1; data as in the IVP test set, problem "crank".
+CRANK = {"l1": 0.15, "l2": 0.30, "m1": 0.36, "m2": 0.151104, "m3": 0.075552, "J1": 0.002727}
+CRANK |= {"J2": 0.0045339259, "E": 2e11, "h": 0.008, "rho": 7870.0, "speed": 150.0}
+
 
 @njit
 def residual_at(s, W, q, v, a, lam):
@@ -145,12 +150,6 @@ def prepared(mechanism):
     """Packed mechanism and memory."""
     packed = pack(mechanism, whole=True)
     return packed, workspace(packed.system, len(packed.signals))
-
-
-# Simeon, Modelling a flexible slider crank mechanism by a mixed system of DAEs and PDEs,
-# Math. Modelling of Systems 2 (1996) 1; data as in the IVP test set, problem "crank".
-CRANK = {"l1": 0.15, "l2": 0.30, "m1": 0.36, "m2": 0.151104, "m3": 0.075552, "J1": 0.002727}
-CRANK |= {"J2": 0.0045339259, "E": 2e11, "h": 0.008, "rho": 7870.0, "speed": 150.0}
 
 
 def simeon_rod(axial_mass_divisor=1.0):

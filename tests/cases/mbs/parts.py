@@ -8,6 +8,7 @@ from rom.components.cosserat import body, straight
 
 ORIGIN = (0.0, 0.0, 0.0)
 X, Y, Z = np.eye(3)
+RECORD = {"outputs": ["slip"], "energy": True}  # what the law writes beside its forces
 
 
 def on_guide(mech, name="mass", *, mass=1.0, at=ORIGIN, axis=X, base=ORIGIN, guide="guide", **more):
@@ -68,9 +69,6 @@ def held_rod(n, *, joint="fixed", gravity=ORIGIN, on=None, axis=None, length=1.0
         ends = base or mech.ground.marker(ORIGIN), rod.marker("start")
         getattr(mech, joint)("hook", *ends, **({} if axis is None else {"axis": axis}))
     return mech, rod
-
-
-RECORD = {"outputs": ["slip"], "energy": True}  # what the law writes beside its forces
 
 
 def slipping(t, parameters, motion, memory, out):

@@ -15,6 +15,7 @@ from rom.errors import ConfigError, ModelError, SolverError
 
 STILL = {"gravity": (0, 0, 0)}
 EXACT = {"rtol": 1e-12, "atol": 1e-13, "method": "DOP853"}
+LENGTHS, MASSES, DAMPERS, TORQUE, SPEED = (1.0, 0.7), (1.0, 0.5), (0.6, 0.3), 1.5, 4.0
 
 
 def slider(stiffness=4.0, damping=0.4, at=0.0):
@@ -149,9 +150,6 @@ def test_kapitza_s_pendulum_stands_where_it_is_shaken_fast_enough():
         w = speed * np.sqrt(2 * 9.81) / a
         mech = pendulum(np.pi, shaken_by(a, w), damping=0.2)
         assert rom.periodic_motion(mech, period=2 * np.pi / w).stable == stable
-
-
-LENGTHS, MASSES, DAMPERS, TORQUE, SPEED = (1.0, 0.7), (1.0, 0.5), (0.6, 0.3), 1.5, 4.0
 
 
 def double_pendulum():

@@ -17,6 +17,8 @@ from rom.components.orbits.family import Family
 from rom.components.orbits.flow import Flow
 
 FORCE, DAMPING, SPRING, FREE = 0.3, 0.1, 2.5, 0.8
+ODD, N = np.array([1, 3, 5, 7, 9]), 256
+E = np.exp(2j * np.pi / N * np.outer(np.arange(N), ODD))
 
 
 def across(w):
@@ -33,10 +35,6 @@ def across(w):
 
 def amplitude(solution):
     return np.abs(solution.position("mass")[:, 0]).max()
-
-
-ODD, N = np.array([1, 3, 5, 7, 9]), 256
-E = np.exp(2j * np.pi / N * np.outer(np.arange(N), ODD))
 
 
 def balance(u, phase):
@@ -99,8 +97,7 @@ def test_the_branch_between_the_folds_is_unstable_and_alone_so(curve):
 
 @pytest.mark.long
 def test_the_way_back_meets_the_same_folds(curve):
-    back = rom.periodic_path(across, (1.5, 1.1), period=lambda w: 2 * np.pi / w, steps=150,
-                             n=30)  # fmt: skip
+    back = rom.periodic_path(across, (1.5, 1.1), period=lambda w: 2 * np.pi / w, steps=150, n=30)
     assert back.critical[0].kind == "fold"
     assert back.critical[0].p == pytest.approx(curve.critical[1].p, rel=1e-5)
     assert back.p[0] == 1.5 and back.stable[0] and not back.stable[-1]
@@ -162,8 +159,7 @@ def test_limit_cycles_are_followed_with_their_periods():
     def rates(t, y):
         return [y[1], path.p[-1] * (1 - y[0] ** 2) * y[1] - y[0]]
 
-    run = solve_ivp(rates, (0, 60), [2.0, 0.0], rtol=1e-10, atol=1e-12,
-                    events=lambda t, y: y[1])  # fmt: skip
+    run = solve_ivp(rates, (0, 60), [2.0, 0.0], rtol=1e-10, atol=1e-12, events=lambda t, y: y[1])
     period = run.t_events[0][-1] - run.t_events[0][-3]
     assert path.p[-1] == pytest.approx(1.5)
     assert path.period[-1] == pytest.approx(period, rel=2e-3)

@@ -16,6 +16,8 @@ from rom.components.orbits.derivatives import by_differences, by_steps, confirme
 from rom.components.orbits.flow import Flow
 from rom.components.orbits.shooting import Return, Turns, turns_of
 
+STIFFNESS, DAMPING, RATE = 4.0, 0.4, 1.3
+
 
 def swung(mechanism, period, steps=40, turns=None):
     """A period from where bodies were added, after one that has brought the method there."""
@@ -167,9 +169,6 @@ def test_derivatives_of_a_neighbour_count_in_the_coordinates_of_a_motion():
     assert kept.around(stranger) is None
     turned = replace(kept, Zq=np.roll(kept.Zq, 1, axis=0), Zv=np.roll(kept.Zv, 1, axis=0))
     assert turned.around(found) is None
-
-
-STIFFNESS, DAMPING, RATE = 4.0, 0.4, 1.3
 
 
 def pushed(force=1.0):

@@ -8,12 +8,14 @@ from numpy.testing import assert_allclose
 
 import rom
 from cases.mbs.mechanisms import prepared, two_soft
-from cases.mbs.parts import Z, boxed, refused_on
+from cases.mbs.parts import ORIGIN, Z, boxed, refused_on
 from cases.mbs.tangents import by_velocity, check_tangents, energy_gradient, forces_at, near
 from rom import rotation
 from rom.mbs.elements import bushings
 
 TILT = np.array([0.9, 0.1, -0.3, 0.3]) / np.linalg.norm([0.9, 0.1, -0.3, 0.3])
+NEAR_SIZE = 0.4  # rotations of the bushing stay well below half a turn
+DIAGONAL = (800.0, 450.0, 200.0, 10.8, 8.0, 2.8)
 
 
 def full_matrix(rng, size=30.0):
@@ -29,9 +31,6 @@ def bushed(rng, damped=False):
                  damping=full_matrix(rng, 2.0) if damped else None,
                  curves={"y": (x, 40 * x**3), "rx": (x, np.sinh(3 * x))})  # fmt: skip
     return mech
-
-
-NEAR_SIZE = 0.4  # rotations of the bushing stay well below half a turn
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -63,9 +62,6 @@ def box(mech, name="box", **more):
     return mech.add_rigid(name, **{"mass": 2.0, "inertia": (0.3, 0.5, 0.7), "at": (0, 0, 0)} | more)
 
 
-DIAGONAL = (800.0, 450.0, 200.0, 10.8, 8.0, 2.8)
-
-
 @pytest.mark.parametrize("k", range(6))
 def test_small_vibrations_have_the_frequency_of_a_spring(k):
     """Omega^2 = k / m along, k / J about each axis of the bushing."""
@@ -73,8 +69,7 @@ def test_small_vibrations_have_the_frequency_of_a_spring(k):
     mech = rom.Mechanism(gravity=(0, 0, 0))
     kick = 1e-6 * np.eye(6)[k]
     part = box(mech, velocity=kick[:3], omega=kick[3:])
-    mech.bushing("rubber", mech.ground.marker((0, 0, 0)), part.marker((0, 0, 0)),
-                 stiffness=DIAGONAL)  # fmt: skip
+    mech.bushing("rubber", mech.ground.marker(ORIGIN), part.marker(ORIGIN), stiffness=DIAGONAL)
     sol = rom.simulate(mech, t_end=1.0, dt=0.01, method="dop853", rtol=1e-10, atol=1e-18)
     wanted = kick[k] * np.cos(omega * sol.t)
     assert_allclose(sol.v[:, k], wanted, atol=1e-5 * kick[k])

@@ -35,6 +35,11 @@ KINDS = {  # of which capsules touch along them, and where both end
     "capsules": ("capsule_on_capsule", CAPSULES | {"length1": 40.0, "length2": 30.0}),
     "ends": ("capsule_on_capsule", CAPSULES | {"length1": 0.5, "length2": 0.3}),
 }
+BRISTLES = {"slides": {}, "holds": {"tangential_stiffness": 0.5, "tangential_damping": 0.05},
+            "slips": {"tangential_stiffness": 5e3, "tangential_damping": 0.05}}  # fmt: skip
+SIZE = (0.4, 0.3, 0.2)
+WEIGHT = 7850.0 * 0.4 * 0.3 * 0.2 * g
+LAW = Impact(stiffness=4e8, exponent=1.0, damping=20.0, mu=0.3, transition_speed=1e-3)
 
 
 def random_contact(kind, law):
@@ -56,10 +61,6 @@ def test_forces_without_loss_are_the_gradient_of_the_energy(kind):
     gradient, found = tangents.elastic_forces(packed, W, q, stiffness, lam)
     assert np.abs(gradient).max() > 0.1
     assert_allclose(found, gradient, atol=2e-7 * np.abs(gradient).max())
-
-
-BRISTLES = {"slides": {}, "holds": {"tangential_stiffness": 0.5, "tangential_damping": 0.05},
-            "slips": {"tangential_stiffness": 5e3, "tangential_damping": 0.05}}  # fmt: skip
 
 
 @pytest.mark.parametrize("how", BRISTLES)
@@ -378,11 +379,6 @@ def test_a_clamped_bar_creeps_or_slips_as_the_law_says(share):
         force = sol.element(jaw).force[-1, 1]
         assert_allclose(abs(force[1]), N, rtol=1e-6)
         assert_allclose(force[2], min(weight / 2, mu * N), rtol=1e-3)
-
-
-SIZE = (0.4, 0.3, 0.2)
-WEIGHT = 7850.0 * 0.4 * 0.3 * 0.2 * g
-LAW = Impact(stiffness=4e8, exponent=1.0, damping=20.0, mu=0.3, transition_speed=1e-3)
 
 
 def below(points):

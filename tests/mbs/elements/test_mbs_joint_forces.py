@@ -19,16 +19,15 @@ from rom.mbs.equations.equations import load_columns
 from rom.mbs.integrate.simulation import simulate
 from rom.mbs.kernels.constraints import constraint_gradient
 
+METHODS = ("generalized-alpha", "dop853")
+g = 9.81
+
 
 @njit
 def columns_at(s, W, lam):
     constraint_gradient(s, W)
     W.UG[:] = W.G
     load_columns(s, W, lam, lam.size)
-
-
-METHODS = ("generalized-alpha", "dop853")
-g = 9.81
 
 
 def wheel(J=0.5, omega=0.0):

@@ -20,6 +20,12 @@ from rom.errors import ConfigError, SolverError
 from rom.mbs.elements import laws
 
 STIFFNESS, YIELD, REACH = 1000.0, 20.0, 0.05
+STARTS = {
+    "equilibrium": rom.equilibrium,
+    "motion": lambda mech: simulate_quietly(mech, t_end=0.1, dt=1e-3),
+    "chosen steps": lambda mech: simulate_quietly(mech, t_end=0.1, dt=None),
+}
+ENERGY, LOSSES, OWN_MEMORY, BEYOND, COUNTS, NAN = range(1, 7)
 
 
 def shaken(*, compiled=True, law=slipping, **options):
@@ -190,13 +196,6 @@ def test_a_law_that_stops_to_be_a_number_is_named_and_the_motion_kept(compiled, 
     assert told.value.solution.t[-1] >= (0.01 if method == "dop853" else 0.04)
 
 
-STARTS = {
-    "equilibrium": rom.equilibrium,
-    "motion": lambda mech: simulate_quietly(mech, t_end=0.1, dt=1e-3),
-    "chosen steps": lambda mech: simulate_quietly(mech, t_end=0.1, dt=None),
-}
-
-
 @pytest.mark.parametrize("start", STARTS)
 def test_a_law_that_never_is_a_number_is_named_at_once(start):
     mech = hung(lambda m, a, b: m.law("hole", spoiled, a, b, parameters=[NAN], compiled=True))
@@ -245,9 +244,6 @@ def pulling_slopes(t, parameters, motion, memory, K, C):
 def wrong_slopes(t, parameters, motion, memory, K, C):
     pulling_slopes(t, parameters, motion, memory, K, C)
     K[7, 1] *= 1.001
-
-
-ENERGY, LOSSES, OWN_MEMORY, BEYOND, COUNTS, NAN = range(1, 7)
 
 
 def spoiled(t, parameters, motion, memory, out):

@@ -17,6 +17,7 @@ from rom.rotation import matrix
 
 Z, ORIGIN = (0, 0, 1), (0, 0, 0)
 MASS, ACROSS, ABOUT = 3.0, 0.03, 0.05
+ECCENTRICITY, STIFF = 2e-4, 1.5e5
 
 
 def rotor(way, speed, **more):
@@ -178,9 +179,6 @@ test_what_is_not_round_is_refused = refused(
     ),
     error=rom.ModelError,
 )
-
-
-ECCENTRICITY, STIFF = 2e-4, 1.5e5
 
 
 @pytest.mark.parametrize("ratio", [0.6, 1.4])

@@ -16,6 +16,7 @@ from rom.mbs import Pulley
 G = 9.81
 SMALL = (1e-3, 1e-3, 1e-3)
 ORIGIN, Z = (0, 0, 0), (0, 0, 1)
+CORNERS = [(0.0, 0.0, 1.0), (0.3, 0.0, 1.2), (0.4, 0.2, 1.0)]
 
 
 def strung(rng, pulleys, **more):
@@ -169,9 +170,6 @@ def test_a_sheave_that_the_rope_grips_turns_with_it(sheave):
     assert moved.position("a")[-1, 2] + 1.0 == pytest.approx(wanted, rel=2e-3)
     turned = 0.1 * moved.joint("axle").angle[-1]
     assert turned == pytest.approx(wanted if sheave else 0.0, rel=3e-3, abs=1e-9)
-
-
-CORNERS = [(0.0, 0.0, 1.0), (0.3, 0.0, 1.2), (0.4, 0.2, 1.0)]
 
 
 @pytest.mark.parametrize("way", [1, -1])

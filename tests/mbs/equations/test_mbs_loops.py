@@ -8,7 +8,7 @@ from scipy.linalg import null_space
 import rom
 from cases.long import few
 from cases.mbs.mechanisms import prepared, random_body, simulate_quietly
-from cases.mbs.parts import X, Z, on_axle, slender
+from cases.mbs.parts import X, Y, Z, on_axle, slender
 from cases.refusals import refuses
 from rom.errors import ConfigError, ModelError, RomWarning
 from rom.mbs.equations import packing
@@ -18,6 +18,8 @@ pytestmark = pytest.mark.filterwarnings("ignore:.*constraints repeat others")
 # crank, coupler, rocker, distance of the pivots [m]; start angle [rad], speed [rad/s]
 A, B, C, D = 0.1, 0.4, 0.3, 0.35
 START, SPEED = 0.6, 20.0
+GRAVITY = (3.0, 0.0, -9.81)
+LOOPS = 7  # 126 coordinates: the fewest in blocks are 100
 
 
 def elbow(phi):
@@ -160,10 +162,6 @@ def test_a_state_without_the_coil_is_refused():
     refuses(ConfigError, words, rom.simulate, wound, t_end=0.02, dt=1e-3, state=state)
 
 
-GRAVITY = (3.0, 0.0, -9.81)
-LOOPS = 7  # 126 coordinates: the fewest in blocks are 100
-
-
 def ladder(n, *, repeated=True):
     """Parallelograms that hang from each other; all hinges, or of every loop one joint less bound.
 
@@ -274,20 +272,16 @@ def train(n, slope=0.2, apart=0.0):
     floor, behind = mech.ground.marker((0, 0, 0)), None
     for k in range(n):
         wheel = mech.add_rigid(f"wheel {k}", mass=2.0, inertia=(0.05, 0.1, 0.05), at=(k, 0, 0.3))
-        mech.rolling(f"roll {k}", floor, wheel.marker((0, 0, 0)), normal=(0, 0, 1), radius=0.3,
-                     axis=(0, 1, 0))  # fmt: skip
-        bar = mech.add_rigid(f"bar {k}", mass=1.0, inertia=(0.1,) * 3,
-                             at=(k + 0.5 + apart, 0, 0.3))  # fmt: skip
-        mech.revolute(f"axle {k}", bar.marker((-0.5, 0, 0)), wheel.marker((0, 0, 0)),
-                      axis=(0, 1, 0))  # fmt: skip
+        mech.rolling(f"roll {k}", floor, wheel.marker((0, 0, 0)), normal=Z, radius=0.3, axis=Y)
+        bar = mech.add_rigid(f"bar {k}", mass=1.0, inertia=(0.1,) * 3, at=(k + 0.5 + apart, 0, 0.3))
+        mech.revolute(f"axle {k}", bar.marker((-0.5, 0, 0)), wheel.marker((0, 0, 0)), axis=Y)
         if behind is not None:
             mech.spherical(f"link {k}", behind.marker((0.5, 0, 0)), bar.marker((-0.5, 0, 0)))
         for y in (-1, 1) if k % 3 == 2 else ():
             at = {"at": (k, y, 0.3), "inertia": (0.05, 0.1, 0.05)}
             other = mech.add_rigid(f"wheel {k}.{y}", mass=2.0, **at)
             centre = other.marker((0, 0, 0))
-            mech.rolling(f"roll {k}.{y}", floor, centre, normal=(0, 0, 1), radius=0.3,
-                         axis=(0, 1, 0))  # fmt: skip
+            mech.rolling(f"roll {k}.{y}", floor, centre, normal=Z, radius=0.3, axis=Y)
             mech.revolute(f"axle {k}.{y}", bar.marker((-0.5, y, 0)), centre, axis=(0, 1, 0))
         behind = bar
     mech.point_on_plane("end", mech.ground.marker((0, 0, 0.3)), behind.marker((0.5, 0, 0)),

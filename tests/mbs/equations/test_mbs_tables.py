@@ -22,6 +22,9 @@ from rom.mbs.kernels.compiled import kernel
 from rom.mbs.kernels.stages import STAGE_KERNELS, STAGE_NAMES, link, needed_by
 from rom.mbs.kernels.tables import Array1, Array3, Index2, Table, table
 
+WRONG = [np.zeros(3), np.zeros((2, 3, 4), dtype=int)]
+WRONG += [np.zeros((4, 3, 2)).T, np.zeros((2, 3, 8))[..., ::2]]
+
 
 @table
 class Inner(Table):
@@ -64,10 +67,6 @@ def test_a_table_is_copied_with_its_arrays_only():
     probed(changed, out[1])
     np.testing.assert_array_equal(out, [[23, 5, 1.5, 7, 4, 16], [23, 5, 4.0, 8, 4, 16]])
     assert t.inner.x[0] == 0.5 and changed.blocks is t.blocks
-
-
-WRONG = [np.zeros(3), np.zeros((2, 3, 4), dtype=int)]
-WRONG += [np.zeros((4, 3, 2)).T, np.zeros((2, 3, 8))[..., ::2]]
 
 
 @pytest.mark.parametrize("wrong", WRONG)

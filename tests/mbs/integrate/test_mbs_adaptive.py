@@ -17,6 +17,10 @@ from rom.mbs.integrate.run import Record
 
 IMPLICIT = ["generalized-alpha", "bdf"]
 ANGLE, PENDULUM_RATE = 1.2, np.sqrt(G / 1.1)  # 1 kg m^2 of the ball's place and 0.1 of its own
+LEAPS = {pendulum: (0.3, 1e-3), heavy_top: (0.02, 1e-3), free_crank: (0.05, 1e-3)}
+LEAPS |= {slider_crank: (0.03, 1e-4), wound_drive: (0.03, 1e-4)}
+LEAPS |= {motions.swing: (0.05, 1e-3), motions.four_links: (0.3, 1e-3)}
+WAYS = [{}, {"method": "bdf"}, {"stabilised": True}, {"rho_inf": 0.5, "save_every": 3}]
 
 
 def swung(t):
@@ -71,12 +75,6 @@ def test_one_call_of_compiled_code_takes_many_steps(method, build, t_end, rtol, 
     monkeypatch.setattr(adaptive_step.control, "take_steps", lambda *x: calls.append(1) or take(*x))
     sol = simulate_quietly(build(), t_end=t_end, rtol=rtol, method=method)
     assert len(calls) < 0.2 * sol.statistics["steps"]
-
-
-LEAPS = {pendulum: (0.3, 1e-3), heavy_top: (0.02, 1e-3), free_crank: (0.05, 1e-3)}
-LEAPS |= {slider_crank: (0.03, 1e-4), wound_drive: (0.03, 1e-4)}
-LEAPS |= {motions.swing: (0.05, 1e-3), motions.four_links: (0.3, 1e-3)}
-WAYS = [{}, {"method": "bdf"}, {"stabilised": True}, {"rho_inf": 0.5, "save_every": 3}]
 
 
 @pytest.mark.parametrize("options", WAYS, ids=str)

@@ -13,6 +13,7 @@ from cases.mbs.parts import ORIGIN, X, Z, on_guide
 from rom.components import cosserat
 
 STEEL_BAR = {"EI": 2800.0, "rhoA": 3.1, "n_modes": 5, "stiffened": False}  # 20 mm square
+INSTANTS = 40
 
 
 def four_bar():
@@ -58,9 +59,6 @@ MECHANISMS = {
     "rod of 40": (lambda: rod(40), 0.5, 10_000),
     "rod of 100": (lambda: rod(100), 0.5, 5_000),
 }
-
-
-INSTANTS = 40
 
 
 def seen(mech, t_end, n=None, **options):

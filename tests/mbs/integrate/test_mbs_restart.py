@@ -13,6 +13,10 @@ from cases.mbs.motions import PARTS, four_links, swing, wound_drive
 from cases.refusals import refuses
 
 CASES = [(swing, 1e-2), (simeon_crank, 1e-5), (wound_drive, 1e-3), (four_links, 1e-3)]
+PLAIN = [{}, {"rho_inf": 0.6}, {"method": "bdf"}]
+# drives need their rates for these: differences end where a run ends
+RATED = [{"stabilised": True}, {"method": "bdf", "order": 1}, {"method": "bdf", "order": 5}]
+RUNS = [*product(CASES, PLAIN), *product([CASES[0], (slider_crank, 1e-3)], RATED)]
 
 
 def pieces(build, dt, path, **options):
@@ -21,12 +25,6 @@ def pieces(build, dt, path, **options):
     state = simulate_quietly(build(), t_end=23 * dt, dt=dt, **options).final
     state = rom.load_state(rom.save_state(state, path))
     return whole, simulate_quietly(build(), t_end=60 * dt, dt=dt, state=state, **options)
-
-
-PLAIN = [{}, {"rho_inf": 0.6}, {"method": "bdf"}]
-# drives need their rates for these: differences end where a run ends
-RATED = [{"stabilised": True}, {"method": "bdf", "order": 1}, {"method": "bdf", "order": 5}]
-RUNS = [*product(CASES, PLAIN), *product([CASES[0], (slider_crank, 1e-3)], RATED)]
 
 
 def told(x):

@@ -19,6 +19,12 @@ from rom.mbs.kernels.work import workspace
 BDF = [{"method": "bdf", "order": k} for k in (1, 3, 4, 5)]
 PLAIN = [{"rho_inf": 0.6}, {"method": "bdf"}]
 STABILISED = [{"stabilised": True}, {"method": "bdf", "stabilised": True}]
+TOP, LOOP = (heavy_top, 0.1), (free_crank, 0.05)
+ORDERS = [  # motion, the longer step, tolerances of the method and of the order; options
+    *product([(*TOP, 5e-4, 1e-12, 0.15)], [*STABILISED, *BDF]),
+    *product([(*LOOP, 6.25e-5, 1e-11, 0.2)], [*STABILISED, BDF[1]]),
+    *product([(*TOP, 2.5e-4, 1e-11, 0.03), (*LOOP, 6.25e-5, 1e-11, 0.03)], PLAIN),
+]
 
 
 @njit
@@ -37,14 +43,6 @@ def velocity_gap(sol):
         wanted = np.where(signal >= 0, W.signal[signal, 1], 0.0) if len(W.signal) else 0.0
         largest = max(largest, np.abs(W.G @ sol.v[k] - wanted).max())
     return largest
-
-
-TOP, LOOP = (heavy_top, 0.1), (free_crank, 0.05)
-ORDERS = [  # motion, the longer step, tolerances of the method and of the order; options
-    *product([(*TOP, 5e-4, 1e-12, 0.15)], [*STABILISED, *BDF]),
-    *product([(*LOOP, 6.25e-5, 1e-11, 0.2)], [*STABILISED, BDF[1]]),
-    *product([(*TOP, 2.5e-4, 1e-11, 0.03), (*LOOP, 6.25e-5, 1e-11, 0.03)], PLAIN),
-]
 
 
 @pytest.mark.parametrize(("run", "options"), ORDERS)

@@ -21,6 +21,7 @@ from rom.mbs.integrate.step_memory import across, shift_ahead
 from rom.mbs.kernels.work import HAS_FACTOR, STEPS, Step, workspace
 
 IMPLICIT = ["generalized-alpha", "bdf"]
+STATISTICS = ("steps", "iterations", "factorisations", "rejected", "shortest", "longest")
 
 
 class End(NamedTuple):
@@ -31,9 +32,6 @@ class End(NamedTuple):
 @njit
 def increment_between(s, h, left, right, out):
     increment(s, h, left, right, out)
-
-
-STATISTICS = ("steps", "iterations", "factorisations", "rejected", "shortest", "longest")
 
 
 def test_dop853_has_its_order_in_the_error_per_tolerance():

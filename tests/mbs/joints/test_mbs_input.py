@@ -12,6 +12,7 @@ from rom.errors import ConfigError, ModelError, SolverError
 
 UNIT = {"mass": 1.0, "inertia": (1.0, 1.0, 1.0), "at": (0, 0, 0)}
 BODY = mechanisms.random_body(np.random.default_rng(1))
+GOOD = {"t_end": 0.01, "dt": 1e-3}
 
 
 def mechanism():
@@ -72,9 +73,6 @@ test_wrong_parts_of_a_mechanism_are_refused_where_they_are_made = refused_on(wit
     "coil on a slide": (lambda m, a, b: m.rotational_spring("c", "slide", stiffness=1.0),
                         "no coordinate 'angle'"),
 })  # fmt: skip
-
-
-GOOD = {"t_end": 0.01, "dt": 1e-3}
 
 
 def test_a_run_that_ends_where_it_starts_or_has_no_body_is_refused():

@@ -18,6 +18,7 @@ from rom.mbs.parts.joints import NO_VECTOR, Row
 from rom.mbs.results.recomputed import displacements
 
 AXIS = np.array([1.0, 2.0, 2.0]) / 3
+POLYNOMIAL = np.polynomial.Polynomial([0.3, -1.0, 2.0, 0.7, -0.4])
 
 
 def two_bodies(join):
@@ -101,8 +102,7 @@ def test_cardan_shafts_turn_with_the_ratio_of_the_closed_form():
                          markers=origin, omega=(start, 0, 0))  # fmt: skip
     mech.revolute("in", ground.marker((0, 0, 0)), one.marker("c"), axis=(1, 0, 0))
     mech.revolute("out", ground.marker((0, 0, 0)), two.marker("c"), axis=out)
-    mech.universal("cross", one.marker("c"), two.marker("c"), axis1=(0, 0, 1),
-                   axis2=np.cross(Z, out))  # fmt: skip
+    mech.universal("cross", one.marker("c"), two.marker("c"), axis1=Z, axis2=np.cross(Z, out))
     mech.drive("motor", "in", lambda t: speed * t)
     sol = simulate_quietly(mech, t_end=1.0, dt=0.01, method="dop853")
     phi = speed * sol.t + np.pi / 2  # the first pin starts across the plane of the shafts
@@ -196,8 +196,7 @@ def flexible():
     mech = rom.Mechanism(gravity=(0, 0, -9.81))
     one = mech.add_flexible("one", random_body(np.random.default_rng(17)), omega=(0.4, -0.2, 0.5))
     place = mech.design_point(one.marker("b"))
-    two = mech.add_rigid("two", mass=2.0, inertia=(1.0, 1.5, 2.0), at=place,
-                         omega=(-0.2, 0.4, 0.3))  # fmt: skip
+    two = mech.add_rigid("two", mass=2.0, inertia=(1.0, 1.5, 2.0), at=place, omega=(-0.2, 0.4, 0.3))
     mech.screw("thread", one.marker("b"), two.marker((0, 0, 0)), axis=AXIS, pitch=0.02)
     mech.motor("servo", "thread", lambda t, x, v: 5.0 - 0.1 * v, coordinate="angle")
     return rom.simulate(mech, t_end=2.0, dt=1e-3, assemble=True)
@@ -250,9 +249,6 @@ def test_joints_without_a_coordinate_are_named():
     sol = rom.simulate(mech, t_end=0.01, dt=1e-3)
     refuses(ConfigError, "'ball joint' is spherical: it has no angle", sol.joint, "ball joint")
     refuses(ConfigError, r"no joint 'pine'; there are \['ball joint', 'pin'\]", sol.joint, "pine")
-
-
-POLYNOMIAL = np.polynomial.Polynomial([0.3, -1.0, 2.0, 0.7, -0.4])
 
 
 def test_derivatives_are_exact_for_a_quartic_from_the_first_time_to_the_last():

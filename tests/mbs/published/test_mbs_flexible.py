@@ -17,6 +17,9 @@ from rom import rotation
 
 EXACT = {"method": "dop853", "rtol": 1e-9, "atol": 1e-11}
 GRAVITY = np.array([0.0, 0.0, -9.81])
+SIZE, CELLS = np.array([1.0, 0.15, 0.12]), np.array([6, 1, 1])
+ANGLE, T_TURN, T_END = 0.3, 0.4, 0.5  # the hinge turns so far [rad] in so long [s]
+TIMES = np.linspace(0.0, T_END, 26)
 
 
 def pendulum(data):
@@ -215,11 +218,6 @@ def test_the_stiff_limit_is_the_rigid_body(beam):
     rigid = mechanisms.simulate_quietly(mech, t_end=0.3, dt=1e-3, rho_inf=0.5)
     assert_allclose(flexible.position("ball"), rigid.position("ball"), atol=1e-5)
     assert np.abs(rigid.position("ball")[-1] - rigid.position("ball")[0]).max() > 0.1
-
-
-SIZE, CELLS = np.array([1.0, 0.15, 0.12]), np.array([6, 1, 1])
-ANGLE, T_TURN, T_END = 0.3, 0.4, 0.5  # the hinge turns so far [rad] in so long [s]
-TIMES = np.linspace(0.0, T_END, 26)
 
 
 def turning(t):

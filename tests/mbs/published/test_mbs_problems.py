@@ -17,6 +17,11 @@ from cases.mbs.mechanisms import simulate_quietly
 from cases.mbs.parts import X, Y, Z, slender, turned
 
 g = 9.81
+# A04, Bricard's linkage: six links of 1 m, each hinge normal to both and to its neighbours: no
+# degree of freedom by count, one in fact. Of three-fold symmetry: angles of hinges alternate, the
+# loop closes where cos phi + cos theta + cos phi cos theta = 0. It starts as six edges of a cube.
+WIDTH = 0.1  # of the square section
+TWIST = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])  # a quarter turn about x
 
 
 def rod_points(a, b, mass=1.0):
@@ -180,13 +185,6 @@ def test_andrews_squeezer_ends_where_it_was_published():
         p, exact = sol.orientation(f"K{k + 1}"), [squeezer_angles(x)[k] for x in found[:7].T]
         assert_allclose(ray(2 * np.arctan2(p[:, 3], p[:, 0])), ray(np.array(exact)), atol=2e-4)
     assert sol.base[-1, 0] == pytest.approx(SQUEEZER_END[0] - SQUEEZER_START[0], abs=2e-4)
-
-
-# A04, Bricard's linkage: six links of 1 m, each hinge normal to both and to its neighbours: no
-# degree of freedom by count, one in fact. Of three-fold symmetry: angles of hinges alternate, the
-# loop closes where cos phi + cos theta + cos phi cos theta = 0. It starts as six edges of a cube.
-WIDTH = 0.1  # of the square section
-TWIST = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])  # a quarter turn about x
 
 
 def bricard_links(q):

@@ -15,6 +15,8 @@ from cases.mbs.parts import on_axle, on_guide
 from cases.mbs.trusses import HUB_INERTIA, MASS, REST, SPRING, dumbbell
 from rom import rotation
 
+AXIS = np.array([2.0, -1.0, 2.0]) / 3
+
 
 def test_heavy_top_follows_eulers_equations_about_its_fixed_point():
     sol = rom.simulate(heavy_top(), t_end=0.5, dt=0.1, method="dop853")
@@ -156,9 +158,6 @@ def test_physical_pendulum_reaction_at_the_lowest_point():
     sol = rom.simulate(mech, t_end=1.0, dt=1e-4)
     lowest = np.argmin(sol.position("bar")[:, 1])
     assert_allclose(sol.reaction("hinge")[lowest, 1], 2.5 * 2.0 * 9.81, rtol=1e-5)
-
-
-AXIS = np.array([2.0, -1.0, 2.0]) / 3
 
 
 def momentum(s, spin):

@@ -19,6 +19,14 @@ from rom.errors import ConfigError, RomWarning
 from rom.mbs.mechanism import Mechanism
 
 EXACT = {"method": "dop853", "rtol": 1e-10, "atol": 1e-12}
+# Kane, Ryan and Banerjee, Dynamics of a cantilever beam attached to a moving base, J. Guid. Control
+# Dyn. 10 (1987) 139; the beam of Wu and Haug. Extremes from a spectral beam theory.
+KRB = {"length": 10.0, "EI": 1.4e4, "rhoA": 1.2, "n_modes": 4}
+WU = {"length": 8.0, "EI": 6.8952e10 * 8.2181e-9, "rhoA": 2766.67 * 7.2968e-5, "n_modes": 4}
+# Dowell, Traybar, Hodges: An experimental-theoretical correlation study of nonlinear bending and
+# torsion deformations of a cantilever beam (J. Sound Vib. 50, 1977, 533)
+LENGTH, DEPTH, THIN, E = 0.508, 12.377e-3, 3.2024e-3, 71.7e9
+STIFF, SOFT = E * THIN * DEPTH**3 / 12, E * DEPTH * THIN**3 / 12
 
 
 @pytest.mark.parametrize("eta", FLAP)
@@ -46,12 +54,6 @@ def test_supports_share_the_pull_of_a_body_between_them():
     # the tip gives no axial motion without axial shapes: all of the tension comes from the root
     held = 2 * np.pi * beam.rotating_frequencies(3, (0, 1, 0), fixed=("root", "tip"))
     assert at_rest[0] ** 2 < held[0] ** 2 < at_rest[0] ** 2 + 12.3 * 9 / 2
-
-
-# Kane, Ryan and Banerjee, Dynamics of a cantilever beam attached to a moving base, J. Guid. Control
-# Dyn. 10 (1987) 139; the beam of Wu and Haug. Extremes from a spectral beam theory.
-KRB = {"length": 10.0, "EI": 1.4e4, "rhoA": 1.2, "n_modes": 4}
-WU = {"length": 8.0, "EI": 6.8952e10 * 8.2181e-9, "rhoA": 2766.67 * 7.2968e-5, "n_modes": 4}
 
 
 def test_spin_up_of_kane_ryan_and_banerjee():
@@ -256,12 +258,6 @@ def test_a_hinged_blade_flaps_once_a_turn_and_bends_faster(eta):
     lag = hinged_blade(eta, Z)
     assert_allclose(lag[1] ** 2, second**2 - eta**2, rtol=4e-5)
     assert lag[0] < 1e-4 * eta
-
-
-# Dowell, Traybar, Hodges: An experimental-theoretical correlation study of nonlinear bending and
-# torsion deformations of a cantilever beam (J. Sound Vib. 50, 1977, 533)
-LENGTH, DEPTH, THIN, E = 0.508, 12.377e-3, 3.2024e-3, 71.7e9
-STIFF, SOFT = E * THIN * DEPTH**3 / 12, E * DEPTH * THIN**3 / 12
 
 
 def piece(length, EI):

@@ -24,6 +24,12 @@ SPEED, OIL, LOAD = 300.0, 0.02, (0.0, -2000.0)
 CELLS = (24, 2, 6)  # of the bush; its bore ends a cell before the ends
 SOFT_FILM = {"axis": (0, 0, 1), "oil": OIL, "elastic_bush": True}
 NONE = np.zeros(0)
+# by ROSS: load [N], modulus [Pa], eccentricity [1], attitude [degrees], largest pressure [MPa]
+ROSS = [
+    (10638.3, None, 0.45904, 49.200, 2.4443),
+    (10638.3, 1e9, 0.50002, 39.915, 2.3617),
+    (23148.1, 2e9, 0.69580, 31.346, 5.7459),
+]
 
 
 def bearing(cells=(60, 8), grooves=(), **more):
@@ -277,14 +283,6 @@ def test_more_functions_come_closer_to_all_nodes():
     assert np.all(np.diff(by_force) < 0)
     assert by_force[0] > 0.05 and by_force[3] < 1e-3
     assert by_peak[0] > 0.03 and by_peak[3] < 2e-3
-
-
-# by ROSS: load [N], modulus [Pa], eccentricity [1], attitude [degrees], largest pressure [MPa]
-ROSS = [
-    (10638.3, None, 0.45904, 49.200, 2.4443),
-    (10638.3, 1e9, 0.50002, 39.915, 2.3617),
-    (23148.1, 2e9, 0.69580, 31.346, 5.7459),
-]
 
 
 @cache

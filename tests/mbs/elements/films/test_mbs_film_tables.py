@@ -69,8 +69,7 @@ def test_what_a_table_leaves_out_of_tilts_falls_with_their_square():
             upright = motion * [1, 1, 0, 0], rate * [1, 1, 0, 0], spin
             known, flat = (loads(b, *one)[0] for one in (state, upright))
             found = loads(b, *state, tabulated=True)[0]
-            off.append([np.linalg.norm(known[:2] - flat[:2]),
-                        np.linalg.norm((known - found)[3:5])])  # fmt: skip
+            off.append([np.linalg.norm(known[:2] - flat[:2]), np.linalg.norm((known - found)[3:5])])
             share.append(np.linalg.norm((known - found)[3:5]) / np.linalg.norm(known[3:5]))
             assert_allclose(found[:2], flat[:2], atol=2e-3 * np.linalg.norm(flat[:2]))
         ratios.append(np.divide(*off))

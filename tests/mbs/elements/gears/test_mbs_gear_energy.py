@@ -20,6 +20,7 @@ PAIRS = {
     "left": GearPair((26, 40), 4e-3, 0.03, helix=-0.2, thinning=5e-5),
     "internal": GearPair((24, -72), 2e-3, 0.02, thinning=2e-5),
 }
+STEEP = Hertz(((1e-4, 1e-4), (5e-3, 5e-3), (1e-4, 5e-4)))
 
 
 def waves(seed, *shape):
@@ -86,9 +87,6 @@ def test_tangents_are_differences_of_forces(kind, options, losses):
     assert_allclose(found, stiff, atol=1e-3 * np.abs(stiff).max())
     found, loss = by_velocity(packed, W, q, v)
     assert_allclose(found, loss, atol=1e-6 * max(np.abs(loss).max(), 1.0))
-
-
-STEEP = Hertz(((1e-4, 1e-4), (5e-3, 5e-3), (1e-4, 5e-4)))
 
 
 @pytest.mark.parametrize("kind", ["spur", "helical", "internal"])

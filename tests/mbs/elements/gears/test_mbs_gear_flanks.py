@@ -24,6 +24,7 @@ SPUR = GearPair((26, 40), 4e-3, 0.03, thinning=5e-5)
 RING = GearPair((24, -72), 2e-3, 0.02, thinning=2e-5)
 CELLS = 6
 HELIX_OF_BASE = replace(SPUR, helix=0.35).base_helix
+LOAD = 3e5  # along the line of action, over the face [N/m]
 
 
 def wheels(pair=SPUR, at=(ORIGIN, ORIGIN), **more):
@@ -347,9 +348,6 @@ def test_depths_of_teeth_are_those_of_the_compliance():
     middle = 0.5 * sum(SPUR.path)
     radius = float(np.hypot(SPUR.rb[0], middle))
     assert hertz.depths[1, 0] == pytest.approx(gear_mesh.tooth_compliance(SPUR, 0, radius)[2])
-
-
-LOAD = 3e5  # along the line of action, over the face [N/m]
 
 
 def stiffness_of(pair, phase, law):

@@ -20,6 +20,8 @@ Y, K = (0, 1, 0), 1.3e10
 LOSSES = {"damping": 1e-6, "friction": 0.1, "transition_speed": 0.1}
 SPUR = RackPair(26, 4e-3, 0.03, thinning=5e-5)
 HELICAL = RackPair(26, 4e-3, 0.04, helix=0.35, shift=0.1, thinning=5e-5)
+FLANKS = Correction((15e-6, 10e-6), (4e-3, 3e-3), 1.5, 4e-6, 5e-6, run_out=((2e-6, 0.3), (0, 0)),
+                    maps=(1e-6 * np.eye(3), 1e-6 * np.eye(4)))  # fmt: skip
 
 
 def free(pair, **more):
@@ -44,10 +46,6 @@ def placed(packed, pair, back, seed):
     delta[5] += -1e-3 - pair.backlash / pair.rb[0] if back else 1e-3
     delta[5] += delta[11]
     return shifted(packed, packed.q, delta)
-
-
-FLANKS = Correction((15e-6, 10e-6), (4e-3, 3e-3), 1.5, 4e-6, 5e-6, run_out=((2e-6, 0.3), (0, 0)),
-                    maps=(1e-6 * np.eye(3), 1e-6 * np.eye(4)))  # fmt: skip
 
 
 @pytest.mark.parametrize("pair", [SPUR, HELICAL], ids=["spur", "helical"])

@@ -25,6 +25,8 @@ FLANKS = Correction(relief=(15e-6, 10e-6), extent=(2e-3, 3e-3), power=1.5, crown
 K = 1.3e10
 STILL = np.zeros(12)
 LAW = {"stiffness": K, "entry": 0.0, "conservative": False}
+SUN = GearPair((24, 24), 2e-3, 0.02, thinning=2e-5)
+RING = GearPair((24, -72), 2e-3, 0.02, thinning=2e-5)
 
 
 def wheels(pair=SPUR, turned=None, **more):
@@ -239,10 +241,6 @@ def test_what_is_no_mesh_is_refused():
                                (a, {}, "connects body 'a' with itself")):  # fmt: skip
         refuses(ConfigError, words, mech.gear_mesh, "mesh", a, other, **given | more)
     assert not mech.gear_meshes
-
-
-SUN = GearPair((24, 24), 2e-3, 0.02, thinning=2e-5)
-RING = GearPair((24, -72), 2e-3, 0.02, thinning=2e-5)
 
 
 def test_an_internal_gear_is_one_of_negative_radii():
