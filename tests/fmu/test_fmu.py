@@ -15,7 +15,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import rom
 from cases.mbs.fmu_instance import Instance, fmpy
 from cases.mbs.mechanisms import random_body, simulate_quietly
-from cases.mbs.parts import ORIGIN, on_guide
+from cases.mbs.parts import ORIGIN, on_axle, on_guide
 from cases.mbs.trusses import truss
 from cases.paths import ROOT
 from cases.refusals import refuses
@@ -162,9 +162,7 @@ def test_a_jump_of_an_input_costs_no_order():
 def flywheel():
     """A wheel of 0.2 kg m^2 on an axle, a sledge of 2 kg on rails."""
     mech, marks = rom.Mechanism(gravity=ORIGIN), {"hub": ORIGIN, "rim": (0.5, 0, 0)}
-    solid = {"mass": 1.0, "inertia": (0.1, 0.1, 0.2), "markers": marks}
-    wheel = mech.add_rigid("wheel", at=ORIGIN, **solid)
-    mech.revolute("axle", mech.ground.marker(ORIGIN), wheel.marker("hub"), axis=(0, 0, 1))
+    on_axle(mech, inertia=(0.1, 0.1, 0.2), markers=marks)
     on_guide(mech, "sledge", mass=2.0, guide="rails")
     return mech
 

@@ -98,8 +98,8 @@ def rail_of_the_core(slide, coupler, payload, spread):
     tip = np.array([spread / 2, np.sqrt(coupler[1] ** 2 - spread**2 / 4)])
     for name, x in (("left", 0.0), ("right", spread)):
         base = ball(mech, f"{name} slide", slide, (x, 0))
-        mech.prismatic(f"{name} rail", mech.ground.marker((x, 0, 0)), base.marker(o),
-                       axis=(1, 0, 0))  # fmt: skip
+        ends = mech.ground.marker((x, 0, 0)), base.marker(o)
+        mech.prismatic(f"{name} rail", *ends, axis=(1, 0, 0))
         turn = direction(tip - [x, 0])
         rod = pinned(mech, f"{name} coupler", coupler, (x, 0), turn, base.marker(o))
         tips.append(rod.marker("tip"))

@@ -27,11 +27,11 @@ def on_hinge(mech, at, name="bob", *, mass=2.0, inertia, axis=Y, pivot=None, **m
     return part
 
 
-def on_axle(mech, name="wheel", *, inertia=(1, 1, 0.5), axle="axle", **more):
-    """Centre of a wheel in the origin that turns about z on the ground."""
+def on_axle(mech, name="wheel", *, inertia=(1, 1, 0.5), axle="axle", axis=Z, **more):
+    """Centre of a wheel in the origin, or at a place, that turns about an axis on the ground."""
     given = {"mass": 1.0, "at": ORIGIN} | more
     centre = mech.add_rigid(name, inertia=inertia, **given).marker(ORIGIN)
-    mech.revolute(axle, mech.ground.marker(given["at"]), centre, axis=Z)
+    mech.revolute(axle, mech.ground.marker(given["at"]), centre, axis=axis)
     return centre
 
 

@@ -14,7 +14,7 @@ import rom
 from cases.beam import elastica
 from cases.long import few
 from cases.mbs.mechanisms import random_body, slider_crank
-from cases.mbs.parts import ORIGIN, X, Y, Z, held_rod, on_guide
+from cases.mbs.parts import ORIGIN, X, Y, Z, held_rod, on_axle, on_guide
 from cases.refusals import refuses
 from rom.errors import ConfigError, ModelError, ModesMissedError, RomWarning, SolverError
 from rom.mbs.analysis import campbell as campbell_module
@@ -202,10 +202,9 @@ def test_what_stands_on_its_head_falls_although_what_almost_hangs_weighs_more(ma
     mech = rom.Mechanism(gravity=(0, 0, -9.81))
     for name, mass, slope in (("heavy", 5.0, np.pi / 2 - 0.2), ("light", 0.1, -np.pi / 2 + 0.1)):
         turned = (np.cos(slope / 2), 0, np.sin(slope / 2), 0)
-        at = (np.cos(slope), 0, -np.sin(slope))
-        link = mech.add_rigid(name, mass=mass, inertia=(mass / 3,) * 3, orientation=turned, at=at,
-                              markers={"a": (-1, 0, 0)})  # fmt: skip
-        mech.revolute(f"pin of {name}", mech.ground.marker((0, 0, 0)), link.marker("a"), axis=Y)
+        solid = {"mass": mass, "inertia": (mass / 3,) * 3, "at": (np.cos(slope), 0, -np.sin(slope))}
+        link = mech.add_rigid(name, **solid, orientation=turned)
+        mech.revolute(f"pin of {name}", mech.ground.marker(ORIGIN), link.marker(-X), axis=Y)
     assert_allclose(rom.equilibrium(mech).q[2::7], -1.0, atol=1e-12)
 
 
@@ -362,8 +361,7 @@ def test_an_infinite_response_of_a_large_mechanism_is_named(monkeypatch):
 
 def test_a_campbell_diagram_of_some_modes_is_that_of_all(monkeypatch):
     mech = rom.Mechanism(gravity=(0, 0, 0))
-    hub = mech.add_rigid("hub", mass=1.0, inertia=(1, 1, 1), at=ORIGIN).marker(ORIGIN)
-    mech.revolute("axle", mech.ground.marker(ORIGIN), hub, axis=X)
+    hub = on_axle(mech, "hub", inertia=(1, 1, 1), axis=X)
     held_rod(12, on=(mech, hub), **SECTION)
     speeds, found = (2.0, 8.0, 20.0), []
     for size in (200, 0):

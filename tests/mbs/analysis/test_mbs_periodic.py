@@ -22,9 +22,8 @@ def slider(stiffness=4.0, damping=0.4, at=0.0):
     """A mass of 1 kg on a guide along x, by default on a spring and a damper."""
     mech = rom.Mechanism(**STILL)
     mass = on_guide(mech, at=(at, 0, 0))
-    six = stiffness, 0, 0, 0, 0, 0
-    mech.bushing("spring", mech.ground.marker((at, 0, 0)), mass, stiffness=six,
-                 damping=(damping, 0, 0, 0, 0, 0))  # fmt: skip
+    base, along = mech.ground.marker((at, 0, 0)), np.eye(6)[0]
+    mech.bushing("spring", base, mass, stiffness=stiffness * along, damping=damping * along)
     return mech, mass
 
 
@@ -208,8 +207,9 @@ def test_a_flexible_beam_answers_a_harmonic_force_as_its_frequency_response():
     part = mech.add_flexible("beam", beam)
     root, tip = (part.marker(name) for name in part.names)
     mech.fixed("clamp", mech.ground.marker(ORIGIN), root)
-    mech.bushing("damper", mech.ground.marker((1, 0, 0)), tip, stiffness=np.zeros(6),
-                 damping=(0, 0.5, 0, 0, 0, 0))  # fmt: skip
+    mech.bushing(
+        "damper", mech.ground.marker(X), tip, stiffness=np.zeros(6), damping=0.5 * np.eye(6)[1]
+    )
     w = 3.0
     H = rom.frequency_response(mech, None, [w / 2 / np.pi], force=tip, motion=tip).receptance
     F = 1e-3

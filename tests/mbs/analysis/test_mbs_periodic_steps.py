@@ -175,8 +175,8 @@ def pushed(force=1.0):
     """A ball on springs in all directions, pushed along x."""
     mech = rom.Mechanism(gravity=(0, 0, 0))
     ball = mech.add_rigid("ball", mass=1.0, inertia=(1, 1, 1), at=ORIGIN).marker(ORIGIN)
-    mech.bushing("springs", mech.ground.marker(ORIGIN), ball, stiffness=6 * (STIFFNESS,),
-                 damping=6 * (DAMPING,))  # fmt: skip
+    base, every = mech.ground.marker(ORIGIN), np.ones(6)
+    mech.bushing("springs", base, ball, stiffness=STIFFNESS * every, damping=DAMPING * every)
     mech.force("push", ball, lambda t: (force * np.cos(RATE * t), 0, 0))
     return mech
 

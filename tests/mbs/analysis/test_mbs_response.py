@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 import rom
 from cases.mbs.mechanisms import rotor
-from cases.mbs.parts import ORIGIN, X, Y, Z, on_guide, on_hinge
+from cases.mbs.parts import ORIGIN, X, Y, Z, on_axle, on_guide, on_hinge
 from cases.refusals import refuses
 from rom.errors import ConfigError, ModelError, RomWarning, SolverError
 from rom.mbs.analysis.campbell import Campbell
@@ -133,9 +133,7 @@ def crossing(speed):
     """Two bobs on a turning shaft, one swings outwards, one sideways with a coil."""
     mech = rom.Mechanism(gravity=(0, 0, 0))
     turn = np.array([0, 0, speed])
-    marks, solid = {"pin": (-0.5, 0, 0)}, {"mass": 1.0, "inertia": (1, 1, 1)}
-    shaft = mech.add_rigid("shaft", **solid, at=ORIGIN, omega=turn).marker(ORIGIN)
-    mech.revolute("axle", mech.ground.marker(ORIGIN), shaft, axis=Z)
+    marks, shaft = {"pin": (-0.5, 0, 0)}, on_axle(mech, "shaft", inertia=(1, 1, 1), omega=turn)
     mech.drive("motor", "axle", lambda t: speed * t, rate=lambda t: speed)
     for name, axis, k in (("lag", Z, 60.0), ("flap", Y, 20.0)):
         bob = mech.add_rigid(name, mass=2.0, inertia=(1e-6,) * 3, at=(0.5, 0, 0), markers=marks,
@@ -170,9 +168,8 @@ def test_a_mechanism_as_a_whole_takes_its_equilibrium_at_each_speed():
     """
     k, m, rest, J = 200.0, 0.5, 0.4, 0.3
     mech = rom.Mechanism(gravity=(0, 0, 0))
-    slot = mech.add_rigid("slot", mass=1.0, inertia=(J, J, J), at=ORIGIN).marker(ORIGIN)
+    slot = on_axle(mech, "slot", inertia=(J, J, J))
     ball = mech.add_rigid("ball", mass=m, inertia=(1e-6,) * 3, at=(rest, 0, 0)).marker(ORIGIN)
-    mech.revolute("axle", mech.ground.marker(ORIGIN), slot, axis=Z)
     mech.prismatic("groove", slot, ball, axis=X)
     mech.spring_damper("rope", slot, ball, stiffness=k)
     speeds = np.array([2.0, 7.0, 12.0])

@@ -166,8 +166,8 @@ def adrift():
     mech = leaning(1.0)
     disc = mech.add_rigid("disc", mass=1.0, inertia=(0.1,) * 3, at=(0, 0, 2))
     for name in ("nacelle", "hub"):
-        mech.bushing(f"to {name}", mech.parts[name].marker(ORIGIN), disc.marker(ORIGIN),
-                     stiffness=(1e3,) * 6)  # fmt: skip
+        ends = mech.parts[name].marker(ORIGIN), disc.marker(ORIGIN)
+        mech.bushing(f"to {name}", *ends, stiffness=(1e3,) * 6)
     return mech
 
 

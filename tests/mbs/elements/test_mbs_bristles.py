@@ -28,8 +28,8 @@ def block(angle, law=LAW, speed=0.0):
     part = mech.add_rigid("block", mass=MASS, inertia=(0.01,) * 3, at=(0, 0, HEIGHT + 1e-6 - sink),
                           velocity=(speed, 0, 0), markers=FEET)  # fmt: skip
     for foot in FEET:
-        mech.sphere_on_plane(foot, mech.ground.marker(ORIGIN), part.marker(foot), law, normal=Z,
-                             radius=1e-6)  # fmt: skip
+        ends = mech.ground.marker(ORIGIN), part.marker(foot)
+        mech.sphere_on_plane(foot, *ends, law, normal=Z, radius=1e-6)
     return mech
 
 
@@ -144,9 +144,8 @@ def test_a_mass_on_a_spring_loses_two_limits_of_its_amplitude_each_half_swing():
     d = MU * load / K
     law = replace(LAW, tangential_stiffness=1e6, tangential_damping=300.0)
     mech = sled(law, load, x=5.5 * d)
-    pin = mech.ground.marker((-1.0, 0, mech.part("sled").at[2]))
-    mech.spring_damper("spring", pin, mech.part("sled").marker(ORIGIN), stiffness=K,
-                       free_length=1.0)  # fmt: skip
+    ends = mech.ground.marker((-1.0, 0, mech.part("sled").at[2])), mech.part("sled").marker(ORIGIN)
+    mech.spring_damper("spring", *ends, stiffness=K, free_length=1.0)
     sol = rom.simulate(mech, t_end=0.6, dt=5e-5)
     x, e = sol.position("sled")[:, 0] / d, sol.energy
     assert_allclose([x[0], x.min()], [5.5, -3.5], rtol=1e-3)

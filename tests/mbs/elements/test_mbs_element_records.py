@@ -99,9 +99,8 @@ def test_energies_and_losses_add_up(slid):
 
 def test_torques_about_joints_and_between_bodies():
     mech = rom.Mechanism(gravity=(0, -9.81, 0))
-    bob = mech.add_rigid("bob", mass=1.0, inertia=(0.1, 0.1, 0.1), at=(0.4, 0, 0),
-                         markers={"eye": (-0.4, 0, 0)})  # fmt: skip
-    eye, foot = bob.marker("eye"), mech.ground.marker((0, 0, 0))
+    bob = mech.add_rigid("bob", mass=1.0, inertia=(0.1, 0.1, 0.1), at=(0.4, 0, 0))
+    eye, foot = bob.marker((-0.4, 0, 0)), mech.ground.marker((0, 0, 0))
     mech.revolute("hinge", foot, eye, axis=Z_AXIS)
     mech.rotational_spring("turn", "hinge", stiffness=7.0, damping=0.2, free_angle=0.1)
     mech.bushing("bushing", foot, eye, stiffness=(1e3,) * 3 + (2.0,) * 3, damping=(0,) * 6)

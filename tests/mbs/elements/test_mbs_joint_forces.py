@@ -340,8 +340,7 @@ def test_the_power_balance_closes_with_friction_motors_and_screws():
 def test_the_power_balance_closes_with_a_prescribed_motion():
     mech = spatial_crank()
     mech.motors.clear()
-    mech.drive("drive", "main", lambda t: 10.0 * t, rate=lambda t: 10.0 + 0 * t,
-               acceleration=lambda t: 0.0 * t)  # fmt: skip
+    mech.drive("drive", "main", lambda t: 10 * t, rate=lambda t: 10.0, acceleration=lambda t: 0.0)
     sol = simulate(mech, t_end=1.0, dt=0.02, method="dop853", rtol=1e-11, atol=1e-12)
     assert np.abs(sol.energy.balance).max() < 1e-8 * np.abs(sol.energy.drives).max()
     assert sol.energy.damping[-1] > 0.1
@@ -356,8 +355,8 @@ def test_a_mass_between_stops_bounces_with_the_speed_and_time_of_the_closed_form
     period = 2 * np.pi * np.sqrt(m / k) + 2 * 0.15 / v0
     sol = simulate(mech, t_end=3 * period, dt=2e-5 if method != "dop853" else 1e-3, method=method)
     x = sol.position("block")[:, 0]
-    assert_allclose([x.max(), x.min()], [0.1 + v0 * np.sqrt(m / k), -0.05 - v0 * np.sqrt(m / k)],
-                    atol=1e-4)  # fmt: skip
+    deep = v0 * np.sqrt(m / k)
+    assert_allclose([x.max(), x.min()], [0.1 + deep, -0.05 - deep], atol=1e-4)
     assert_allclose(sol.velocity("block")[-1, 0], v0, atol=1e-4)
     assert_allclose(x[-1], 0.0, atol=1e-4)
     stored = 0.5 * k * np.maximum(np.maximum(x - 0.1, -0.05 - x), 0.0) ** 2
@@ -368,8 +367,8 @@ def test_a_mass_between_stops_bounces_with_the_speed_and_time_of_the_closed_form
 
 def test_a_stop_on_an_angle_acts_after_whole_turns():
     mech = wheel(J=0.5, omega=10.0)
-    mech.stop("pawl", "axle", Impact(1e4, exponent=1.0, restitution=0.5, impact_speed=10.0),
-              upper=15.0)  # fmt: skip
+    law = Impact(1e4, exponent=1.0, restitution=0.5, impact_speed=10.0)
+    mech.stop("pawl", "axle", law, upper=15.0)
     sol = simulate(mech, t_end=2.0, dt=1e-4)
     assert 15.0 < sol.base[:, 0].max() < 15.2
     assert_allclose(sol.omega("wheel")[-1, 2], -5.0, rtol=1e-3)

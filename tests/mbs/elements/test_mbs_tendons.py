@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 import rom
 from cases.mbs.mechanisms import prepared, random_body, random_pose, stored_at, tangents_at
-from cases.mbs.parts import on_guide
+from cases.mbs.parts import on_axle, on_guide
 from cases.mbs.tangents import by_velocity, check_tangents, elastic_forces, forces_at, near
 from cases.refusals import refuses
 from rom.components.tendons.tendons import TENDONS_FAMILY
@@ -160,9 +160,8 @@ def test_a_sheave_that_the_rope_grips_turns_with_it(sheave):
     mech = rom.Mechanism(gravity=(0, 0, -G))
     a, b = weight(mech, "a", (-0.1, 0, -1.0), 2.0), weight(mech, "b", (0.1, 0, -1.5))
     inertia = 0.02
-    wheel = mech.add_rigid("wheel", mass=1.0, inertia=(0.02, inertia, 0.02), at=ORIGIN)
-    mech.revolute("axle", mech.ground.marker(ORIGIN), wheel.marker(ORIGIN), axis=(0, 1, 0))
-    rope = [a, Pulley(wheel.marker(ORIGIN), 0.1, (0, 1, 0), friction=sheave), b]
+    wheel = on_axle(mech, inertia=(0.02, inertia, 0.02), axis=(0, 1, 0))
+    rope = [a, Pulley(wheel, 0.1, (0, 1, 0), friction=sheave), b]
     mech.tendon("rope", rope, EA=1e5, damping=2e3, transition_speed=1e-3, pretension=13.0)
     moved = rom.simulate(mech, t_end=0.5, dt=2e-4, progress=False)
     shared = inertia / 0.1**2 if sheave else 0.0
@@ -200,13 +199,12 @@ def test_a_turning_drum_shifts_tension_by_its_whole_wrap(turns):
     Pieces stretch together as far as before: what the one gains the other loses.
     """
     mech = rom.Mechanism(gravity=(0, 0, 0))
-    g, R, mu, EA = mech.ground.marker, 0.2, 0.15, 1e5
-    drum = mech.add_rigid("drum", mass=1.0, inertia=(0.02,) * 3, at=ORIGIN)
-    mech.revolute("axle", g(ORIGIN), drum.marker(ORIGIN), axis=Z)
+    g, R, mu = mech.ground.marker, 0.2, 0.15
+    drum = on_axle(mech, "drum", inertia=(0.02,) * 3)
     mech.drive("speed", "axle", lambda t: 5.0 * t, rate=lambda t: 5.0 + 0 * t)
-    wheel = Pulley(drum.marker(ORIGIN), R, Z, friction=mu, turns=turns)
-    mech.tendon("rope", [g((-1, -R, 0)), wheel, g((-1, R, 0))], EA=EA, pretension=100.0,
-                transition_speed=1e-4)  # fmt: skip
+    wheel = Pulley(drum, R, Z, friction=mu, turns=turns)
+    law = {"EA": 1e5, "pretension": 100.0, "transition_speed": 1e-4}
+    mech.tendon("rope", [g((-1, -R, 0)), wheel, g((-1, R, 0))], **law)
     moved = rom.simulate(mech, t_end=1.0, dt=1e-2, progress=False)
     slack, taut = sizes(moved, "rope")[-1, [2, 0]]
     theta = np.pi * (1 + 2 * turns)

@@ -341,8 +341,8 @@ def test_joints_that_repeat_others_are_found_in_a_long_chain(solved):
 def test_a_chain_that_cannot_be_closed_is_refused(monkeypatch):
     monkeypatch.setattr(graph, "BLOCK_GAIN", 1e-12)
     mech = chain(5)
-    mech.distance("rope", mech.ground.marker((9, 0.1, 0)), mech.parts["link 4"].marker("b"),
-                  length=1.0)  # fmt: skip
+    ends = mech.ground.marker((9, 0.1, 0)), mech.parts["link 4"].marker("b")
+    mech.distance("rope", *ends, length=1.0)
     with pytest.raises(ModelError, match="cannot be assembled"):
         initial_state(pack(mech))
 

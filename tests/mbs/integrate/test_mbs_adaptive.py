@@ -11,6 +11,7 @@ from cases.long import few
 from cases.mbs import motions
 from cases.mbs.mechanisms import simulate_quietly, slider_crank
 from cases.mbs.motions import PARTS, TOP, G, free_crank, heavy_top, pendulum, wound_drive
+from cases.mbs.parts import ORIGIN
 from rom.errors import ModelError, SolverError
 from rom.mbs.integrate import adaptive_step, fixed_step
 from rom.mbs.integrate.run import Record
@@ -234,12 +235,11 @@ def linkage_that_stops():
                            velocity=(1e-3, 0, 0))  # fmt: skip
     rod = mech.add_rigid("rod", mass=1.0, inertia=(1e-3, 1e-3, 2e-3), at=(0.25, 0.05, 0),
                          markers={"p": (-0.15, -0.05, 0), "q": (0.15, -0.05, 0)})  # fmt: skip
-    slider = mech.add_rigid("slider", mass=1.0, inertia=(1e-3,) * 3, at=(0.4, 0, 0),
-                            markers={"p": (0, 0, 0)})  # fmt: skip
+    slider = mech.add_rigid("slider", mass=1.0, inertia=(1e-3,) * 3, at=(0.4, 0, 0)).marker(ORIGIN)
     mech.revolute("main", mech.ground.marker((0, 0, 0)), crank.marker("p"), axis=z)
     mech.revolute("pin", crank.marker("q"), rod.marker("p"), axis=z)
-    mech.revolute("wrist", rod.marker("q"), slider.marker("p"), axis=z)
-    mech.prismatic("guide", mech.ground.marker((0.4, 0, 0)), slider.marker("p"), axis=(1, 0, 0))
+    mech.revolute("wrist", rod.marker("q"), slider, axis=z)
+    mech.prismatic("guide", mech.ground.marker((0.4, 0, 0)), slider, axis=(1, 0, 0))
     mech.drive("motor", "main", lambda t: 0.05 * (1 - np.where(t < 0.1, (1 - 10 * t) ** 4, 0.0)))
     return mech
 

@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose
 
 import rom
 from cases.mbs.mechanisms import lattice, lattice_body, slider_crank
+from cases.mbs.parts import on_guide
 from cases.refusals import refuses
 
 Z = (0, 0, 1)
@@ -68,8 +69,8 @@ def test_a_state_that_new_joints_do_not_fit_is_refused_unless_asked_for():
     state = rom.equilibrium(rod_on_a_pin(angle=0.3))
     with pytest.raises(rom.ModelError, match=r"^turn: the start contradicts"):
         rom.release(rod_on_a_pin(angle=0.4), state)
-    assert_allclose(rom.release(rod_on_a_pin(angle=0.4), state, assemble=True).q[1],
-                    0.5 * np.sin(0.4), atol=1e-12)  # fmt: skip
+    height = rom.release(rod_on_a_pin(angle=0.4), state, assemble=True).q[1]
+    assert_allclose(height, 0.5 * np.sin(0.4), atol=1e-12)
 
 
 @pytest.mark.parametrize(("omega", "rate", "told"), [
@@ -90,10 +91,8 @@ def test_what_moves_a_light_body_counts_as_much_as_what_moves_a_heavy_one():
     """Speeds are compared, not momenta; a body next to rest is compared with the fastest."""
     for mass, slow, refused in ((1e3, 0.0, True), (1e-6, 0.0, True), (1.0, 3.999, False)):
         mech = rod_on_a_pin(omega=4.0)
-        light = mech.add_rigid("light", mass=mass, inertia=(mass,) * 3, at=(0, 0, 1),
-                               velocity=(slow or 2.0, 0, 0))  # fmt: skip
-        mech.prismatic("rail", mech.ground.marker((0, 0, 1)), light.marker((0, 0, 0)),
-                       axis=(1, 0, 0))  # fmt: skip
+        given = {"mass": mass, "at": (0, 0, 1), "base": (0, 0, 1), "guide": "rail"}
+        on_guide(mech, "light", **given, velocity=(slow or 2.0, 0, 0))
         mech.drive("push", "rail", lambda t: 4.0 * t)
         if refused:
             refuses(rom.ModelError, r"^light: .*'light' changes by [\d.]+ of", moved, mech)

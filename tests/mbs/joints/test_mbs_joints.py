@@ -153,12 +153,11 @@ def test_redundant_hinges_share_the_load_with_least_norm_and_a_warning():
 
 def test_hinges_that_contradict_each_other_are_refused_by_name():
     mech = rom.Mechanism(gravity=(0, 0, 0))
-    leaf = mech.add_rigid("leaf", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0),
-                          markers={"a": (0, 0, 0), "b": (1, 0, 0)})  # fmt: skip
-    mech.revolute("here", mech.ground.marker((0, 0, 0)), leaf.marker("a"), axis=Z)
-    mech.revolute("too far", mech.ground.marker((1.5, 0, 0)), leaf.marker("b"), axis=Z)
-    with pytest.raises(ModelError, match=r"cannot be assembled: '(here|too far)' stays open"):
-        rom.simulate(mech, t_end=0.1, dt=0.01)
+    leaf = mech.add_rigid("leaf", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0))
+    mech.revolute("here", mech.ground.marker((0, 0, 0)), leaf.marker((0, 0, 0)), axis=Z)
+    mech.revolute("too far", mech.ground.marker((1.5, 0, 0)), leaf.marker((1, 0, 0)), axis=Z)
+    words = r"cannot be assembled: '(here|too far)' stays open"
+    refuses(ModelError, words, rom.simulate, mech, t_end=0.1, dt=0.01)
 
 
 def spinning_ball(speed, join):

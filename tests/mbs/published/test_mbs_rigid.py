@@ -11,7 +11,7 @@ from scipy.special import ellipj
 
 import rom
 from cases.mbs.motions import TOP, heavy_top
-from cases.mbs.parts import on_axle, on_guide
+from cases.mbs.parts import X, Z, on_axle, on_guide, on_hinge
 from cases.mbs.trusses import HUB_INERTIA, MASS, REST, SPRING, dumbbell
 from rom import rotation
 
@@ -153,8 +153,7 @@ def test_drive_of_a_slide_counts_from_the_start():
 def test_physical_pendulum_reaction_at_the_lowest_point():
     """A bar released level: the hinge carries (1 + 3/2) m g when it passes below."""
     mech = rom.Mechanism(gravity=(0, -9.81, 0))
-    bar = mech.add_rigid("bar", mass=2.0, inertia=(1e-3, 1 / 6, 1 / 6), at=(0.5, 0, 0))
-    mech.revolute("hinge", mech.ground.marker((0, 0, 0)), bar.marker((-0.5, 0, 0)), axis=(0, 0, 1))
+    on_hinge(mech, X / 2, "bar", inertia=(1e-3, 1 / 6, 1 / 6), axis=Z)
     sol = rom.simulate(mech, t_end=1.0, dt=1e-4)
     lowest = np.argmin(sol.position("bar")[:, 1])
     assert_allclose(sol.reaction("hinge")[lowest, 1], 2.5 * 2.0 * 9.81, rtol=1e-5)

@@ -11,7 +11,7 @@ import rom
 from cases.beam import FLAP, FLAP_ON_HUB, elastica, gauss_hermite, spin_up, stiffened_beam
 from cases.mbs import mechanisms
 from cases.mbs.mechanisms import nodal_body, random_body, random_pose, simulate_quietly
-from cases.mbs.parts import X, Y, Z
+from cases.mbs.parts import X, Y, Z, on_axle
 from cases.refusals import refuses
 from rom.body.stiffening import SecondOrder
 from rom.eigen.verbs import rigid_motions
@@ -237,11 +237,9 @@ def test_a_pendulum_that_bends_swings_as_its_exact_beam():
 def hinged_blade(eta, axis):
     """A beam on a hinge about z, on the axle of a hub that turns with the speed eta."""
     mech = Mechanism(gravity=(0, 0, 0))
-    turn = eta * axis
-    blade = mech.add_flexible("blade", stiffened_beam(), omega=turn)
-    hub = mech.add_rigid("hub", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0), omega=turn)
-    mech.revolute("axle", mech.ground.marker((0, 0, 0)), hub.marker((0, 0, 0)), axis=axis)
-    mech.revolute("hinge", hub.marker((0, 0, 0)), blade.marker("root"), axis=Z)
+    blade = mech.add_flexible("blade", stiffened_beam(), omega=eta * axis)
+    hub = on_axle(mech, "hub", inertia=(1, 1, 1), axis=axis, omega=eta * axis)
+    mech.revolute("hinge", hub, blade.marker("root"), axis=Z)
     mech.drive("motor", "axle", lambda t: eta * t, rate=lambda t: eta, acceleration=lambda t: 0)
     return 2 * np.pi * rom.linearize(mech).frequencies
 

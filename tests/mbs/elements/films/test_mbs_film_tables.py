@@ -178,8 +178,8 @@ def test_a_motion_is_that_of_the_film_that_is_solved():
 def test_the_temperature_is_that_of_the_film_that_is_solved():
     oil, found = rom.mbs.iso_vg(46), []
     for tabulated in (False, True):
-        mech = held_rotor(bearing(), (3000.0, 0.0), speed=300.0, oil=oil, inlet=40.0,
-                          tabulated=tabulated)  # fmt: skip
+        given = {"speed": 300.0, "oil": oil, "inlet": 40.0, "tabulated": tabulated}
+        mech = held_rotor(bearing(), (3000.0, 0.0), **given)
         state = rom.equilibrium(mech, spin={"turn": 300.0})
         found.append(rom.mbs.snapshot(mech, state).journal_bearing("film"))
     assert found[0].temperature[0] > 42.0

@@ -198,8 +198,8 @@ def test_tangents_of_bodies_that_bend_are_the_derivatives(side):
     part = mech.add_flexible("soft", soft, at=-point, omega=rng.normal(size=3))
     stiff = mech.add_rigid("stiff", mass=1.0, inertia=(0.1,) * 3, at=(2e-5, 1e-5, 0))
     ends = [part.marker("a"), stiff.marker(ORIGIN)]
-    mech.journal_bearing("film", *ends[:: 1 - 2 * side], axis=(0, 0, 1), bearing=bearing(),
-                         oil=VISCOSITY)  # fmt: skip
+    given = {"axis": (0, 0, 1), "bearing": bearing(), "oil": VISCOSITY}
+    mech.journal_bearing("film", *ends[:: 1 - 2 * side], **given)
     packed, W = prepared(mech)
     v = packed.v + 1e-3 * rng.normal(size=packed.v.size)
     v[:3] = np.cross(v[3:6], -point)  # the marker stands still, but for what bends

@@ -11,6 +11,7 @@ from scipy.sparse.linalg import splu
 
 import rom
 from cases.mbs.mechanisms import prepared, residual_at
+from cases.mbs.parts import on_axle
 from cases.mbs.tangents import by_position, by_velocity, elastic_forces, shifted
 from cases.mbs.tubes import tube
 from cases.refusals import refuses
@@ -42,15 +43,11 @@ def driven(body, turned=0.0):
     mech = rom.Mechanism(gravity=(0, 0, 0))
     p = np.cos(turned / 2), 0, 0, np.sin(turned / 2)
     shaft = mech.add_flexible("pinion", body, at=(0, 0, 0), orientation=p)
-    gear = mech.add_rigid("gear", mass=5.0, inertia=(0.01, 0.01, 0.02), at=(PAIR.distance, 0, 0),
-                          markers={"middle": (0, 0, 0)})  # fmt: skip
     mech.fixed("end", mech.ground.marker((0, 0, -LENGTH / 2)), shaft.marker("low"))
-    mech.revolute("axis", mech.ground.marker((PAIR.distance, 0, 0)), gear.marker("middle"),
-                  axis=(0, 0, 1))  # fmt: skip
+    gear = on_axle(mech, "gear", mass=5.0, inertia=(0.01, 0.01, 0.02), at=(PAIR.distance, 0, 0))
     given = {"stiffness": K, "phase": PHASE, "entry": 0.0, "cells": SLICES}
-    mech.gear_mesh("mesh", shaft.marker("rim"), gear.marker("middle"), axis=(0, 0, 1), pair=PAIR,
-                   **given)  # fmt: skip
-    mech.torque("load", gear.marker("middle"), (0, 0, TORQUE))
+    mech.gear_mesh("mesh", shaft.marker("rim"), gear, axis=(0, 0, 1), pair=PAIR, **given)
+    mech.torque("load", gear, (0, 0, TORQUE))
     return mech
 
 

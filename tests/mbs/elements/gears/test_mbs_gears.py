@@ -491,8 +491,8 @@ def test_a_planetary_train_vibrates_as_its_lumped_model(planets):
         angle = 2 * np.pi * k / planets
         at = 0.048 * np.array([np.cos(angle), np.sin(angle), 0.0])
         planet = body(f"planet {k}", at).marker(ORIGIN)
-        mech.bushing(f"pin {k}", parts["carrier"].marker(at), planet,
-                     stiffness=(1e8, 1e8, 0, 0, 0, 0))  # fmt: skip
+        ends = parts["carrier"].marker(at), planet
+        mech.bushing(f"pin {k}", *ends, stiffness=(1e8, 1e8, 0, 0, 0, 0))
         law = {"stiffness": 5e8 / SUN.width, "entry": 0.0, "conservative": False}
         mech.gear_mesh(f"sun {k}", parts["sun"].marker(ORIGIN), planet, axis=Z, pair=SUN,
                        phase=one_line(SUN), **law)  # fmt: skip

@@ -118,8 +118,8 @@ def test_a_rotor_on_a_marker_that_turns_far_keeps_energy_and_momentum():
     mech = rom.Mechanism(gravity=(0, 0, 0))
     part = mech.add_flexible("truss", truss(), omega=(0.4, -1.0, 0.7), q=2 * START)
     middle = part.point(part.marker("mean"))
-    rotor = mech.add_rigid("rotor", mass=0.4, inertia=(0.03, 0.05, 0.04), at=middle,
-                           markers={"c": (0, 0, 0)})  # fmt: skip
+    solid = {"mass": 0.4, "inertia": (0.03, 0.05, 0.04), "markers": {"c": (0, 0, 0)}}
+    rotor = mech.add_rigid("rotor", **solid, at=middle)
     mech.revolute("hinge", part.marker("mean"), rotor.marker("c"), axis=(0, 0, 1))
     mech.rotational_spring("coil", "hinge", stiffness=0.6)
     solution = rom.simulate(mech, t_end=2.0, dt=0.02, method="dop853", assemble=True)
