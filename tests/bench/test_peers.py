@@ -20,9 +20,8 @@ from benchmarks.units import RigidShaft
 from cases.gear_unit import tilting
 from cases.paths import TESTS
 from rom import rotation
+from rom.components import journal_bearing, transmission
 from rom.components.cosserat import body, straight
-from rom.components.journal_bearing import equilibrium
-from rom.components.transmission import Shaft, rest
 from rom.components.wind.wind_turbine import RATED_SPEED, blade, ramp, run_up
 
 STORED = json.loads((TESTS / "reference" / "exudyn_motion.json").read_text())
@@ -118,7 +117,7 @@ def test_both_programs_are_held_against_the_same_row(monkeypatch):
     """An answer as ROSS gives it, with the stiffness and damping of our own film, in SI."""
     bearing, load = films.two_groove()
     kept = {"speed": films.FILM_CASE["speed"], "viscosity": films.FILM_CASE["viscosity"]}
-    f = equilibrium(bearing, (0.0, -load), **kept)
+    f = journal_bearing.equilibrium(bearing, (0.0, -load), **kept)
     K, C = (x[:2, :2].tolist() for x in (f.stiffness, f.damping))
     found = {"seconds": 1.0, "stiffness": K, "damping": C}
     monkeypatch.setattr(films, "interpreter", lambda *_: "python")
@@ -141,7 +140,7 @@ def test_axes_are_turned_to_the_load():
 @pytest.mark.once
 @pytest.mark.long
 def test_the_unit_that_runs_through_its_speeds_carries_its_load():
-    state = rest(films.gear_unit(cells=(48, 4)))
+    state = transmission.rest(films.gear_unit(cells=(48, 4)))
     given, taken, heat = state.powers
     assert given - taken - heat == pytest.approx(tilting(state), rel=0.03)
     assert taken == pytest.approx(300 * 100 * np.pi)
@@ -168,7 +167,7 @@ def test_a_shaft_without_elasticity_keeps_its_inertia():
 
     Beams of four elements have their mass at the nodes but for a part, which the middle feels.
     """
-    found = RigidShaft.of(Shaft(np.linspace(0.1, 0.3, 5), 0.05))
+    found = RigidShaft.of(transmission.Shaft(np.linspace(0.1, 0.3, 5), 0.05))
     mass = np.pi / 4 * 0.05**2 * 0.2 * 7850
     assert found.mass == pytest.approx(mass, rel=1e-9) and found.span == pytest.approx(0.2)
     assert found.about == pytest.approx(mass * 0.05**2 / 8, rel=1e-9)

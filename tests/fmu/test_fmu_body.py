@@ -72,7 +72,7 @@ def exact(body, history, gravity, steps):
     return state[:n], state[n:]
 
 
-def test_the_description_is_valid_and_needs_no_tool(free):
+def test_the_description_is_valid_and_needs_no_tool_and_the_library_no_python(free, tmp_path):
     assert fmpy.validation.validate_fmu(str(free)) == []
     d = fmpy.read_model_description(str(free))
     assert not d.coSimulation.needsExecutionTool and len(d.modelVariables) == 2 * 6 + 3 + 2 * 12
@@ -84,9 +84,6 @@ def test_the_description_is_valid_and_needs_no_tool(free):
     units = {v.name: (v.causality, v.unit) for v in d.modelVariables}
     assert units["a.torque[2]"] == ("input", "N.m")
     assert units["b.angular_velocity[3]"] == ("output", "rad/s")
-
-
-def test_the_library_needs_the_c_library_only(free, tmp_path):
     one = Instance(free, tmp_path)
     library = f"{one.folder}/binaries/linux64/{one.description.coSimulation.modelIdentifier}.so"
     done = subprocess.run(["nm", "-D", "-u", library], capture_output=True, text=True, check=True)

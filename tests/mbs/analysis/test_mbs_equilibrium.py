@@ -34,23 +34,21 @@ def test_a_pendulum_hangs_down_from_wherever_it_starts(angle):
     assert_allclose(reaction[0, :3], [0, 0, 2.0 * g], atol=1e-9)
 
 
-def chain_with_springs(n, bending, twist):
-    """Links of 1 m together, in a row on ball joints with springs against bending and twist."""
-    mech, half, springs = rom.Mechanism(gravity=ORIGIN), X / (2 * n), (twist, bending, bending)
-    last, solid = mech.ground.marker(ORIGIN), {"mass": 0.1, "inertia": (1e-3,) * 3}
-    for i in range(n):
-        ends = {"begin": -half, "end": half}
-        link = mech.add_rigid(f"link {i}", **solid, at=(2 * i + 1) * half, markers=ends)
-        mech.spherical(f"joint {i}", last, link.marker("begin"))
-        mech.bushing(f"spring {i}", last, link.marker("begin"), stiffness=(0, 0, 0, *springs))
-        last = link.marker("end")
-    return mech, last
-
-
 @pytest.mark.parametrize("angle", few(1, [1.7, 0.7, 1.3]))  # of half a turn
 def test_a_moment_about_an_axis_fixed_in_space_bends_further_than_is_stable(angle):
     """It has no potential: a chain weak in twist would leave the plane; it bends by M n / k."""
-    mech, tip = chain_with_springs(4, 4.0, 0.3)
+    mech, n, springs = rom.Mechanism(gravity=ORIGIN), 4, (0.3, 4.0, 4.0)
+    half, tip, solid = (
+        X / (2 * n),
+        mech.ground.marker(ORIGIN),
+        {"mass": 0.1, "inertia": (1e-3,) * 3},
+    )
+    for i in range(n):
+        link = mech.add_rigid(f"link {i}", **solid, at=(2 * i + 1) * half)
+        ends = tip, link.marker(-half)
+        mech.spherical(f"joint {i}", *ends)
+        mech.bushing(f"spring {i}", *ends, stiffness=(0, 0, 0, *springs))
+        tip = link.marker(half)
     mech.torque("moment", tip, (0, -np.pi * angle, 0))
     with pytest.warns(RomWarning, match="unstable: body 'link 3' turns about its own axis"):
         still = rom.snapshot(mech, rom.equilibrium(mech, steps=8))

@@ -18,8 +18,7 @@ from cases.mbs.parts import ORIGIN, X, Y, Z, held_rod, on_axle, on_guide
 from cases.refusals import refuses
 from rom.errors import ConfigError, ModelError, ModesMissedError, RomWarning, SolverError
 from rom.mbs.analysis import campbell as campbell_module
-from rom.mbs.analysis import few_modes, local_equations
-from rom.mbs.analysis.tangent import best_reactions
+from rom.mbs.analysis import few_modes, local_equations, tangent
 from rom.mbs.integrate.consistent_start import initial_state
 
 SECTION = {"stretch": 1e5, "bend": (40.0, 60.0, 30.0), "mass": 1.0, "inertia": (1e-3, 2e-3, 3e-3)}
@@ -215,7 +214,7 @@ def test_reactions_balance_best_as_those_of_dense_matrices():
         now = local_equations.instant(mech, 0.0, sparse=sparse)
         state = initial_state(now.packed)
         state = replace(state, a=0 * state.a, lam=np.cos(np.arange(state.lam.size)))
-        left, change = best_reactions(now, state)
+        left, change = tangent.best_reactions(now, state)
         changes.append(state.lam + change)
         assert np.abs(left).max() < 2.0
     assert np.sign(changes[1][0]) == np.sign(changes[0][0])  # weighed by masses, not by sizes

@@ -69,17 +69,12 @@ def test_a_body_that_advances_is_turned_back_with_its_small_motions():
     assert_same(by_steps(found), by_differences(found), atol=2e-4)
 
 
-@pytest.fixture(scope="module")
-def geared():
-    """Films and teeth of a unit through a tooth, from its rest."""
+def test_films_and_teeth_have_the_derivatives_of_differences():
+    """Films are so thin that differences have to be finer; teeth leave out how forces turn."""
     unit = rigid_unit(speed=400.0)
     mech = as_mechanism(unit)
     flow = Flow(mech, 0.0, unit.mesh_period, 60, 0.8)
-    return Return.of(flow, Turns(), flow.begun(rom.equilibrium(mech)))
-
-
-def test_films_and_teeth_have_the_derivatives_of_differences(geared):
-    """Films are so thin that differences have to be finer; teeth leave out how forces turn."""
+    geared = Return.of(flow, Turns(), flow.begun(rom.equilibrium(mech)))
     wanted = by_differences(geared, 1e-8)
     assert_same(by_steps(geared), wanted, atol=0.03)
     found = np.sort(np.abs(confirmed(geared).multipliers))

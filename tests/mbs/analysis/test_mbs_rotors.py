@@ -20,10 +20,10 @@ NACELLE_MASS, SUPPORT, LAG_SPRING = 60.0, 2.0e4, 40.0
 S, I = BLADE_MASS * ARM, BLADE_INERTIA + BLADE_MASS * ARM**2  # about the hinge
 
 
-def helicopter(n, speed, *, hinge, damping=0.0, azimuth=0.3):
-    """Blades hinged to a hub that a drive turns on a nacelle on springs, its axis upright.
+def turning(n, speed, *, hinge, damping=0.0, azimuth=0.3):
+    """Blades hinged to a hub that a drive turns on a nacelle on springs, and their steady motion.
 
-    Lag hinges are upright, too; flap hinges lie in the plane and across the blade.
+    The axis of the hub and lag hinges are upright; flap hinges lie in the plane across the blade.
     """
     mech = rom.Mechanism(gravity=ORIGIN)
     nacelle = mech.add_rigid("nacelle", mass=NACELLE_MASS, inertia=(5.0,) * 3, at=ORIGIN)
@@ -39,7 +39,7 @@ def helicopter(n, speed, *, hinge, damping=0.0, azimuth=0.3):
         if hinge == "lag":
             spring = {"stiffness": LAG_SPRING, "damping": damping}
             mech.rotational_spring(f"spring {k}", f"hinge {k}", **spring)
-    return mech
+    return mech, rom.equilibrium(mech, spin={"bearing": speed})
 
 
 def add_blade(mech, hub, k, azimuth, axis, root, centre=ORIGIN):
@@ -53,11 +53,6 @@ def add_blade(mech, hub, k, azimuth, axis, root, centre=ORIGIN):
 
 def blades(n):
     return [f"blade {k}" for k in range(n)]
-
-
-def turning(n, speed, **options):
-    mech = helicopter(n, speed, **options)
-    return mech, rom.equilibrium(mech, spin={"bearing": speed})
 
 
 def coleman_feingold(n, speed, damping=0.0):

@@ -69,7 +69,7 @@ def test_each_element_by_its_own_law(slid):
     assert np.abs(np.diff(own.memory[:, 0])).max() > 0
 
 
-def test_together_they_are_what_acts_on_the_block(slid):
+def test_together_they_are_what_acts_on_the_block_and_what_is_stored_and_lost(slid):
     """With what the guide transmits; and that is mass times acceleration."""
     total = slid.reaction("guide")[:, :3].copy()
     for name in slid.elements:
@@ -78,6 +78,11 @@ def test_together_they_are_what_acts_on_the_block(slid):
         total += found.force[:, on_block].sum(axis=1)
     assert_allclose(total, slid.interface_loads("block")["hook"][:, :3], atol=1e-9)
     assert set(slid.elements) == set(slide().elements)
+    every = [slid.element(name) for name in slid.elements]
+    assert_allclose(sum(one.energy for one in every), slid.energy.strain, atol=1e-9)
+    lost = sum(one.lost for one in every)
+    spent = np.concatenate([[0], np.cumsum(0.5 * np.diff(slid.t) * (lost[1:] + lost[:-1]))])
+    assert_allclose(spent, slid.energy.damping, atol=2e-3 * slid.energy.damping[-1])
 
 
 def test_tables_of_a_motion_have_all_forces_and_asking_changes_nothing(slid):
@@ -87,14 +92,6 @@ def test_tables_of_a_motion_have_all_forces_and_asking_changes_nothing(slid):
     assert_allclose(found["load force"][:, 0], np.cos(5 * slid.t), rtol=1e-14)
     assert_allclose(found["spring force"], slid.element("spring").force[:, 1], atol=1e-12)
     assert [len(x) for x in (places.signals, places.coordinates, places.remembered)] == before
-
-
-def test_energies_and_losses_add_up(slid):
-    energy = sum(slid.element(name).energy for name in slid.elements)
-    assert_allclose(energy, slid.energy.strain, atol=1e-9)
-    lost = sum(slid.element(name).lost for name in slid.elements)
-    spent = np.concatenate([[0], np.cumsum(0.5 * np.diff(slid.t) * (lost[1:] + lost[:-1]))])
-    assert_allclose(spent, slid.energy.damping, atol=2e-3 * slid.energy.damping[-1])
 
 
 def test_torques_about_joints_and_between_bodies():

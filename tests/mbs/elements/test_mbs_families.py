@@ -12,10 +12,8 @@ from cases.long import few
 from cases.mbs.mechanisms import simulate_quietly
 from cases.paths import ROOT
 from rom.mbs.elements.family import Family, integers, rows_of
+from rom.mbs.kernels import constraints, element_calls, tables
 from rom.mbs.kernels.algebra import row, sub
-from rom.mbs.kernels.constraints import pair_stiffness, place_relative
-from rom.mbs.kernels.element_calls import energy, residuals, tangents
-from rom.mbs.kernels.tables import Array2, Index1, Table, table
 
 K, C, MASS, LENGTH = 200.0, 3.0, 2.0, 0.3
 
@@ -30,11 +28,11 @@ class Cord:
     damping: float
 
 
-@table
-class Cords(Table):
-    i: Index1
-    j: Index1
-    law: Array2
+@tables.table
+class Cords(tables.Table):
+    i: tables.Index1
+    j: tables.Index1
+    law: tables.Array2
 
 
 def pack(cords, places):
@@ -45,7 +43,7 @@ def pack(cords, places):
     )
 
 
-@residuals.of(Cords)
+@element_calls.residuals.of(Cords)
 def cord_wrenches(_s, W, cords, _q, _v, _lam):
     for k in range(cords.i.size):
         i, j = cords.i[k], cords.j[k]
@@ -57,7 +55,7 @@ def cord_wrenches(_s, W, cords, _q, _v, _lam):
             W.power[2] += cords.law[k, 1] * slide[p] ** 2
 
 
-@tangents.of(Cords)
+@element_calls.tangents.of(Cords)
 def cord_tangents(s, W, cords, _lam, ck, cc):
     for k in range(cords.i.size):
         i, j = cords.i[k], cords.j[k]
@@ -65,11 +63,11 @@ def cord_tangents(s, W, cords, _lam, ck, cc):
             W.Q[:] = 0.0
             for p in range(3):
                 e = (1.0 if p == 0 else 0.0, 1.0 if p == 1 else 0.0, 1.0 if p == 2 else 0.0)
-                place_relative(W.Q, 0, p, c, e)
-            pair_stiffness(s, W, i, j, S)
+                constraints.place_relative(W.Q, 0, p, c, e)
+            constraints.pair_stiffness(s, W, i, j, S)
 
 
-@energy.of(Cords)
+@element_calls.energy.of(Cords)
 def cord_energy(_s, W, cords, _q, _v):
     total = 0.0
     for k in range(cords.i.size):

@@ -77,20 +77,14 @@ def on_top(points):
     return points[:, 2] > 0.08 - 1e-9
 
 
-def top_forces(model, pressure):
-    """(3n, 1) nodal forces of a pressure on the face z = 0.08 of the full model."""
-    F = np.zeros((model.n_dofs, 1))
+def test_a_pressure_bends_a_block_as_the_full_statics_say():
+    """All points of the surface; the body knows the shape of the answer by WithLoads."""
+    model, pressure = outward_block(), 50.0
+    F, kinds = np.zeros((model.n_dofs, 1)), {"root": "rbe2", "tip": "polynomial:1"}
     for corners in model.surface.nodes[model.surface.triangles]:
         a, b, c = model.points[corners]
         if on_top(model.points[corners]).all():
             F[3 * corners + 2, 0] -= pressure * np.linalg.norm(np.cross(b - a, c - a)) / 6
-    return F
-
-
-def test_a_pressure_bends_a_block_as_the_full_statics_say():
-    """All points of the surface; the body knows the shape of the answer by WithLoads."""
-    model, pressure = outward_block(), 50.0
-    F, kinds = top_forces(model, pressure), {"root": "rbe2", "tip": "polynomial:1"}
     assert_allclose(F.sum(), -pressure * 1.0 * 0.1)
     connection = connect(operators(model), model, kinds)
     held = connection.boundary[connection.parts["root"]]

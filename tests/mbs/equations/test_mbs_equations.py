@@ -13,10 +13,8 @@ from cases.mbs import mechanisms
 from cases.mbs.mechanisms import prepared, random_pose, random_state, two_soft
 from cases.mbs.tangents import GRAVITY, check_tangents, constraint_derivatives
 from rom import rotation
-from rom.body.rotating import rotating_matrices
-from rom.body.stiffening import elastic_loads
-from rom.mbs.equations.equations import linearize_constraints, rates
-from rom.mbs.equations.sparse_solve import signature
+from rom.body import rotating, stiffening
+from rom.mbs.equations import equations, sparse_solve
 from rom.mbs.integrate.consistent_start import initial_state
 from rom.mbs.kernels.algebra import PANEL_WIDTH, back_substitute, factorise
 from rom.mbs.mechanism import Mechanism
@@ -45,7 +43,7 @@ def test_frame_equations_equal_direct_nodal_dynamics():
         packed, W = prepared(mech)
         y = np.concatenate([packed.q, packed.v, np.zeros(3)])
         a = np.zeros(10)
-        assert rates(packed.system, W, y, 0, True, a, np.zeros(0), np.zeros_like(y))
+        assert equations.rates(packed.system, W, y, 0, True, a, np.zeros(0), np.zeros_like(y))
         exact = nodal_accelerations(nodes, q, qd, pose["orientation"], pose["omega"])
         assert_allclose(a, exact, rtol=1e-10, atol=1e-10 * np.abs(exact).max())
 
@@ -80,7 +78,7 @@ def test_constraint_gradient_and_convective_term_are_derivatives_of_the_residual
     packed, W = prepared(everything(rng))
     s, (q, v, _, _) = packed.system, random_state(rng, packed)
     G, convective = constraint_derivatives(packed, W, q, v)
-    linearize_constraints(s, W, q, v)
+    equations.linearize_constraints(s, W, q, v)
     assert_allclose(W.G, G, atol=2e-8 * np.abs(G).max())
     assert_allclose(W.gamma, convective, atol=1e-7 * np.abs(convective).max())
 
@@ -99,7 +97,7 @@ def test_a_rotating_body_is_linearised_as_it_moves():
     """Stiffness and gyroscopic matrix of the body: the derivatives of its equations of motion."""
     rng = np.random.default_rng(6)
     body = mechanisms.random_body(rng, damped=False, stiffened=True).with_reference("mean-axis")
-    for load in elastic_loads(body.n_modes):  # they act on a body that is bent
+    for load in stiffening.elastic_loads(body.n_modes):  # they act on a body that is bent
         del body.K_geo[load]
     w, arm, pose = rng.normal(size=3), rng.normal(size=3), random_pose(rng)
     mech = Mechanism(gravity=(0, 0, 0))
@@ -108,7 +106,7 @@ def test_a_rotating_body_is_linearised_as_it_moves():
     a, none = np.zeros(10), np.zeros(0)
     a[:3] = rotation.matrix(pose["orientation"]) @ np.cross(w, np.cross(w, -arm))
     mechanisms.tangents_at(packed.system, W, packed.q, packed.v, a, none, (0.0, 1.0, 1.0))
-    K, G = rotating_matrices(body, w, arm)
+    K, G = rotating.rotating_matrices(body, w, arm)
     assert_allclose(W.Kt[6:, 6:], K, atol=1e-12 * np.abs(K).max())
     assert_allclose(W.S[6:, 6:], G, atol=1e-12 * np.abs(G).max())
 
@@ -124,7 +122,7 @@ def test_stiffness_of_drives_and_coils_is_exact_where_the_joint_is_closed():
     packed.system.markers.bend[:, 3:] *= 1e-3
     start = initial_state(packed, assemble=True)
     W.signal[:, 0] = 0.4
-    linearize_constraints(packed.system, W, start.q, start.v)
+    equations.linearize_constraints(packed.system, W, start.q, start.v)
     motions = null_space(W.G[:5])
     _, v, a, lam = random_state(rng, packed)
     check_tangents(packed, W, (start.q, v, a, lam), motions, 1e-6)
@@ -190,7 +188,7 @@ def test_signs_of_eigenvalues_are_counted_in_any_order(seed, massless):
     exact = np.linalg.eigvalsh(A)
     assert np.abs(exact).min() > 1e-8 * np.abs(exact).max()  # none of them is zero
     for order in (groups, groups[::-1], [groups[k] for k in rng.permutation(len(groups))]):
-        found = signature(csc_matrix(A), order)
+        found = sparse_solve.signature(csc_matrix(A), order)
         assert found == (np.sum(exact < 0), 0, np.sum(exact > 0))
 
 
@@ -201,4 +199,4 @@ def test_constraints_that_repeat_others_are_counted_as_zero(copies):
     G = np.vstack([G, rng.normal(size=(copies, 7)) @ G])
     A = np.block([[np.diag(rng.uniform(1, 9, 30)), G.T], [G, np.zeros((len(G),) * 2)]])
     groups = [np.arange(a, a + 5) for a in range(0, 30, 5)] + [np.arange(30, len(A))]
-    assert signature(csc_matrix(A), groups, 1e-10) == (7, copies, 30)
+    assert sparse_solve.signature(csc_matrix(A), groups, 1e-10) == (7, copies, 30)

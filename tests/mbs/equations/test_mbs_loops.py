@@ -11,8 +11,7 @@ from cases.mbs.mechanisms import prepared, random_body, simulate_quietly
 from cases.mbs.parts import X, Y, Z, on_axle, slender
 from cases.refusals import refuses
 from rom.errors import ConfigError, ModelError, RomWarning
-from rom.mbs.equations import packing
-from rom.mbs.equations.equations import linearize_constraints
+from rom.mbs.equations import equations, packing
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*constraints repeat others")
 # crank, coupler, rocker, distance of the pivots [m]; start angle [rad], speed [rad/s]
@@ -76,28 +75,22 @@ def test_loads_of_the_repeated_four_bar_are_those_of_the_one_that_repeats_nothin
     assert_allclose(torque, single.reaction("motor")[:, 5], atol=1e-6 * np.abs(torque).max())
 
 
-def tumbling_door():
-    """A leaf on two hinges of a frame; both tumble across the line of the hinges."""
-    mech = rom.Mechanism(gravity=(0, 0, 0))
+@pytest.mark.parametrize("method", ["generalized-alpha", "dop853"])
+def test_multipliers_stay_those_of_least_norm_while_the_hinges_tumble(method):
+    """They have no share in the loads that the hinges could exchange among themselves."""
+    mech = rom.Mechanism(gravity=(0, 0, 0))  # frame and leaf tumble across the line of the hinges
     points = {"low": (0, 0, -0.8), "high": (0, 0, 0.8)}
     frame = mech.add_rigid("frame", mass=30.0, inertia=(9.0, 8.0, 4.0), at=(0, 0, 0),
                            markers=points, omega=(2.0, 1.0, 0.5))  # fmt: skip
     leaf = mech.add_rigid("leaf", mass=20.0, inertia=(3.0, 2.0, 1.2), at=(0.4, 0, 0.1),
-                          markers={k: np.array(x) - [0.4, 0, 0.1] for k, x in points.items()},
                           omega=(2.0, 1.0, 3.0))  # fmt: skip
-    for name in points:
-        mech.revolute(name, frame.marker(name), leaf.marker(name), axis=Z)
-    return mech
-
-
-@pytest.mark.parametrize("method", ["generalized-alpha", "dop853"])
-def test_multipliers_stay_those_of_least_norm_while_the_hinges_tumble(method):
-    """They have no share in the loads that the hinges could exchange among themselves."""
-    mech = tumbling_door()
+    for name, at in points.items():
+        end = leaf.marker(np.array(at) - [0.4, 0, 0.1])
+        mech.revolute(name, frame.marker(name), end, axis=Z)
     sol = simulate_quietly(mech, t_end=1.0, dt=2e-3, method=method, save_every=50)
     packed, W = prepared(mech)
     for q, v, lam in zip(sol.q, sol.v, sol.lam, strict=True):
-        linearize_constraints(packed.system, W, q, v)
+        equations.linearize_constraints(packed.system, W, q, v)
         among = null_space(W.G.T, rcond=1e-8)
         assert among.shape[1] == 5
         assert np.abs(among.T @ lam).max() < 1e-6 * np.abs(lam).max()
@@ -185,12 +178,6 @@ def ladder(n, *, repeated=True):
     return mech
 
 
-@pytest.fixture
-def whole(monkeypatch):
-    """Lets mechanisms of any size have whole matrices."""
-    return lambda: monkeypatch.setattr(packing, "MAX_SHARING_WHOLE", 10_000)
-
-
 METHODS = {
     "alpha": {"dt": 2e-3},
     "steps chosen": {"rtol": 1e-6},
@@ -201,13 +188,13 @@ METHODS = {
 
 
 @pytest.mark.parametrize("method", few(3, METHODS))
-def test_blocks_move_and_carry_as_whole_matrices(method, whole):
+def test_blocks_move_and_carry_as_whole_matrices(method, monkeypatch):
     options = {"t_end": 0.3, **METHODS[method]}
     words = "21 of 140 constraints repeat others; joints up 0.0, .* and 20 more"
     with pytest.warns(RomWarning, match=words):
         blocks = rom.simulate(ladder(LOOPS), **options)
     assert blocks.packed.by_blocks and blocks.statistics["redundant"] == 3 * LOOPS
-    whole()
+    monkeypatch.setattr(packing, "MAX_SHARING_WHOLE", 10_000)
     other = rom.simulate(ladder(LOOPS), **options)
     assert not other.packed.by_blocks and other.statistics["rank"] == blocks.statistics["rank"]
     where = -1 if method == "steps chosen" else slice(None)
@@ -288,11 +275,11 @@ def train(n, slope=0.2, apart=0.0):
     return mech
 
 
-def test_many_wheels_roll_by_blocks_as_by_whole_matrices(whole):
+def test_many_wheels_roll_by_blocks_as_by_whole_matrices(monkeypatch):
     """Down the slope with g sin(a) (sum of masses) / (sum of masses + J / r^2)."""
     options = {"t_end": 0.2, "dt": 1e-3}
     blocks = rom.simulate(train(12), **options)
-    whole()
+    monkeypatch.setattr(packing, "MAX_SHARING_WHOLE", 10_000)
     other = rom.simulate(train(12), **options)
     assert blocks.packed.by_blocks and blocks.statistics["redundant"] > 0
     assert not other.packed.by_blocks and other.statistics["rank"] == blocks.statistics["rank"]
@@ -303,10 +290,10 @@ def test_many_wheels_roll_by_blocks_as_by_whole_matrices(whole):
     assert_allclose(blocks.velocity("bar 11")[-1], [speed, 0, 0], atol=1e-7)
 
 
-def test_gaps_of_what_rolls_are_closed_as_by_whole_matrices(whole):
+def test_gaps_of_what_rolls_are_closed_as_by_whole_matrices(monkeypatch):
     """Bars given a centimetre beside their axles: bodies come together, wheels may slip for it."""
     blocks = rom.simulate(train(12, apart=0.01), t_end=1e-3, dt=1e-3, assemble=True)
-    whole()
+    monkeypatch.setattr(packing, "MAX_SHARING_WHOLE", 10_000)
     other = rom.simulate(train(12, apart=0.01), t_end=1e-3, dt=1e-3, assemble=True)
     assert blocks.packed.by_blocks and not other.packed.by_blocks
     assert np.abs(blocks.position("bar 3")[0] - [3.51, 0, 0.3]).max() > 1e-3

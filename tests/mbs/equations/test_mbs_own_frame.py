@@ -25,17 +25,11 @@ def hinged(frame, gravity=(0.0, -9.81, 0.0)):
     return mech
 
 
-@pytest.fixture(scope="module")
-def paths():
-    return {
-        frame: rom.simulate(hinged(frame), t_end=0.5, dt=1e-3).position("beam", "tip")
-        for frame in FRAMES
-    }
-
-
-@pytest.mark.parametrize("frame", FRAMES[1:])
-def test_the_path_is_the_same_in_any_frame(frame, paths):
-    assert_allclose(paths[frame], paths["root"], atol=1e-8)
+def test_the_path_is_the_same_in_any_frame():
+    runs = {frame: rom.simulate(hinged(frame), t_end=0.5, dt=1e-3) for frame in FRAMES}
+    paths = {frame: sol.position("beam", "tip") for frame, sol in runs.items()}
+    for frame in FRAMES[1:]:
+        assert_allclose(paths[frame], paths["root"], atol=1e-8, err_msg=f"{frame}")
     assert paths["root"][-1, 1] < -0.9
 
 

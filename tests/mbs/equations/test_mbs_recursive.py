@@ -12,9 +12,7 @@ import rom
 from cases.mbs.lagrange import lagrange, potential_force
 from cases.mbs.mechanisms import random_body, simeon_rod
 from rom.errors import ModelError, RomWarning
-from rom.mbs.equations import graph
-from rom.mbs.equations.equations import linearize_constraints
-from rom.mbs.equations.linear_solve import factorise_bordered, solve_bordered
+from rom.mbs.equations import equations, graph, linear_solve
 from rom.mbs.equations.packing import pack
 from rom.mbs.integrate.consistent_start import factorised, initial_state
 from rom.mbs.integrate.step_memory import across
@@ -195,7 +193,7 @@ def test_the_smallest_pivot_of_a_joint_is_looked_at():
     """With unit masses no pivot of a body is below one; joints that share a body have smaller."""
     packed = pack(chain(12, flexible=False))
     W = workspace(packed.system, 0)
-    linearize_constraints(packed.system, W, packed.q, packed.v)
+    equations.linearize_constraints(packed.system, W, packed.q, packed.v)
     W.S[:] = 0.0
     for row in packed.system.graph.x[packed.system.graph.own]:
         W.S[row : row + 6] = np.eye(6)
@@ -400,8 +398,8 @@ def test_random_blocks_are_solved_like_their_whole_matrix(case, weak, monkeypatc
     n, m = W.residual.size, W.value.size
     W.rhs[:n], W.part[:] = b[:n], b[n:]
     x, lam = np.zeros(n), np.zeros(m)
-    assert factorise_bordered(s, W, m) and W.by_blocks[0] == (not weak)
-    solve_bordered(s, W, m, x, lam)
+    assert linear_solve.factorise_bordered(s, W, m) and W.by_blocks[0] == (not weak)
+    linear_solve.solve_bordered(s, W, m, x, lam)
     assert_allclose(np.r_[x, lam], np.linalg.solve(A, b), atol=1e-10 * np.abs(lam).max())
 
 

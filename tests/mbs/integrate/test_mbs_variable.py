@@ -14,10 +14,7 @@ from cases.mbs.motions import G, errors, falling, four_links, free_crank, heavy_
 from cases.mbs.parts import on_guide
 from rom import rotation
 from rom.mbs.equations.packing import pack
-from rom.mbs.integrate.adaptive_step import _Run
-from rom.mbs.integrate.generalized_alpha import bdf_coefficients, coefficients, turn_columns
-from rom.mbs.integrate.step_control import LENGTH, increment
-from rom.mbs.integrate.step_memory import across, shift_ahead
+from rom.mbs.integrate import adaptive_step, generalized_alpha, step_control, step_memory
 from rom.mbs.kernels.work import HAS_FACTOR, STEPS, Step, workspace
 
 IMPLICIT = ["generalized-alpha", "bdf"]
@@ -31,7 +28,7 @@ class End(NamedTuple):
 
 @njit
 def increment_between(s, h, left, right, out):
-    increment(s, h, left, right, out)
+    step_control.increment(s, h, left, right, out)
 
 
 def test_dop853_has_its_order_in_the_error_per_tolerance():
@@ -83,22 +80,22 @@ def test_the_increment_of_a_step_is_known_to_fourth_order():
 def test_another_length_of_steps_prepares_the_method_for_it(build, t_end, monkeypatch):
     """Acceleration a + (alpha_m - alpha_f) h da/dt, velocity ahead across constraints only."""
     seen = []
-    original = _Run.chunk
+    original = adaptive_step._Run.chunk
 
     def chunk(self, limit):
-        before = self.now.number[LENGTH]
-        taken, h = original(self, 1), self.now.number[LENGTH]
+        before = self.now.number[step_control.LENGTH]
+        taken, h = original(self, 1), self.now.number[step_control.LENGTH]
         if self.T.count[STEPS] < 5 or h == before or self.T.count[HAS_FACTOR]:
             return taken
         now, T, record = self.record.final, self.T, self.record
         lag = (T.method[3] - T.method[4]) * h * self.now.jerk
-        ahead = h**2 * shift_ahead(record, now, T.method, self.now.jerk)
-        across_ahead = across(record, workspace(record.packed.system, 0), now, ahead)
+        ahead = h**2 * step_memory.shift_ahead(record, now, T.method, self.now.jerk)
+        across_ahead = step_memory.across(record, workspace(record.packed.system, 0), now, ahead)
         moved = (T.a - now.a, lag), (T.v - now.v, across_ahead)
         seen.append([np.linalg.norm(x - known) / np.linalg.norm(known) for x, known in moved])
         return taken
 
-    monkeypatch.setattr(_Run, "chunk", chunk)
+    monkeypatch.setattr(adaptive_step._Run, "chunk", chunk)
     rom.simulate(build(), t_end=t_end, rtol=1e-3, rho_inf=0.0)
     assert len(seen) > 2
     assert (np.max(seen, axis=0) < [0.3, 1e-6]).all()
@@ -107,13 +104,13 @@ def test_another_length_of_steps_prepares_the_method_for_it(build, t_end, monkey
 @pytest.mark.parametrize("before", [0.1, 0.25, 0.4])
 def test_weights_of_bdf_differentiate_parabolas_exactly(before):
     h = 0.2
-    method, weights = bdf_coefficients(h, before)
+    method, weights = generalized_alpha.bdf_coefficients(h, before)
     t = np.array([0.0, -h, -h - before])
     values = np.array([np.ones(3), t, t**2])
     assert_allclose(values @ weights, [0.0, 1.0, 0.0], atol=1e-13)
     _, beta, gamma, *_ = method
     assert_allclose([gamma / (beta * h), 1 / (beta * h**2)], [weights[0], weights[0] ** 2])
-    assert_allclose(bdf_coefficients(h, 0.0)[1], [1 / h, -1 / h, 0])
+    assert_allclose(generalized_alpha.bdf_coefficients(h, 0.0)[1], [1 / h, -1 / h, 0])
 
 
 @pytest.mark.parametrize("method", IMPLICIT)
@@ -197,7 +194,7 @@ def test_a_first_step_that_is_far_too_long_is_shortened_until_it_fits(method):
 
 @njit
 def turned_columns(s, W, T):
-    turn_columns(s, W, T, 1)
+    generalized_alpha.turn_columns(s, W, T, 1)
 
 
 def change(psi, delta):
@@ -213,7 +210,7 @@ def test_columns_of_rotations_count_in_increments_of_the_rotation_vector():
     psi = rng.normal(size=n)
     vectors = [np.zeros(k) for k in (packed.q.size, n, n, n, m, packed.q.size, n, n, m)]
     counts = np.zeros(11, dtype=np.int64)
-    constants = (np.zeros(4), coefficients(1e-3, 0.9), np.zeros(3))
+    constants = (np.zeros(4), generalized_alpha.coefficients(1e-3, 0.9), np.zeros(3))
     history = np.zeros((2, 1, n)), np.zeros(n)
     T = Step(*vectors, psi, np.zeros(3), np.zeros(3), counts, *constants, *history)
     W.Kt[:], W.UG[:] = rng.normal(size=(n, n)), rng.normal(size=(m, n))

@@ -250,15 +250,12 @@ def test_joints_without_a_coordinate_are_named():
     refuses(ConfigError, r"no joint 'pine'; there are \['ball joint', 'pin'\]", sol.joint, "pine")
 
 
-def test_derivatives_are_exact_for_a_quartic_from_the_first_time_to_the_last():
+def test_derivatives_are_those_given_or_exact_for_a_quartic_from_the_first_time_to_the_last():
     """Five points: forward, central, backward weights all pass a polynomial of degree four."""
     t, span = np.linspace(-1.0, 2.0, 31), (-1.0, 2.0)
     table = rom.mbs.Signal("motor", POLYNOMIAL).sample(t, span, 0.1)
     wanted = [POLYNOMIAL(t), POLYNOMIAL.deriv(1)(t), POLYNOMIAL.deriv(2)(t)]
     assert_allclose(table, np.transpose(wanted), atol=1e-10)
-
-
-def test_given_derivatives_are_used():
     signal = rom.mbs.Signal("motor", np.sin, lambda t: 3.0, lambda t: 5.0)
     assert_allclose(signal.sample(np.array([0.2]), (0.0, 1.0), 0.1), [[np.sin(0.2), 3.0, 5.0]])
 

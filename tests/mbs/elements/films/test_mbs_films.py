@@ -89,8 +89,11 @@ def test_an_aligned_film_does_not_see_tilts(law):
     assert power == pytest.approx(f.dissipated, rel=1e-7)
 
 
-def test_a_film_that_does_not_turn_is_squeezed():
-    """Short bearing: p = 6 mu (dh/dt) / h^3 (z^2 - L^2/4); where it opens there is none."""
+def test_films_that_do_not_turn_are_squeezed():
+    """Short bearing: p = 6 mu (dh/dt) / h^3 (z^2 - L^2/4); where it opens there is none.
+
+    Long one with a full film: 12 pi mu L (R/c)^3 / (1 - e^2)^1.5.
+    """
     e, speed = 0.5, 2e-3
     b = bearing(slender=0.01, cells=(180, 40), grooves=(), aligned=True)
     pair = Pair(b, motion=np.array([e * 1e-4, 0, 0, 0]))
@@ -99,11 +102,6 @@ def test_a_film_that_does_not_turn_is_squeezed():
     C = VISCOSITY * b.radius * b.length**3 / b.clearance**3 * half
     assert_allclose(on_journal[:2], [-C * speed, 0.0], rtol=1e-3, atol=1e-6 * C * speed)
     assert power == pytest.approx(-on_journal[0] * speed, rel=1e-12)
-
-
-def test_a_long_film_that_does_not_turn_is_squeezed():
-    """12 pi mu L (R/c)^3 / (1 - e^2)^1.5 of a full film."""
-    e, speed = 0.5, 2e-3
     b = bearing("none", (360, 8), (), 40.0, aligned=True)
     pair = Pair(b, motion=np.array([e * 1e-4, 0, 0, 0]))
     (on_journal, _), _ = pair.loads(pair.velocities(np.array([speed, 0, 0, 0]), 0.0))

@@ -16,8 +16,7 @@ from cases.mbs.tangents import shifted
 from cases.refusals import refused, refuses
 from rom.components import gear_mesh
 from rom.components.gear_mesh import Correction, GearPair, Hertz, bending_table, contact_compliance
-from rom.components.gear_mesh.gears.meshes import GEAR_MESHES_FAMILY
-from rom.components.gear_mesh.gears.table import PHASE
+from rom.components.gear_mesh.gears import meshes, table
 
 K = 1.3e10
 SPUR = GearPair((26, 40), 4e-3, 0.03, thinning=5e-5)
@@ -36,7 +35,7 @@ def wheels(pair=SPUR, at=(ORIGIN, ORIGIN), **more):
 def load_at(found, turns, phase=None):
     """Sum of the normal forces when the wheels have turned [N]."""
     if phase is not None:
-        found[0].elements[GEAR_MESHES_FAMILY].size[0, PHASE] = phase
+        found[0].elements[meshes.GEAR_MESHES_FAMILY].size[0, table.PHASE] = phase
     return load_moved(found, dict(zip((5, 11), turns, strict=True)))
 
 
@@ -46,7 +45,7 @@ def load_moved(found, moves):
     delta, none = np.zeros(12), np.zeros(12)
     delta[list(moves)] = list(moves.values())
     residual_at(packed.system, W, shifted(packed, packed.q, delta), none, none, np.zeros(0))
-    return packed.elements[GEAR_MESHES_FAMILY].load[0]
+    return packed.elements[meshes.GEAR_MESHES_FAMILY].load[0]
 
 
 def on_grid(values, tooth, u, z, width):
