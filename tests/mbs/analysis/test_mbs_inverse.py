@@ -52,19 +52,13 @@ def test_a_slider_crank_needs_the_torque_of_lagranges_equation():
     assert_allclose(sol.energy.drives, work, atol=0.1)  # trapezoids over 61 times
 
 
-def loaded_swing():
-    """A flexible body on a ball joint under every kind of load."""
+def test_interface_loads_and_gravity_are_the_rate_of_momentum():
     mech = swing()
     hook, end = mech.joints["hook"].markers[0], mech.part("one").marker("b")
     mech.force("push", end, (0.1, 0, 0.2), frame="body")
     mech.torque("twist", end, (0.2, -0.1, 0.3))
     mech.user_force("resistance", lambda t, a: ((0, 0, 0), -0.05 * a.omega), end)
     mech.spring_damper("coil", hook, end, stiffness=30.0, damping=0.2)
-    return mech
-
-
-def test_interface_loads_and_gravity_are_the_rate_of_momentum():
-    mech = loaded_swing()
     sol = rom.simulate(mech, t_end=0.3, dt=2e-3, method="dop853")
     loads = sol.interface_loads("one")
     assert set(loads) == {"a", "b"}

@@ -100,21 +100,15 @@ def test_what_steps_do_not_know_is_noticed():
     assert_allclose(confirmed(found).E, exact.E, atol=1e-5)
 
 
-def unit_with(**films):
-    """The unit with other films, and its rest."""
-    unit = rigid_unit(speed=500.0)
-    shafts = [
-        replace(rotor, bearings={k: replace(b, **films) for k, b in rotor.bearings.items()})
-        for rotor in (unit.pinion, unit.gear)
-    ]
-    return replace(unit, pinion=shafts[0], gear=shafts[1])
-
-
 def test_films_that_remember_are_refused_by_name():
     """Their filling goes around with the oil, over revolutions; heat takes longer still."""
     unit = rigid_unit(speed=500.0)
-    for mech in (as_mechanism(unit_with(cavitation="jfo")),
-                 as_mechanism(unit, oil=rom.mbs.iso_vg(46), inlet=50.0)):  # fmt: skip
+    shafts = [
+        replace(x, bearings={k: replace(b, cavitation="jfo") for k, b in x.bearings.items()})
+        for x in (unit.pinion, unit.gear)
+    ]
+    filled = as_mechanism(replace(unit, pinion=shafts[0], gear=shafts[1]))
+    for mech in (filled, as_mechanism(unit, oil=rom.mbs.iso_vg(46), inlet=50.0)):
         with pytest.raises(rom.ModelError, match="'pinion low' remembers its oil, its heat"):
             rom.periodic_motion(mech, period=unit.mesh_period, start=rom.equilibrium(mech))
 

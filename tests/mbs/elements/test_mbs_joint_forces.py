@@ -179,8 +179,10 @@ def test_a_sliding_block_stops_after_v_over_mu_g(method):
     assert rom.audit(sol).ok, rom.audit(sol)
 
 
-def loaded(rng):
-    """Two flexible bodies and the ground on joints with every force of this page."""
+@pytest.mark.once
+@pytest.mark.parametrize("seed", range(2))
+def test_tangents_are_derivatives_of_the_forces(seed):
+    rng = np.random.default_rng(seed)
     mech, one, two = mechanisms.two_soft(rng, (0, 0, -g))
     mech.cylindrical("tube", one.marker("a"), two.marker("b"), axis=(1, 2, 2))
     mech.prismatic("guide", mech.ground.marker((0, 1, 0)), one.marker("b"), axis=X)
@@ -192,14 +194,7 @@ def loaded(rng):
     mech.stop("wall", "guide", law, upper=-20.0)
     mech.motor("motor", "tube", lambda t, x, v: 1.7, compiled=False)
     mech.motor("drive", "tube", lambda t, x, v: 1.5 - 4.0 * x**2 - 0.7 * v**3, coordinate="way")
-    return mech
-
-
-@pytest.mark.once
-@pytest.mark.parametrize("seed", range(2))
-def test_tangents_are_derivatives_of_the_forces(seed):
-    rng = np.random.default_rng(seed)
-    packed, W = mechanisms.prepared(loaded(rng))
+    packed, W = mechanisms.prepared(mech)
     packed.system.markers.twist[:] *= 1e-3
     s, (q, v, a, lam) = packed.system, mechanisms.random_state(rng, packed)
     packed.elements[motors.MOTORS_FAMILY].answer[:] = 1.7

@@ -17,8 +17,13 @@ AXIS, ACROSS = np.array([1.0, 2.0, 2.0]) / 3, np.array([2.0, 1.0, -2.0]) / 3
 BALL = (0.2, 0.2, 0.2)
 
 
-def everything(rng):
-    """Every connection of this page, between flexible bodies, a rigid one and the ground."""
+@pytest.mark.parametrize("seed", range(3))
+def test_gradient_and_convective_term_are_derivatives(seed):
+    """dG/dt = 0 along every motion: the gradient times the velocity is the rate of the residual.
+
+    Of every connection of this page, between flexible bodies, a rigid one and the ground.
+    """
+    rng = np.random.default_rng(seed)
     mech, one, two = two_soft(rng, GRAVITY)
     box = mech.add_rigid("box", mass=2.0, inertia=(1.0, 1.5, 2.0),
                          markers={"a": (0.3, 0.2, -0.1)}, **random_pose(rng))  # fmt: skip
@@ -32,14 +37,7 @@ def everything(rng):
     mech.rolling("wheel", m2, one.marker("b"), normal=AXIS, radius=0.4, axis=ACROSS)
     mech.gear("pinion", "screw", "planar", ratio=-0.7)
     mech.gear("rack", "screw", "line", ratio=0.3, coordinate1="way")
-    return mech
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_gradient_and_convective_term_are_derivatives(seed):
-    """dG/dt = 0 along every motion: the gradient times the velocity is the rate of the residual."""
-    rng = np.random.default_rng(seed)
-    packed, W = prepared(everything(rng))
+    packed, W = prepared(mech)
     s, (q, v, _, _) = packed.system, random_state(rng, packed)
     rolls = s.rows.kind == ROLL
     evaluate(s, W, q, v)

@@ -201,14 +201,6 @@ def compliance(E, cells):
     return C, theta, model.points[bore[0], 2]
 
 
-def spread(theta, z, n, m):
-    """Smooth motion of a grid of n times m + 1 points by that of the nodes of a bore."""
-    ring_of = np.vstack([np.eye(len(theta)), np.eye(len(theta))[:1]])
-    around = CubicSpline(np.append(theta, 2 * np.pi), ring_of, bc_type="periodic")
-    along = CubicSpline(z, np.eye(len(z)))
-    return np.kron(around(2 * np.pi / n * np.arange(n)), along(np.linspace(z[0], z[-1], m + 1)))
-
-
 def pressure(h, active):
     """Pressure (n, m + 1) of a film by differences; where it would pull it is zero (Reynolds)."""
     n, m = h.shape[0], h.shape[1] - 1
@@ -239,7 +231,10 @@ def elastic_film(at, E, cells, n=96, m=16):
     C, P = np.zeros((0, 0)), np.zeros((n * m + n, 0))
     if E is not None:
         C, theta, z = compliance(E, cells)
-        P = spread(theta, z, n, m)
+        ring_of = np.vstack([np.eye(len(theta)), np.eye(len(theta))[:1]])
+        around = CubicSpline(np.append(theta, 2 * np.pi), ring_of, bc_type="periodic")
+        places = 2 * np.pi / n * np.arange(n), np.linspace(z[0], z[-1], m + 1)
+        P = np.kron(around(places[0]), CubicSpline(z, np.eye(len(z)))(places[1]))
     rigid = CLEARANCE - at[0] * np.cos(angle) - at[1] * np.sin(angle) + np.zeros((n, m + 1))
     area = np.pi * DIAMETER / n * LENGTH / m
     w, active = 0 * rigid, np.ones(n * (m - 1), dtype=bool)
