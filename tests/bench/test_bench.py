@@ -14,7 +14,7 @@ import rom
 from benchmarks import benchmarks, two_stages, updating, wheel
 from benchmarks import large_deflection as bench
 from benchmarks.models import planetary_train, shaft_in_films
-from benchmarks.peers import compare, spin_up
+from benchmarks.peers import compare, ours, spin_up
 from cases.command import ran
 from cases.solid import block
 from rom import rotation
@@ -32,21 +32,25 @@ def bar():
     return benchmarks.bar(tuple(SIZE), (16, 2, 1))
 
 
-def test_the_bar_has_the_mass_centre_and_inertia_of_a_bar(bar):
+def test_the_bar_has_the_inertia_the_energy_of_any_constant_strain_and_the_ends_of_a_bar(bar):
     m = 7850.0 * SIZE.prod()
     R = rigid_motions(bar.points - SIZE / 2)
     expected = np.diag([m, m, m, *(m / 12 * ((SIZE**2).sum() - SIZE**2))])
     assert_allclose(R.T @ (bar.M @ R), expected, atol=1e-12 * m)
     assert np.abs(bar.K @ R).max() < 1e-14 * abs(bar.K).max()
-
-
-def test_the_energy_of_any_constant_strain_is_that_of_steel(bar):
     A = np.random.default_rng(3).normal(size=(3, 3))
     e = 0.5 * (A + A.T)
     voigt = np.array([e[0, 0], e[1, 1], e[2, 2], 2 * e[1, 2], 2 * e[0, 2], 2 * e[0, 1]])
     u = (bar.points @ A.T).ravel()
     energy = SIZE.prod() * voigt @ benchmarks.STEEL.stiffness @ voigt
     assert_allclose(u @ (bar.K @ u), energy, rtol=1e-11)
+    for name, x in (("root", 0.0), ("tip", SIZE[0])):
+        face = bar.interfaces[name]
+        assert_allclose(face.origin, [x, SIZE[1] / 2, SIZE[2] / 2], atol=1e-12)
+        assert_allclose(face.area, SIZE[1] * SIZE[2], rtol=1e-12)
+        y, z = face.points[:, 1], face.points[:, 2]
+        exact = SIZE[1] ** 3 / 3 * SIZE[2] ** 2 / 2  # integral of y^2 z
+        assert_allclose(y @ face.surface_mass @ (y * z), exact, rtol=1e-12)
 
 
 def test_the_bar_vibrates_like_a_bar(bar):
@@ -58,24 +62,13 @@ def test_the_bar_vibrates_like_a_bar(bar):
     assert_allclose(f[6], benchmarks.STEEL.wave_speed / (2 * SIZE[0]), rtol=2e-3)
 
 
-def test_the_ends_of_the_bar_are_its_interfaces(bar):
-    for name, x in (("root", 0.0), ("tip", SIZE[0])):
-        face = bar.interfaces[name]
-        assert_allclose(face.origin, [x, SIZE[1] / 2, SIZE[2] / 2], atol=1e-12)
-        assert_allclose(face.area, SIZE[1] * SIZE[2], rtol=1e-12)
-        y, z = face.points[:, 1], face.points[:, 2]
-        exact = SIZE[1] ** 3 / 3 * SIZE[2] ** 2 / 2  # integral of y^2 z
-        assert_allclose(y @ face.surface_mass @ (y * z), exact, rtol=1e-12)
-
-
 @pytest.mark.parametrize("kind", ["full", "polynomial:4"])
 def test_a_bed_under_the_interfaces_is_that_of_the_full_model(bar, kind):
     """Ten frequencies of the bar with springs under both ends, from all its dofs by LAPACK."""
     K, M = bar.K.toarray(), bar.M.toarray()
     for face in bar.interfaces.values():
-        K[np.ix_(face.dofs, face.dofs)] += benchmarks.BED_STIFFNESS * np.kron(
-            face.surface_mass.toarray(), np.eye(3)
-        )
+        bed = benchmarks.BED_STIFFNESS * np.kron(face.surface_mass.toarray(), np.eye(3))
+        K[np.ix_(face.dofs, face.dofs)] += bed
     exact = np.sqrt(eigh(K, M, eigvals_only=True, subset_by_index=(0, 9))) / (2 * np.pi)
     kinds = dict.fromkeys(bar.interfaces, kind)
     body = rom.reduce(bar, method=rom.CraigBampton(40), interfaces=kinds, certify=False)
@@ -94,7 +87,6 @@ def test_a_planetary_train_is_timed_on_a_motion_that_is_right():
 
 @pytest.mark.long
 def test_a_shaft_in_films_is_timed_on_a_motion_that_is_right():
-    """It is carried: its weight, on both films alike."""
     mech = shaft_in_films("reynolds")
     moved = rom.simulate(mech, t_end=0.02, dt=1e-4, method="bdf", progress=False)
     both = [moved.journal_bearing(f"film {k}").motion[-1] for k in range(2)]
@@ -103,15 +95,10 @@ def test_a_shaft_in_films_is_timed_on_a_motion_that_is_right():
 
 
 def test_other_programs_reduce_the_same_model(bar, tmp_path):
-    """The script that other programs run, here with SciPy: its body has our frequencies."""
-    from benchmarks.peers.compare import SCRIPT_FILE
-    from benchmarks.peers.ours import save_matrices
-
     file = tmp_path / "matrices.npz"
-    save_matrices(bar, str(file), tuple(benchmarks.KINDS))
-    words = file, "superlu", "rbe2", 8
-    done = ran(sys.executable, SCRIPT_FILE, *words, timeout=600, check=True)
-    found = json.loads(done.stdout)
+    ours.save_matrices(bar, str(file), tuple(benchmarks.KINDS))
+    words = compare.SCRIPT_FILE, file, "superlu", "rbe2", 8
+    found = json.loads(ran(sys.executable, *words, timeout=600, check=True).stdout)
     body = rom.reduce(bar, method=rom.CraigBampton(8), interfaces=benchmarks.KINDS, certify=False)
     assert_allclose(found["frequencies"], body.frequencies()[6:16], rtol=1e-8)
     assert found["seconds"] > 0.0
@@ -154,7 +141,6 @@ def test_an_update_is_timed_that_finds_the_truth():
 
 @pytest.mark.long
 def test_compiled_loops_are_timed_on_motions_that_are_right():
-    """A short arch that rests on its abutments, postures near an isotropic one, a coarse bar."""
     figures = {
         f"{f.case.split(',')[0]}: {f.quantity}": f
         for f in benchmarks.loops(blocks=10, steps=400, cells=120, height=10)
@@ -191,7 +177,6 @@ def test_rods_and_their_beams_are_the_bar_of_the_paper(monkeypatch):
 
 
 def test_the_deflection_of_a_beam_is_read_from_the_places_of_its_tip(monkeypatch):
-    """A stiff bar has none; one that lags by 0.2 m has that."""
     angle = ramp(spin_up.FINAL_SPEED, spin_up.RISE_TIME)[1]
     t = np.linspace(0.0, spin_up.RISE_TIME, 31)
     turned = [rotation.matrix(rotation.exp([angle(s), 0, 0])) for s in t]
@@ -210,7 +195,6 @@ def test_the_deflection_of_a_beam_is_read_from_the_places_of_its_tip(monkeypatch
 
 
 def test_a_rod_spins_up_as_the_exact_beam_does():
-    """The error falls with the square of the length of its segments."""
     errors = [spin_up.spun_up(spin_up.rod(n), t_end=7.0).error for n in (8, 16)]
     assert errors[1] < 1e-2 and 3 < errors[0] / errors[1] < 5
 

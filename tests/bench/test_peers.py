@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+import rom
 from benchmarks.benchmarks import motion
 from benchmarks.models import bar
 from benchmarks.peers import compare, films, reference, rods
@@ -19,12 +20,9 @@ from benchmarks.units import RigidShaft
 from cases.gear_unit import tilting
 from cases.paths import TESTS
 from rom import rotation
+from rom.components import journal_bearing, transmission
 from rom.components.cosserat import body, straight
-from rom.components.journal_bearing import equilibrium
-from rom.components.transmission import Shaft, rest
 from rom.components.wind.wind_turbine import RATED_SPEED, blade, ramp, run_up
-from rom.errors import ConfigError
-from rom.mbs.integrate.simulation import simulate
 
 STORED = json.loads((TESTS / "reference" / "exudyn_motion.json").read_text())
 
@@ -52,7 +50,7 @@ def test_paths_differ_from_those_of_exudyn_by_the_error_of_the_step(mesh, name):
 def test_no_joint_of_the_mechanisms_is_redundant(mesh, name):
     body, runs = reference.case(name, mesh)
     mech = built(runs[0].mechanism, body)
-    sol = simulate(mech, t_end=1e-3, dt=1e-4)
+    sol = rom.simulate(mech, t_end=1e-3, dt=1e-4)
     assert sol.statistics["redundant"] == 0
     assert np.abs(sol.gap).max() < 1e-9
     # they start as they are described: no velocity is corrected
@@ -78,9 +76,8 @@ def test_figures_say_rates_ratio_and_difference(monkeypatch):
     """With our own runs in the place of Exudyn's: no difference, and an aim for each ratio."""
     monkeypatch.setattr(peer, "N_TIMED_STEPS", 1)
     monkeypatch.setattr(peer, "rod", lambda lc: bar((0.3, 0.02, 0.012), (7, 1, 1)))
-    monkeypatch.setattr(
-        peer, "by_exudyn", lambda model, body, runs: [peer.by_rom(body, run) for run in runs]
-    )
+    ours = lambda _, body, runs: [peer.by_rom(body, run) for run in runs]  # noqa: E731
+    monkeypatch.setattr(peer, "by_exudyn", ours)
     figures = list(motion((0.02,), (2,)))
     cases = [f"{name}, 14 modes, 405 dofs" for name in ("pendulum", "slider-crank", "chain of 2")]
     assert [f.case for f in figures[::4]] == cases
@@ -91,7 +88,7 @@ def test_figures_say_rates_ratio_and_difference(monkeypatch):
 
 def test_samples_that_do_not_divide_the_steps_are_refused(mesh):
     body = peer.reduced(mesh, 2)
-    with pytest.raises(ConfigError, match="20 samples do not divide 30 steps"):
+    with pytest.raises(rom.ConfigError, match="20 samples do not divide 30 steps"):
         peer.Run(pendulum(body), 1e-2, 30)
 
 
@@ -103,7 +100,7 @@ def test_steps_leave_no_memory_behind(mesh):
     def held(steps):
         tracemalloc.start()
         before = sys.getallocatedblocks()
-        sol = simulate(mech, t_end=steps * 1e-5, dt=1e-5, save_every=steps // 4)
+        sol = rom.simulate(mech, t_end=steps * 1e-5, dt=1e-5, save_every=steps // 4)
         blocks, peak = sys.getallocatedblocks() - before, tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
         assert (sol.statistics["steps"], len(sol.t)) == (steps, 5)
@@ -114,29 +111,23 @@ def test_steps_leave_no_memory_behind(mesh):
     assert many[1] - few[1] < 8 * 58_000 * 3 // 4  # bytes; what a few thousand steps need at once
 
 
-@pytest.fixture
-def theirs(monkeypatch):
+@pytest.mark.once
+@pytest.mark.long
+def test_both_programs_are_held_against_the_same_row(monkeypatch):
     """An answer as ROSS gives it, with the stiffness and damping of our own film, in SI."""
     bearing, load = films.two_groove()
     kept = {"speed": films.FILM_CASE["speed"], "viscosity": films.FILM_CASE["viscosity"]}
-    f = equilibrium(bearing, (0.0, -load), **kept)
-    found = {"seconds": 1.0, "stiffness": f.stiffness[:2, :2].tolist(),
-             "damping": f.damping[:2, :2].tolist()}  # fmt: skip
+    f = journal_bearing.equilibrium(bearing, (0.0, -load), **kept)
+    K, C = (x[:2, :2].tolist() for x in (f.stiffness, f.damping))
+    found = {"seconds": 1.0, "stiffness": K, "damping": C}
     monkeypatch.setattr(films, "interpreter", lambda *_: "python")
     monkeypatch.setattr(films, "answer_of", lambda _: {"version": "2", "lund": found})
-    return found
-
-
-@pytest.mark.once
-@pytest.mark.long
-def test_both_programs_are_held_against_the_same_row(theirs):
     rows = {quantity: value for _, quantity, value, _, _ in films.coefficients_compared()}
     ours = rows["rom, coefficients off Lund and Thomsen"]
     assert 0 < ours < 0.03
     assert rows["ROSS 2, lund, coefficients off Lund and Thomsen"] == pytest.approx(ours, rel=1e-6)
-    assert rows["ROSS 2, lund, over rom"] == pytest.approx(
-        1e3 / rows["rom, rest and coefficients"], rel=1e-9
-    )
+    ratio = 1e3 / rows["rom, rest and coefficients"]
+    assert rows["ROSS 2, lund, over rom"] == pytest.approx(ratio, rel=1e-9)
 
 
 @pytest.mark.once
@@ -149,7 +140,7 @@ def test_axes_are_turned_to_the_load():
 @pytest.mark.once
 @pytest.mark.long
 def test_the_unit_that_runs_through_its_speeds_carries_its_load():
-    state = rest(films.gear_unit(cells=(48, 4)))
+    state = transmission.rest(films.gear_unit(cells=(48, 4)))
     given, taken, heat = state.powers
     assert given - taken - heat == pytest.approx(tilting(state), rel=0.03)
     assert taken == pytest.approx(300 * 100 * np.pi)
@@ -161,9 +152,8 @@ def test_the_unit_that_runs_through_its_speeds_carries_its_load():
 def test_the_unit_of_rigid_shafts_is_the_same_by_both_programs():
     """They find the same largest forces on teeth but for what 60 steps leave."""
     rows = {quantity: value for _, quantity, value, _, _ in films.programs_compared(2, (40, 4))}
-    own, mechanism = (
-        rows[f"a speed of a sweep {how}"] for how in ("by its own program", "as a mechanism")
-    )
+    ways = "by its own program", "as a mechanism"
+    own, mechanism = (rows[f"a speed of a sweep {how}"] for how in ways)
     assert rows["mechanism over its own program"] == pytest.approx(mechanism / own)
     assert 0 < rows["load factors apart, middle of all speeds"] < 0.02
     assert rows["rest as a mechanism"] > 0
@@ -177,7 +167,7 @@ def test_a_shaft_without_elasticity_keeps_its_inertia():
 
     Beams of four elements have their mass at the nodes but for a part, which the middle feels.
     """
-    found = RigidShaft.of(Shaft(np.linspace(0.1, 0.3, 5), 0.05))
+    found = RigidShaft.of(transmission.Shaft(np.linspace(0.1, 0.3, 5), 0.05))
     mass = np.pi / 4 * 0.05**2 * 0.2 * 7850
     assert found.mass == pytest.approx(mass, rel=1e-9) and found.span == pytest.approx(0.2)
     assert found.about == pytest.approx(mass * 0.05**2 / 8, rel=1e-9)
@@ -221,8 +211,7 @@ def test_the_rotor_here_is_the_run_up_of_its_blades(monkeypatch):
     alone = run_up(one, t_end=4.0, dt=rods.TIME_STEP, rise=4.0)
     assert seconds > 0
     every = round(4.0 / rods.TIME_STEP) // rods.N_SAMPLES
-    assert_allclose(tip[:, 0], alone.tip[::every, 0], atol=1e-5)
-    assert_allclose(tip[:, 1], alone.tip[::every, 1], atol=1e-5)
+    assert_allclose(tip[:, :2], alone.tip[::every, :2], atol=1e-5)
     assert np.abs(tip[:, 1]).max() > 0.03
 
 
@@ -233,9 +222,8 @@ def test_both_programs_turn_the_hub_alike():
     scope = {"sin": np.sin, "pi": np.pi}
     exec(compile(ast.Module([law], []), "beams", "exec"), scope)
     for t in (0.3, 7.0, 19.9, 25.0):
-        assert_allclose(
-            scope["angle"](t, RATED_SPEED, 20.0), ramp(RATED_SPEED, 20.0)[1](t), rtol=1e-14
-        )
+        ours = ramp(RATED_SPEED, 20.0)[1](t)
+        assert_allclose(scope["angle"](t, RATED_SPEED, 20.0), ours, rtol=1e-14)
 
 
 def test_the_cantilever_is_the_elastica_and_the_one_handed_over(monkeypatch):
@@ -245,9 +233,8 @@ def test_the_cantilever_is_the_elastica_and_the_one_handed_over(monkeypatch):
     twist = np.sqrt(100.0 / 1e-3) / 4  # Hz, a bar clamped at one end
     assert np.abs(ours["frequencies"] / twist - 1).min() < 1e-3
     monkeypatch.setattr(compare, "interpreter", lambda: "python")
-    monkeypatch.setattr(
-        compare, "answer_of", lambda command: json.loads(Path(command[2]).read_text())
-    )
+    echo = lambda command: json.loads(Path(command[2]).read_text())  # noqa: E731
+    monkeypatch.setattr(compare, "answer_of", echo)
     given = rods.bent_by_exudyn(100)
     one = straight(1.0, 100, **rods.CANTILEVER_SECTION)
     assert_allclose(given["stiffness"], np.concatenate([one.stretch[50], one.bend[50]]))

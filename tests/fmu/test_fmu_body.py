@@ -15,13 +15,11 @@ from cases.mbs.fmu_instance import Instance, fmpy
 from cases.mbs.mechanisms import random_body, simulate_quietly
 from cases.solid import block, reduced
 from rom.errors import ConfigError, InterfaceError
-from rom.mbs.mechanism import Mechanism
 
-pytestmark = pytest.mark.usefixtures("no_python")
 MOTION = ("displacement", "rotation", "velocity", "angular_velocity")
 
 
-@pytest.fixture
+@pytest.fixture(autouse=True)
 def no_python(monkeypatch):
     monkeypatch.setenv("ROM_PYTHON", "/nowhere/python")
 
@@ -74,7 +72,7 @@ def exact(body, history, gravity, steps):
     return state[:n], state[n:]
 
 
-def test_the_description_is_valid_and_needs_no_tool(free):
+def test_the_description_is_valid_and_needs_no_tool_and_the_library_no_python(free, tmp_path):
     assert fmpy.validation.validate_fmu(str(free)) == []
     d = fmpy.read_model_description(str(free))
     assert not d.coSimulation.needsExecutionTool and len(d.modelVariables) == 2 * 6 + 3 + 2 * 12
@@ -86,9 +84,6 @@ def test_the_description_is_valid_and_needs_no_tool(free):
     units = {v.name: (v.causality, v.unit) for v in d.modelVariables}
     assert units["a.torque[2]"] == ("input", "N.m")
     assert units["b.angular_velocity[3]"] == ("output", "rad/s")
-
-
-def test_the_library_needs_the_c_library_only(free, tmp_path):
     one = Instance(free, tmp_path)
     library = f"{one.folder}/binaries/linux64/{one.description.coSimulation.modelIdentifier}.so"
     done = subprocess.run(["nm", "-D", "-u", library], capture_output=True, text=True, check=True)
@@ -97,7 +92,6 @@ def test_the_library_needs_the_c_library_only(free, tmp_path):
 
 @pytest.mark.parametrize("steps", [(0.02,) * 4, (3.0,) * 4, (0.25, 0.25, 0.4, 0.1)])
 def test_a_free_body_moves_as_its_equations_say(body, free, tmp_path, steps):
-    """Steps far below and far above the periods of its vibrations, and some of each length."""
     rng = np.random.default_rng(1)
     history = [{name: rng.normal(size=6) for name in "ab"} for _ in range(4)]
     gravity = np.array([0.3, -0.2, 9.0])
@@ -122,7 +116,7 @@ def test_small_motions_are_those_of_the_multibody_integrator(body, free, tmp_pat
     """Its equations are not linear and its signs are its own."""
     small = 1e-5
     force, torque = np.array([1.0, -2.0, 0.5]) * small, np.array([0.3, 0.2, -0.4]) * small
-    mech = Mechanism(gravity=(0.0, 0.0, 0.0))
+    mech = rom.Mechanism(gravity=(0.0, 0.0, 0.0))
     part = mech.add_flexible("one", body)
     mech.force("f", part.marker("b"), force)
     mech.torque("t", part.marker("b"), torque)
@@ -139,7 +133,6 @@ def test_small_motions_are_those_of_the_multibody_integrator(body, free, tmp_pat
 
 
 def test_a_cantilever_comes_to_rest_where_statics_has_it(rod, tmp_path):
-    """Deflection under a force at the tip, and the sag that an accelerated ground gives."""
     path = rom.write_body_fmu(rod, tmp_path / "rod.fmu", fixed=("root",))
     one = Instance(path, tmp_path).begin()
     M, K = rod.full_matrices()

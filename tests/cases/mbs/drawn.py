@@ -4,11 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
+import rom
 from cases.mbs.mechanisms import lattice, lattice_body
 from rom import view
 from rom.body.flexible import Surface
-from rom.mbs.integrate.simulation import simulate
-from rom.mbs.mechanism import Mechanism
 
 
 def lattice_bar():
@@ -26,11 +25,11 @@ def lattice_bar():
 
 def swinging(bar):
     """The bar, turning with a ball beside it: a mechanism and its motion."""
-    mech = Mechanism(gravity=(0, 0, 0))
+    mech = rom.Mechanism(gravity=(0, 0, 0))
     part = mech.add_flexible("bar", bar, omega=(0, 0, 30.0))
     mech.add_rigid("ball", mass=1.0, inertia=(1e-2,) * 3, at=(0, 0.6, 0))
     mech.spherical("tie", mech.ground.marker((0, 0, 0.15)), part.marker("n7"))
-    return mech, simulate(mech, t_end=0.1, dt=1e-3, assemble=True)
+    return mech, rom.simulate(mech, t_end=0.1, dt=1e-3, assemble=True)
 
 
 def squeezed(amount):

@@ -176,15 +176,10 @@ def _rate(q, w):
 
 
 def simulate(rod, t, *, reference_condition, load, velocity, omega):
-    """Motion of a free rod from its shape without stress, by DOP853 in a floating frame.
+    """Motion at instants of a free rod from its shape without stress, in a floating frame.
 
-    Args:
-        rod: with mass and inertia, plates too.
-        t: (k,) ascending instants [s] at which the motion is returned.
-        reference_condition: "start", "chord" or "mean-axis".
-        load: dead forces and moments as of `statics.loads`.
-        velocity: (3,) of the origin at the start [m/s].
-        omega: (3,) angular velocity of the rod as a whole at the start [rad/s].
+    Plates have inertia, too; loads are dead ones as of `statics.loads`; velocity of the origin and
+    angular velocity are those of the rod as a whole at the start.
     """
     conditions, shape, n = REFERENCES[reference_condition], reference(rod), rod.h.size
     z = np.concatenate([velocity, omega, np.zeros(6 * n + 9)])

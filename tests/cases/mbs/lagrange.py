@@ -31,12 +31,10 @@ def lagrange(  # noqa: PLR0913  the problem and how to solve it
         points: q -> (n,) with the kinetic energy 1/2 |d points / dt|^2: coordinates of masses times
             the root of the mass, directions times the root of a moment. Takes complex numbers.
         force: (q, v) -> (k,) generalised forces.
-        q: (k,) coordinates at the start.
-        v: (k,) their rates.
+        q, v: (k,) coordinates and their rates at the start.
         times: (n_t,).
         closed: q -> (c,) what stays zero where loops are closed.
-        method: of `solve_ivp`.
-        rtol: its relative tolerance.
+        method, rtol: of `solve_ivp`.
     """
     k = q.size
 

@@ -9,7 +9,6 @@ Z = (0.0, 0.0, 1.0)
 
 
 def still(t):
-    """No displacement of a drive."""
     return 0.0
 
 
@@ -35,12 +34,10 @@ def pinned(mech, name, body, at, angle, first):
 
 
 def ball(mech, name, mass, at, inertia=1e-9):
-    """Add a body that is nearly a point."""
     return mech.add_rigid(name, mass=mass, inertia=(inertia,) * 3, at=(*at, 0.0))
 
 
 def direction(arm):
-    """Angle of a vector (2,) [rad]."""
     return float(np.arctan2(arm[1], arm[0]))
 
 
@@ -50,11 +47,9 @@ def five_bar_of_the_core(q, cranks, couplers, posture):
     tips = []
     for k, (pivot, elbow) in enumerate(((0, 1), (4, 3))):
         o = mech.ground.marker((*posture[pivot], 0.0))
-        crank = pinned(mech, f"crank {k}", cranks[k], posture[pivot], q[k], o)
+        end = pinned(mech, f"crank {k}", cranks[k], posture[pivot], q[k], o).marker("tip")
         turn = direction(posture[2] - posture[elbow])
-        coupler = pinned(
-            mech, f"coupler {k}", couplers[k], posture[elbow], turn, crank.marker("tip")
-        )
+        coupler = pinned(mech, f"coupler {k}", couplers[k], posture[elbow], turn, end)
         tips.append(coupler.marker("tip"))
         mech.drive(("left", "right")[k], f"crank {k} pin", still)
     mech.revolute("tip", *tips, axis=Z)
@@ -103,8 +98,8 @@ def rail_of_the_core(slide, coupler, payload, spread):
     tip = np.array([spread / 2, np.sqrt(coupler[1] ** 2 - spread**2 / 4)])
     for name, x in (("left", 0.0), ("right", spread)):
         base = ball(mech, f"{name} slide", slide, (x, 0))
-        mech.prismatic(f"{name} rail", mech.ground.marker((x, 0, 0)), base.marker(o),
-                       axis=(1, 0, 0))  # fmt: skip
+        ends = mech.ground.marker((x, 0, 0)), base.marker(o)
+        mech.prismatic(f"{name} rail", *ends, axis=(1, 0, 0))
         turn = direction(tip - [x, 0])
         rod = pinned(mech, f"{name} coupler", coupler, (x, 0), turn, base.marker(o))
         tips.append(rod.marker("tip"))

@@ -8,16 +8,18 @@ from numba import njit
 from scipy.integrate import solve_ivp
 from scipy.linalg import block_diag, eigh
 
+import rom
 from rom import rotation
-from rom.body.flexible import FlexibleBody
 from rom.body.records import Marker
 from rom.body.stiffening import elastic_loads, known_loads
-from rom.errors import RomWarning
 from rom.mbs.equations.equations import element_energy, evaluate, residual, tangents
 from rom.mbs.equations.packing import pack
-from rom.mbs.integrate.simulation import simulate
 from rom.mbs.kernels.work import workspace
-from rom.mbs.mechanism import Mechanism
+
+# Simeon, Modelling a flexible slider crank mechanism by a mixed system of DAEs and PDEs,
+# Math. Modelling of Systems 2 (1996) 1; data as in the IVP test set, problem "crank".
+CRANK = {"l1": 0.15, "l2": 0.30, "m1": 0.36, "m2": 0.151104, "m3": 0.075552, "J1": 0.002727}
+CRANK |= {"J2": 0.0045339259, "E": 2e11, "h": 0.008, "rho": 7870.0, "speed": 150.0}
 
 
 @njit
@@ -50,7 +52,7 @@ def nodal_body(x, Ms, phi, K=None, D=None, markers=None, name="body"):
     M = np.einsum("kia,ij,lja->kl", phi, Ms, phi)
     K = np.zeros((r, r)) if K is None else K
     omega = np.sqrt(np.maximum(np.linalg.eigvals(np.linalg.solve(M, K)).real, 0)) if r else K[0]
-    return FlexibleBody(
+    return rom.FlexibleBody(
         name=name,
         mass=float(Ms.sum()),
         first_moment=Ms.sum(axis=0) @ x,
@@ -100,9 +102,8 @@ def random_nodes(rng, n=7, r=4):
 def random_body(rng, r=4, *, damped=True, stiffened=False):
     """A body whose two markers move and turn with the elastic coordinates."""
     x, Ms, phi, K, D = random_nodes(rng, r=r)
-    markers = {
-        key: (x[i], phi[:, i].T, 0.4 * rng.normal(size=(3, r))) for i, key in ((0, "a"), (1, "b"))
-    }
+    twists = 0.4 * rng.normal(size=(2, 3, r))
+    markers = {key: (x[i], phi[:, i].T, twists[i]) for i, key in enumerate("ab")}
     body = nodal_body(x, Ms, phi, K, D if damped else 0 * D, markers)
     if not stiffened:
         return body
@@ -124,7 +125,7 @@ def random_pose(rng):
 
 def two_soft(rng, gravity=(0, 0, 0), *, damped=True, stiffened=False):
     """A mechanism of two flexible bodies, anywhere and in any motion, and both of them."""
-    mech = Mechanism(gravity=gravity)
+    mech = rom.Mechanism(gravity=gravity)
     bodies = (("one", {"stiffened": stiffened}), ("two", {"r": 3}))
     return mech, *(
         mech.add_flexible(name, random_body(rng, damped=damped, **kind), **random_pose(rng))
@@ -151,12 +152,6 @@ def prepared(mechanism):
     return packed, workspace(packed.system, len(packed.signals))
 
 
-# Simeon, Modelling a flexible slider crank mechanism by a mixed system of DAEs and PDEs,
-# Math. Modelling of Systems 2 (1996) 1; data as in the IVP test set, problem "crank".
-CRANK = {"l1": 0.15, "l2": 0.30, "m1": 0.36, "m2": 0.151104, "m3": 0.075552, "J1": 0.002727}
-CRANK |= {"J2": 0.0045339259, "E": 2e11, "h": 0.008, "rho": 7870.0, "speed": 150.0}
-
-
 def simeon_rod(axial_mass_divisor=1.0):
     """Rod of the test set: two bending shapes, one quadratic axial element, chord frame.
 
@@ -169,9 +164,8 @@ def simeon_rod(axial_mass_divisor=1.0):
     rAl = c["rho"] * A * l
     M = rAl * block_diag(0.5, 0.5, np.array([[8.0, 1.0], [1.0, 2.0]]) / axial_mass_divisor)
     EAl = c["E"] * A / l
-    K = EAl * block_diag(
-        pi**4 / 24 * (h / l) ** 2, 2 * pi**4 / 3 * (h / l) ** 2, np.array([[16, -8], [-8, 7]]) / 3
-    )
+    bending = pi**4 / 24 * (h / l) ** 2 * np.array([1, 16])
+    K = EAl * block_diag(*bending, np.array([[16, -8], [-8, 7]]) / 3)
     S = rAl * np.array([[0, 0, 2 / 3, 1 / 6], [2 / pi, 0, 0, 0], [0, 0, 0, 0]])
     B = np.zeros((4, 4))
     B[0, 2], B[0, 3], B[1, 3] = -16 / pi**3, 8 / pi**3 - 1 / pi, 1 / (2 * pi)
@@ -183,7 +177,7 @@ def simeon_rod(axial_mass_divisor=1.0):
     S_kl[1, 0, :2, 2:], S_kl[0, 1, 2:, :2] = -B[:2, 2:], -B[:2, 2:].T
     tip, zero = np.zeros((2, 3, 4))
     tip[0, 3] = 1.0
-    return FlexibleBody(
+    return rom.FlexibleBody(
         name="rod",
         mass=m,
         first_moment=np.array([m * l / 2, 0, 0]),
@@ -209,7 +203,7 @@ def simeon_crank(axial_mass_divisor=1.0, start=None):
         [0.0, 0.0, 1.03339863e-5, 1.69327969e-5],
         [0.444896112581599, 4.634339319238670e-3, -1.78591076e-6, -2.68938672e-6],
     )
-    mech, speed, l1 = Mechanism(gravity=(0, 0, 0)), c["speed"], c["l1"]
+    mech, speed, l1 = rom.Mechanism(gravity=(0, 0, 0)), c["speed"], c["l1"]
     half, across = np.array([l1 / 2, 0, 0]), c["J1"] - c["m1"] * l1**2 / 4
     solid = {"mass": c["m1"], "inertia": (1e-4, across, across), "at": half}
     moving = {"velocity": (0, speed * l1 / 2, 0), "omega": (0, 0, speed)}
@@ -236,13 +230,13 @@ def joined_crank(mech, crank, rod, slider, speed):
 def simulate_quietly(mechanism, **options):
     """Simulate a mechanism whose redundant constraints, and start beside its joints, are known."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RomWarning)
-        return simulate(mechanism, **{"assemble": True} | options)
+        warnings.simplefilter("ignore", rom.RomWarning)
+        return rom.simulate(mechanism, **{"assemble": True} | options)
 
 
 def slider_crank(l1=0.1, l2=0.3, speed=50.0, gravity=0.0, rod=None):
     """Driven slider-crank in the xy plane with a rigid rod, or a flexible one in the rod frame."""
-    mech = Mechanism(gravity=(0, -gravity, 0))
+    mech = rom.Mechanism(gravity=(0, -gravity, 0))
     start = {"velocity": (0, speed * l1, 0), "omega": (0, 0, -speed * l1 / l2)}
     solid = {"mass": 1.0, "inertia": (1e-3, 1e-3, 2e-3), "at": (0, 0, 0), "omega": (0, 0, speed)}
     crank = mech.add_rigid("crank", **solid, markers={"o": (0, 0, 0), "a": (l1, 0, 0)})
@@ -275,11 +269,7 @@ def crank_torque(angle, l1=0.1, l2=0.3, speed=50.0, gravity=0.0):
 
 
 def lattice(sections=5, stiffness=4e3, length=1.0, mass=1.0):
-    """Point masses joined by springs, three to a section: nodes, springs, masses.
-
-    Returns:
-        x (N, 3), pairs (s, 2), stiffness (s,), masses (N,).
-    """
+    """Nodes (N, 3), pairs (s, 2) on springs, stiffness (s,), point masses (N,): three a section."""
     angles = 2 * np.pi * np.arange(3) / 3
     ring = 0.15 * np.column_stack([np.zeros(3), np.cos(angles), np.sin(angles)])
     along = np.array([length / (sections - 1), 0, 0])
@@ -308,15 +298,7 @@ def lattice_body(lattice_data):
 
 
 def lattice_motion(lattice_data, times, y0, v0, outer, held=()):
-    """Positions (n_t, N, 3) of the nodes under springs that turn with their ends.
-
-    Args:
-        lattice_data: see `lattice`.
-        times: (n_t,) output times.
-        y0, v0: (N, 3) positions and velocities at the start.
-        outer: function (t, y) -> (N, 3) forces.
-        held: nodes that do not move.
-    """
+    """Positions (n_t, N, 3) of nodes under springs that turn with their ends and forces (t, y)."""
     x, pairs, k, masses = lattice_data
     n, (i, j) = x.shape[0], pairs.T
     rest = np.linalg.norm(x[j] - x[i], axis=1)
@@ -340,7 +322,7 @@ def lattice_motion(lattice_data, times, y0, v0, outer, held=()):
 
 def rotor(speed, *, across=0.3, along=0.5, kx=300.0, ky=500.0):
     """A disc on a ball joint, turning about z, two springs against its tilt."""
-    mech = Mechanism(gravity=(0, 0, 0))
+    mech = rom.Mechanism(gravity=(0, 0, 0))
     marks = {"c": (0, 0, 0), "tip": (0, 0, 1)}
     disc = mech.add_rigid("disc", mass=4.0, inertia=(across, across, along), at=(0, 0, 0),
                           omega=(0, 0, speed), markers=marks)  # fmt: skip

@@ -12,6 +12,8 @@ from cases.paths import TESTS
 from rom.mbs.mechanism import Mechanism
 
 G = 9.81
+PARTS = ("t", "q", "v", "a", "lam", "base")
+TOP = json.loads((TESTS / "reference" / "heavy_top.json").read_text())
 
 
 def ball(height=1.0, speed=0.0):
@@ -36,9 +38,6 @@ def pendulum(angle=1.2):
     return mech
 
 
-PARTS = ("t", "q", "v", "a", "lam", "base")
-
-
 def swing():
     """A flexible body on a ball joint, pulled by a load and by a law in Python."""
     mech = Mechanism()
@@ -59,9 +58,6 @@ def wound_drive():
     mech.drive("motor", "main", lambda t: 50 * t + 0.3 * t**3)
     mech.rotational_spring("coil", "main", stiffness=2.0)
     return mech
-
-
-TOP = json.loads((TESTS / "reference" / "heavy_top.json").read_text())
 
 
 def heavy_top():

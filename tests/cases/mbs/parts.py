@@ -1,14 +1,14 @@
-"""What many mechanisms begin with: a body on a guide or a hinge, a rod held; wrong calls on one."""
+"""A body on a guide or a hinge, a rod held, a law that slips; wrong calls on a mechanism."""
 
 import numpy as np
 import pytest
 
 import rom
 from rom.components.cosserat import body, straight
-from rom.errors import ConfigError
 
 ORIGIN = (0.0, 0.0, 0.0)
 X, Y, Z = np.eye(3)
+RECORD = {"outputs": ["slip"], "energy": True}  # what the law writes beside its forces
 
 
 def on_guide(mech, name="mass", *, mass=1.0, at=ORIGIN, axis=X, base=ORIGIN, guide="guide", **more):
@@ -27,11 +27,11 @@ def on_hinge(mech, at, name="bob", *, mass=2.0, inertia, axis=Y, pivot=None, **m
     return part
 
 
-def on_axle(mech, name="wheel", *, inertia=(1, 1, 0.5), axle="axle", **more):
-    """Centre of a wheel in the origin that turns about z on the ground."""
+def on_axle(mech, name="wheel", *, inertia=(1, 1, 0.5), axle="axle", axis=Z, **more):
+    """Centre of a wheel in the origin, or at a place, that turns about an axis on the ground."""
     given = {"mass": 1.0, "at": ORIGIN} | more
     centre = mech.add_rigid(name, inertia=inertia, **given).marker(ORIGIN)
-    mech.revolute(axle, mech.ground.marker(given["at"]), centre, axis=Z)
+    mech.revolute(axle, mech.ground.marker(given["at"]), centre, axis=axis)
     return centre
 
 
@@ -59,28 +59,32 @@ def below(angle, length=1.0):
 
 
 def held_rod(n, *, joint="fixed", gravity=ORIGIN, on=None, axis=None, length=1.0, **section):
-    """A mechanism with an upright rod, its start joined to the ground or to a marker.
+    """A mechanism and an upright rod of n pieces in it, its start joined to the ground.
 
-    Args:
-        n: number of pieces.
-        joint: kind of the joint, or nothing.
-        gravity: of the mechanism.
-        on: (mechanism, marker) that it stands on instead.
-        axis: of the joint, where it has one.
-        length: of the rod [m].
-        section: as of `straight`.
-
-    Returns:
-        Mechanism and rod.
+    Or to (mechanism, marker) that it stands on, or to nothing; the section is that of `straight`.
     """
     mech, base = on or (rom.Mechanism(gravity=gravity), None)
     rod = mech.add_nonlinear("rod", body(straight(length, n, **section)))
     if joint:
-        about = {} if axis is None else {"axis": axis}
-        getattr(mech, joint)(
-            "hook", base or mech.ground.marker(ORIGIN), rod.marker("start"), **about
-        )
+        ends = base or mech.ground.marker(ORIGIN), rod.marker("start")
+        getattr(mech, joint)("hook", *ends, **({} if axis is None else {"axis": axis}))
     return mech, rod
+
+
+def slipping(t, parameters, motion, memory, out):
+    """A spring in a row with dry friction along x; it remembers where the friction stands."""
+    k, limit = parameters
+    x = motion.position[1, 0] - motion.position[0, 0]
+    pull = k * (x - memory[0])
+    slip = 0.0
+    if abs(pull) > limit:
+        slip = (abs(pull) - limit) / k * np.sign(pull)
+        pull = np.sign(pull) * limit
+        out.lost[0] = abs(pull * (motion.velocity[1, 0] - motion.velocity[0, 0]))
+    out.memory[0] = memory[0] + slip
+    out.force[0, 0], out.force[1, 0] = pull, -pull
+    out.energy[0] = 0.5 * pull**2 / k
+    out.outputs[0] = slip
 
 
 def boxed():
@@ -90,14 +94,10 @@ def boxed():
     return mech, mech.ground.marker(ORIGIN), box.marker(ORIGIN)
 
 
-def refused_on(build, rows, error=ConfigError):
+def refused_on(build, rows, error=rom.ConfigError):
     """A test that each call names its culprit, and leaves a mechanism as it was.
 
-    Args:
-        build: makes a mechanism, and what the calls take beside it.
-        rows: {what is wrong: (call, words of the message)}, with the class between where it is
-            another one.
-        error: that class.
+    Rows are {what is wrong: (call, words of the message)}, the class between where it is another.
     """
 
     @pytest.mark.parametrize("case", rows)

@@ -9,9 +9,7 @@ from cases.boxes import box, distort
 
 E_STEEL = 210e9
 STEEL = rom.Material(E=E_STEEL, nu=0.3, rho=7850.0)
-TIMBER = rom.Orthotropic(
-    E=(11e9, 0.9e9, 0.5e9), nu=(0.3, 0.4, 0.5), G=(0.1e9, 0.7e9, 0.6e9), rho=450.0
-)
+TIMBER = rom.Orthotropic((11e9, 0.9e9, 0.5e9), (0.3, 0.4, 0.5), (0.1e9, 0.7e9, 0.6e9), rho=450.0)
 # at the crown of half an arch the other half lets it move up and down alone
 SYMMETRIC = {"tip": "xyrxryrz"}
 

@@ -75,9 +75,8 @@ def assert_forces_are_the_gradient(packed, W, mesh, q):
 def by_position(packed, W, q, v, a=None, lam=NONE, step=1e-9):
     """Derivatives of the forces by the position: as the tangent has them, and by differences."""
     a = 0 * v if a is None else a
-    wanted = difference(
-        lambda x: forces_at(packed, W, shifted(packed, q, x), v, a, lam), v.size, step
-    )
+    at = lambda x: forces_at(packed, W, shifted(packed, q, x), v, a, lam)  # noqa: E731
+    wanted = difference(at, v.size, step)
     tangents_at(packed.system, W, q, v, a, lam, (0.0, 0.0, 1.0))
     return W.Kt.copy(), wanted
 

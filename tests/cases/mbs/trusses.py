@@ -10,6 +10,12 @@ from rom.body.nonlinear.quartic import Quartic
 # masses at +-REST on a spring [kg, m, N/m], and the hub that gives the body its other inertias
 MASS, REST, SPRING, HUB, RADIUS = 0.5, 0.4, 1200.0, 0.3, 0.1
 HUB_INERTIA = 2 * HUB * RADIUS**2  # about z
+# four masses and six bars; seen from the first, the second moves on a line, the third in a plane
+NODES = np.array([[0.0, 0, 0], [1.0, 0, 0], [0.3, 0.9, 0], [0.4, 0.3, 1.1]])
+MASSES = np.array([0.7, 0.4, 0.5, 0.3])
+BARS = [(0, 1, 40.0), (0, 2, 25.0), (0, 3, 60.0), (1, 2, 30.0), (1, 3, 20.0), (2, 3, 45.0)]
+FREE = [(1, 0), (2, 0), (2, 1), (3, 0), (3, 1), (3, 2)]  # (node, axis) of the coordinates
+START = np.array([0.15, -0.1, 0.2, 0.1, -0.2, 0.25])
 
 
 def dumbbell():
@@ -23,14 +29,6 @@ def dumbbell():
     none = np.zeros((3, 1))
     markers = {name: (x[k], phi[:, k].T, none) for k, name in ((0, "right"), (1, "left"))}
     return nodal_body(x, masses, phi, np.array([[4 * SPRING]]), markers=markers)
-
-
-# four masses and six bars; seen from the first, the second moves on a line, the third in a plane
-NODES = np.array([[0.0, 0, 0], [1.0, 0, 0], [0.3, 0.9, 0], [0.4, 0.3, 1.1]])
-MASSES = np.array([0.7, 0.4, 0.5, 0.3])
-BARS = [(0, 1, 40.0), (0, 2, 25.0), (0, 3, 60.0), (1, 2, 30.0), (1, 3, 20.0), (2, 3, 45.0)]
-FREE = [(1, 0), (2, 0), (2, 1), (3, 0), (3, 1), (3, 2)]  # (node, axis) of the coordinates
-START = np.array([0.15, -0.1, 0.2, 0.1, -0.2, 0.25])
 
 
 def truss(**options):

@@ -6,11 +6,11 @@ from numpy.testing import assert_allclose
 from scipy.interpolate import CubicSpline
 
 import rom
-from cases.mbs.mechanisms import crank_torque, random_body, slider_crank
+from cases.mbs.mechanisms import crank_torque, slider_crank
+from cases.mbs.motions import swing
 from cases.mbs.parts import X, Z, on_hinge, slender
 from cases.refusals import refuses
 from rom.errors import ConfigError, ModelError
-from rom.rotation import matrix
 
 G = 9.81
 SPEED = 50.0
@@ -52,24 +52,13 @@ def test_a_slider_crank_needs_the_torque_of_lagranges_equation():
     assert_allclose(sol.energy.drives, work, atol=0.1)  # trapezoids over 61 times
 
 
-def loaded_swing():
-    """A flexible body on a ball joint with a spring, a load and a law in Python."""
-    mech = rom.Mechanism()
-    shapes, omega = random_body(np.random.default_rng(3)), (1.0, 2.0, 3.0)
-    start = np.cross(shapes.markers["a"].point, omega)
-    body = mech.add_flexible("one", shapes, omega=omega, velocity=start)
-    hook = mech.ground.marker(mech.design_point(body.marker("a")))
-    mech.spherical("hook", hook, body.marker("a"))
-    mech.force("pull", body.marker("b"), lambda t: (0.3 * t, 0, np.sin(t)), frame="body")
-    mech.torque("twist", body.marker("b"), (0.2, -0.1, 0.3))
-    mech.user_force("drag", lambda t, a: (-0.1 * a.velocity, -0.05 * a.omega), body.marker("b"))
-    mech.spring_damper("coil", hook, body.marker("b"), stiffness=30.0, damping=0.2)
-    return mech
-
-
 def test_interface_loads_and_gravity_are_the_rate_of_momentum():
-    """Linear and angular, of a flexible body, with every kind of load."""
-    mech = loaded_swing()
+    mech = swing()
+    hook, end = mech.joints["hook"].markers[0], mech.part("one").marker("b")
+    mech.force("push", end, (0.1, 0, 0.2), frame="body")
+    mech.torque("twist", end, (0.2, -0.1, 0.3))
+    mech.user_force("resistance", lambda t, a: ((0, 0, 0), -0.05 * a.omega), end)
+    mech.spring_damper("coil", hook, end, stiffness=30.0, damping=0.2)
     sol = rom.simulate(mech, t_end=0.3, dt=2e-3, method="dop853")
     loads = sol.interface_loads("one")
     assert set(loads) == {"a", "b"}
@@ -77,8 +66,10 @@ def test_interface_loads_and_gravity_are_the_rate_of_momentum():
     arms = {place: sol.position("one", place) for place in loads}
     moment = sum(x[:, 3:] + np.cross(arms[place], x[:, :3]) for place, x in loads.items())
     linear, angular = (CubicSpline(sol.t, p)(sol.t, 1) for p in sol.momentum)
-    mass, g = mech.part("one").mass, np.array([0, 0, -G])
-    centre = np.array([_centre(sol, k) for k in range(sol.t.size)])
+    body, g = mech.part("one").flexible, np.array([0, 0, -G])
+    mass, first = body.mass, body.first_moment + sol.elastic("one") @ body.S.T
+    A = np.array([rom.rotation.matrix(p) for p in sol.orientation("one")])
+    centre = sol.position("one") + np.einsum("nab,nb->na", A, first) / mass
     inner = slice(5, -5)
     scale = np.abs(linear).max()
     assert_allclose((force + mass * g)[inner], linear[inner], atol=1e-6 * scale)
@@ -87,6 +78,10 @@ def test_interface_loads_and_gravity_are_the_rate_of_momentum():
     on_ground = sum(sol.interface_loads("ground").values())[:, :3]
     applied = loads["b"][:, :3] - _spring(sol)
     assert_allclose(on_ground, applied - force, atol=1e-9 * scale)
+    own = sol.interface_loads("one", frame="body")
+    for place, load in loads.items():
+        for part in (slice(0, 3), slice(3, 6)):
+            assert_allclose(np.einsum("nab,nb->na", A, own[place][:, part]), load[:, part])
 
 
 def _spring(sol):
@@ -97,21 +92,6 @@ def _spring(sol):
     e = at / length
     speed = (e * rate).sum(axis=1, keepdims=True)
     return -(30.0 * (length - sol.mechanism.springs["coil"].free_length) + 0.2 * speed) * e
-
-
-def _centre(sol, k):
-    body = sol.mechanism.part("one").flexible
-    first = body.first_moment + body.S @ sol.elastic("one")[k]
-    return sol.position("one")[k] + matrix(sol.orientation("one")[k]) @ first / body.mass
-
-
-def test_interface_loads_can_be_asked_for_in_the_axes_of_the_body():
-    sol = rom.simulate(loaded_swing(), t_end=0.05, dt=1e-2)
-    world, own = sol.interface_loads("one"), sol.interface_loads("one", frame="body")
-    A = np.array([matrix(p) for p in sol.orientation("one")])
-    for place, load in world.items():
-        for part in (slice(0, 3), slice(3, 6)):
-            assert_allclose(np.einsum("nab,nb->na", A, own[place][:, part]), load[:, part])
 
 
 def test_motions_that_nothing_prescribes_are_refused():

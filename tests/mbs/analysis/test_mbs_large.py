@@ -14,14 +14,12 @@ import rom
 from cases.beam import elastica
 from cases.long import few
 from cases.mbs.mechanisms import random_body, slider_crank
-from cases.mbs.parts import ORIGIN, X, Y, Z, held_rod, on_guide
+from cases.mbs.parts import ORIGIN, X, Y, Z, held_rod, on_axle, on_guide
 from cases.refusals import refuses
 from rom.errors import ConfigError, ModelError, ModesMissedError, RomWarning, SolverError
 from rom.mbs.analysis import campbell as campbell_module
-from rom.mbs.analysis import few_modes, local_equations
-from rom.mbs.analysis.tangent import best_reactions
+from rom.mbs.analysis import few_modes, local_equations, tangent
 from rom.mbs.integrate.consistent_start import initial_state
-from rom.mbs.mechanism import Mechanism
 
 SECTION = {"stretch": 1e5, "bend": (40.0, 60.0, 30.0), "mass": 1.0, "inertia": (1e-3, 2e-3, 3e-3)}
 
@@ -33,7 +31,7 @@ def rod_on(joint, n=20, gravity=(0, 0, -9.81), **more):
 def flexible_pair(seed=3):
     """Two bodies with modes of their own, hinged to each other and to the ground by springs."""
     rng = np.random.default_rng(seed)
-    mech = Mechanism(gravity=(0, 0, -1e-3))
+    mech = rom.Mechanism(gravity=(0, 0, -1e-3))
     last = mech.ground.marker((0, 0, 0))
     for name in ("one", "two"):
         part = mech.add_flexible(name, random_body(rng, 12, damped=False))
@@ -49,7 +47,7 @@ def links(n, *, slopes, ends=True, planar=False):
 
     A closed one of revolute joints has three constraints that repeat others.
     """
-    mech, l = Mechanism(gravity=(0, 0, -9.81)), 1.0 / n
+    mech, l = rom.Mechanism(gravity=(0, 0, -9.81)), 1.0 / n
     marks = {"a": (-l / 2, 0, 0), "b": (l / 2, 0, 0)}
     last, corner = mech.ground.marker((0, 0, 0)), np.zeros(3)
     for k, slope in enumerate(slopes):
@@ -200,13 +198,12 @@ def test_chains_that_begin_almost_on_their_heads_fall_to_where_they_hang(monkeyp
 def test_what_stands_on_its_head_falls_although_what_almost_hangs_weighs_more(many, monkeypatch):
     """Newton's correction, downhill as a whole, would raise the light one."""
     monkeypatch.setattr(local_equations, "MAX_DENSE", 0 if many else 10**6)
-    mech = Mechanism(gravity=(0, 0, -9.81))
+    mech = rom.Mechanism(gravity=(0, 0, -9.81))
     for name, mass, slope in (("heavy", 5.0, np.pi / 2 - 0.2), ("light", 0.1, -np.pi / 2 + 0.1)):
         turned = (np.cos(slope / 2), 0, np.sin(slope / 2), 0)
-        at = (np.cos(slope), 0, -np.sin(slope))
-        link = mech.add_rigid(name, mass=mass, inertia=(mass / 3,) * 3, orientation=turned, at=at,
-                              markers={"a": (-1, 0, 0)})  # fmt: skip
-        mech.revolute(f"pin of {name}", mech.ground.marker((0, 0, 0)), link.marker("a"), axis=Y)
+        solid = {"mass": mass, "inertia": (mass / 3,) * 3, "at": (np.cos(slope), 0, -np.sin(slope))}
+        link = mech.add_rigid(name, **solid, orientation=turned)
+        mech.revolute(f"pin of {name}", mech.ground.marker(ORIGIN), link.marker(-X), axis=Y)
     assert_allclose(rom.equilibrium(mech).q[2::7], -1.0, atol=1e-12)
 
 
@@ -217,7 +214,7 @@ def test_reactions_balance_best_as_those_of_dense_matrices():
         now = local_equations.instant(mech, 0.0, sparse=sparse)
         state = initial_state(now.packed)
         state = replace(state, a=0 * state.a, lam=np.cos(np.arange(state.lam.size)))
-        left, change = best_reactions(now, state)
+        left, change = tangent.best_reactions(now, state)
         changes.append(state.lam + change)
         assert np.abs(left).max() < 2.0
     assert np.sign(changes[1][0]) == np.sign(changes[0][0])  # weighed by masses, not by sizes
@@ -307,7 +304,7 @@ def test_a_mechanism_that_nothing_holds_is_refused_and_a_head_that_stands_is_sai
 
 def shaken_rod(viscosity=1e-3, n=12):
     """A rod on a table that a drive may shake along x."""
-    mech = Mechanism(gravity=(0, 0, -9.81))
+    mech = rom.Mechanism(gravity=(0, 0, -9.81))
     table = on_guide(mech, "table", mass=7.0)
     mech.drive("shaker", "guide", lambda t: 0.0 * t)
     _, rod = held_rod(n, on=(mech, table), **SECTION, viscosity=viscosity)
@@ -362,10 +359,8 @@ def test_an_infinite_response_of_a_large_mechanism_is_named(monkeypatch):
 
 
 def test_a_campbell_diagram_of_some_modes_is_that_of_all(monkeypatch):
-    """A rod on a hub that turns as a whole, gyroscopic and stiffened."""
-    mech = Mechanism(gravity=(0, 0, 0))
-    hub = mech.add_rigid("hub", mass=1.0, inertia=(1, 1, 1), at=ORIGIN).marker(ORIGIN)
-    mech.revolute("axle", mech.ground.marker(ORIGIN), hub, axis=X)
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    hub = on_axle(mech, "hub", inertia=(1, 1, 1), axis=X)
     held_rod(12, on=(mech, hub), **SECTION)
     speeds, found = (2.0, 8.0, 20.0), []
     for size in (200, 0):
@@ -379,7 +374,7 @@ def test_a_campbell_diagram_of_some_modes_is_that_of_all(monkeypatch):
 
 def test_a_row_of_cranks_swings_as_one_whose_joints_repeat_each_other():
     """One motion of 234 coordinates, 19 constraints that repeat others: a compound pendulum."""
-    n, mech, before = 20, Mechanism(gravity=(0, 0, -9.81)), None
+    n, mech, before = 20, rom.Mechanism(gravity=(0, 0, -9.81)), None
     solid = {"mass": 1.0, "inertia": (0.1, 0.1, 0.1)}
     for k in range(n):
         crank = mech.add_rigid(f"crank {k}", **solid, at=(k, 0, -0.5))

@@ -9,21 +9,21 @@ from scipy.special import ellipk
 
 import rom
 from cases.beam import stiffened_beam
-from cases.mbs.parts import ORIGIN, X, Y, Z, below, on_guide, on_hinge
+from cases.mbs.parts import ORIGIN, RECORD, X, Y, Z, below, on_guide, on_hinge, slipping
 from cases.refusals import refused, refuses
 from rom.errors import ConfigError, ModelError, SolverError
 
 STILL = {"gravity": (0, 0, 0)}
 EXACT = {"rtol": 1e-12, "atol": 1e-13, "method": "DOP853"}
+LENGTHS, MASSES, DAMPERS, TORQUE, SPEED = (1.0, 0.7), (1.0, 0.5), (0.6, 0.3), 1.5, 4.0
 
 
 def slider(stiffness=4.0, damping=0.4, at=0.0):
     """A mass of 1 kg on a guide along x, by default on a spring and a damper."""
     mech = rom.Mechanism(**STILL)
     mass = on_guide(mech, at=(at, 0, 0))
-    six = stiffness, 0, 0, 0, 0, 0
-    mech.bushing("spring", mech.ground.marker((at, 0, 0)), mass, stiffness=six,
-                 damping=(damping, 0, 0, 0, 0, 0))  # fmt: skip
+    base, along = mech.ground.marker((at, 0, 0)), np.eye(6)[0]
+    mech.bushing("spring", base, mass, stiffness=stiffness * along, damping=damping * along)
     return mech, mass
 
 
@@ -68,6 +68,7 @@ def test_a_linear_motion_closes_at_once():
     assert_allclose(on.position("mass")[:, 0], way(found), atol=1e-8)
     again = rom.periodic_motion(pushed(w), period=2 * np.pi / w, start=found)
     assert again.passes <= 2 and "stable" in repr(again)
+    assert rom.periodic_motion(pushed(w), period=2 * np.pi / w, settle=20).passes <= 4
 
 
 def test_a_motion_that_grows_is_found_and_called_unstable():
@@ -83,7 +84,6 @@ def test_a_motion_that_grows_is_found_and_called_unstable():
 
 
 def cycling(mu, at=2.0):
-    """Van der Pol's oscillator."""
     mech = rom.Mechanism(**STILL)
     mech.law("van der Pol", van_der_pol, on_guide(mech, at=(at, 0, 0)), parameters=(mu,))
     return mech
@@ -151,9 +151,6 @@ def test_kapitza_s_pendulum_stands_where_it_is_shaken_fast_enough():
         assert rom.periodic_motion(mech, period=2 * np.pi / w).stable == stable
 
 
-LENGTHS, MASSES, DAMPERS, TORQUE, SPEED = (1.0, 0.7), (1.0, 0.5), (0.6, 0.3), 1.5, 4.0
-
-
 def double_pendulum():
     """Two point masses, damped hinges, the first driven by a periodic moment."""
     mech = rom.Mechanism(gravity=(0, 0, -9.81))
@@ -210,8 +207,9 @@ def test_a_flexible_beam_answers_a_harmonic_force_as_its_frequency_response():
     part = mech.add_flexible("beam", beam)
     root, tip = (part.marker(name) for name in part.names)
     mech.fixed("clamp", mech.ground.marker(ORIGIN), root)
-    mech.bushing("damper", mech.ground.marker((1, 0, 0)), tip, stiffness=np.zeros(6),
-                 damping=(0, 0.5, 0, 0, 0, 0))  # fmt: skip
+    mech.bushing(
+        "damper", mech.ground.marker(X), tip, stiffness=np.zeros(6), damping=0.5 * np.eye(6)[1]
+    )
     w = 3.0
     H = rom.frequency_response(mech, None, [w / 2 / np.pi], force=tip, motion=tip).receptance
     F = 1e-3
@@ -226,25 +224,12 @@ def test_a_flexible_beam_answers_a_harmonic_force_as_its_frequency_response():
     assert found.stable and found.multipliers.size == 8
 
 
-def slipping(t, parameters, motion, memory, out):
-    """A spring in a row with dry friction; it remembers where the friction stands."""
-    k, limit = parameters
-    x = motion.position[0, 0]
-    pull = k * (x - memory[0])
-    slip = 0.0
-    if abs(pull) > limit:
-        slip = (abs(pull) - limit) / k * np.sign(pull)
-        pull = np.sign(pull) * limit
-    out.force[0, 0] = -pull
-    out.memory[0] = memory[0] + slip
-
-
 def test_what_a_law_remembers_repeats_too():
     """The loop of a spring in a row with dry friction takes up 4 R (x - R / k) per period."""
     w, k, limit = 1.7, 30.0, 0.3
     mech = pushed(w, stiffness=4.0, damping=0.1)
-    mech.law("slip", slipping, mech.parts["mass"].marker(ORIGIN), parameters=(k, limit),
-             memory=(0.0,))  # fmt: skip
+    ends = mech.ground.marker(ORIGIN), mech.parts["mass"].marker(ORIGIN)
+    mech.law("slip", slipping, *ends, parameters=(k, limit), memory=(0.0,), **RECORD)
     found = rom.periodic_motion(mech, period=2 * np.pi / w, steps=800)
     memory = found.solution.law("slip").memory[:, 0]
     assert memory[-1] == pytest.approx(memory[0], abs=1e-9) and np.ptp(memory) > 0.05
@@ -253,11 +238,6 @@ def test_what_a_law_remembers_repeats_too():
     lost = 0.1 * trapezoid(v**2, found.solution.t)
     loop = 4 * limit * (np.ptp(x) / 2 - limit / k)
     assert put_in == pytest.approx(lost + loop, rel=1e-4)
-
-
-def test_settling_brings_the_start_nearer():
-    found = rom.periodic_motion(pushed(1.3), period=2 * np.pi / 1.3, settle=20)
-    assert found.passes <= 4
 
 
 def asked(mech=None, **more):
@@ -310,7 +290,6 @@ def test_a_start_of_another_mechanism_is_refused():
 
 
 def test_where_no_motion_repeats_the_gap_is_told_and_the_last_attempt_kept():
-    """A mass that is pushed steadily without a spring runs away."""
     mech, mass = slider(stiffness=0.0, damping=0.0)
     mech.force("push", mass, (1.0, 0, 0))
     with pytest.raises(SolverError, match="no motion repeats with the period 1 s") as caught:

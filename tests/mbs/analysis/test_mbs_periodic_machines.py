@@ -9,16 +9,15 @@ from scipy.integrate import solve_ivp
 
 import rom
 from cases.beam import stiffened_beam
-from cases.mbs.parts import ORIGIN, Z
+from cases.mbs.parts import ORIGIN, Z, on_axle
 from cases.refusals import refused, refuses
 from rom.components.gear_mesh import Correction, GearPair
 from rom.errors import ModelError
-from rom.mbs import BallBearing
 
 EXACT = {"rtol": 1e-11, "atol": 1e-13, "method": "DOP853"}
 PAIR = GearPair((26, 40), 4e-3, 0.03, thinning=5e-5)
 TURNS = {"pinion axle": 2 * np.pi / 26, "gear axle": -2 * np.pi / 40}
-BALLS = BallBearing(9, 12.7e-3, 65e-3, clearance=20e-6)
+BALLS = rom.mbs.BallBearing(9, 12.7e-3, 65e-3, clearance=20e-6)
 
 
 def geared(speed, inertia=((1e-3, 1e-3, 2e-3), (5e-3, 5e-3, 9e-3)), torque=80.0, **more):
@@ -26,10 +25,8 @@ def geared(speed, inertia=((1e-3, 1e-3, 2e-3), (5e-3, 5e-3, 9e-3)), torque=80.0,
     mech, ends = rom.Mechanism(gravity=(0, 0, 0)), []
     spins = speed, -speed * 26 / 40
     for name, x, J, w in zip(("pinion", "gear"), (0.0, PAIR.distance), inertia, spins, strict=True):
-        part = mech.add_rigid(name, mass=1.0, inertia=J, at=(x, 0, 0), omega=(0, 0, w))
-        part = part.marker(ORIGIN)
-        mech.revolute(f"{name} axle", mech.ground.marker((x, 0, 0)), part, axis=Z)
-        ends.append(part)
+        moving = {"at": (x, 0, 0), "omega": (0, 0, w)}
+        ends.append(on_axle(mech, name, inertia=J, axle=f"{name} axle", **moving))
     flanks = Correction(relief=(1e-5, 1e-5), extent=(2e-3, 2e-3))
     mech.gear_mesh("mesh", *ends, axis=Z, pair=PAIR,
                    **{"stiffness": 1.3e10, "entry": 0.05, "damping": 5e-6, "conservative": False,
@@ -54,7 +51,6 @@ def deviation(motion, speed):
 
 
 def test_a_gear_pair_repeats_with_every_tooth():
-    """The same as a run over many teeth, and as the motion over three of them."""
     speed = 300.0
     one = meshing(speed)
     assert one.stable and one.gap < 1e-9
@@ -79,11 +75,10 @@ def test_multipliers_of_three_teeth_are_those_of_one_to_the_third_power(conserva
     A line that comes or goes at the end of a step between two motions that are compared bends
     their difference: with forces that follow their energy 2.5 % were off.
     """
-    speed, apart = 300.0, []
-    mech = geared(speed, conservative=conservative)
+    mech, apart = geared(300.0, conservative=conservative), []
+    given = {"period": 2 * np.pi / 26 / 300.0, "turns": TURNS, "settle": 10}
     for steps in (120, 240):
-        one = rom.periodic_motion(mech, period=2 * np.pi / 26 / speed, turns=TURNS, steps=steps,
-                                  settle=10)  # fmt: skip
+        one = rom.periodic_motion(mech, steps=steps, **given)
         three = rom.periodic_motion(mech, period=3 * one.period, steps=3 * steps, start=one,
                                     turns={k: 3 * x for k, x in TURNS.items()})  # fmt: skip
         apart.append(np.abs(three.multipliers / one.multipliers**3).max() - 1)
@@ -121,9 +116,8 @@ def test_a_flexible_body_takes_whole_turns_only():
 
 def test_a_wheel_beside_its_axis_is_refused():
     mech = rom.Mechanism(gravity=(0, 0, 0))
-    wheel = mech.add_rigid("wheel", mass=1.0, inertia=(1, 1, 2), at=(0.1, 0, 0),
-                           markers={"pin": (-0.1, 0, 0)})  # fmt: skip
-    mech.revolute("axle", mech.ground.marker(ORIGIN), wheel.marker("pin"), axis=Z)
+    wheel = mech.add_rigid("wheel", mass=1.0, inertia=(1, 1, 2), at=(0.1, 0, 0))
+    mech.revolute("axle", mech.ground.marker(ORIGIN), wheel.marker((-0.1, 0, 0)), axis=Z)
     mech.drive("speed", "axle", lambda t: t)
     with pytest.raises(ModelError, match="its mass centre is beside the axis"):
         rom.periodic_motion(mech, period=1.0, turns={"axle": 1.0})

@@ -15,9 +15,10 @@ from cases.mbs.parts import ORIGIN, X, Z, on_guide, on_hinge
 from cases.refusals import refused, refuses
 from rom.components.orbits.family import Family
 from rom.components.orbits.flow import Flow
-from rom.errors import ConfigError, ModelError, SolverError
 
 FORCE, DAMPING, SPRING, FREE = 0.3, 0.1, 2.5, 0.8
+ODD, N = np.array([1, 3, 5, 7, 9]), 256
+E = np.exp(2j * np.pi / N * np.outer(np.arange(N), ODD))
 
 
 def across(w):
@@ -36,10 +37,6 @@ def amplitude(solution):
     return np.abs(solution.position("mass")[:, 0]).max()
 
 
-ODD, N = np.array([1, 3, 5, 7, 9]), 256
-E = np.exp(2j * np.pi / N * np.outer(np.arange(N), ODD))
-
-
 def balance(u, phase):
     """Residual of harmonic balance for a frequency and a motion (6 coefficients, first at a phase).
 
@@ -53,17 +50,6 @@ def balance(u, phase):
     return np.ravel([r.real, r.imag], order="F")
 
 
-def balanced_curve():
-    """(k, 2) frequency and amplitude of the first harmonic by its phase (k,), which falls."""
-    phases, found = np.linspace(-0.2, -3.08, 300), []
-    u = np.r_[1.0, 0.6, np.zeros(2 * ODD.size - 2)]
-    for phase in phases:
-        u, _, _, message = fsolve(balance, u, (phase,), full_output=True, xtol=1e-13)
-        assert np.abs(balance(u, phase)).max() < 1e-10, message
-        found.append(u[:2])
-    return phases, np.array(found)
-
-
 @pytest.fixture(scope="module")
 def curve():
     return rom.periodic_path(across, (1.1, 1.9), period=lambda w: 2 * np.pi / w, steps=150)
@@ -71,20 +57,18 @@ def curve():
 
 @pytest.fixture(scope="module")
 def exact():
-    phases, found = balanced_curve()
+    """Frequency and amplitude of the first harmonic by less its phase, which falls."""
+    phases, found = np.linspace(-0.2, -3.08, 300), []
+    u = np.r_[1.0, 0.6, np.zeros(2 * ODD.size - 2)]
+    for phase in phases:
+        u, _, _, message = fsolve(balance, u, (phase,), full_output=True, xtol=1e-13)
+        assert np.abs(balance(u, phase)).max() < 1e-10, message
+        found.append(u[:2])
     return CubicSpline(-phases, found)
 
 
-def test_the_folds_of_a_hardening_spring_are_those_of_harmonic_balance(curve, exact):
-    folds = exact(exact.derivative().roots(extrapolate=False)[0])[:, 0]
-    folds = [w for w in folds if 1.1 < w < 1.9]
-    assert [x.kind for x in curve.critical] == ["fold", "fold"] and len(folds) == 2
-    assert_allclose([x.p for x in curve.critical], folds, rtol=2e-3)
-    for x in curve.critical:
-        assert np.abs(x.motion.multipliers[0] - 1.0) < 2e-2
-
-
-def test_all_motions_of_the_path_are_those_of_harmonic_balance(curve, exact):
+def test_motions_and_folds_of_a_hardening_spring_are_those_of_harmonic_balance(curve, exact):
+    """And the branch between the folds is unstable, and alone so."""
     for motion in curve.motions[::3]:
         s = motion.solution
         turning = np.exp(-2j * np.pi * s.t[:-1] / motion.period)
@@ -92,21 +76,22 @@ def test_all_motions_of_the_path_are_those_of_harmonic_balance(curve, exact):
         w, a = exact(-np.angle(c))
         assert 2 * np.pi / motion.period == pytest.approx(w, rel=3e-3)
         assert abs(c) == pytest.approx(a, rel=3e-3)
-
-
-def test_the_branch_between_the_folds_is_unstable_and_alone_so(curve):
+    folds = exact(exact.derivative().roots(extrapolate=False)[0])[:, 0]
+    folds = [w for w in folds if 1.1 < w < 1.9]
+    assert [x.kind for x in curve.critical] == ["fold", "fold"] and len(folds) == 2
+    assert_allclose([x.p for x in curve.critical], folds, rtol=2e-3)
+    for x in curve.critical:
+        assert np.abs(x.motion.multipliers[0] - 1.0) < 2e-2
     changes = np.flatnonzero(np.diff(curve.stable.astype(int)))
     assert len(changes) == 2 and curve.stable[0] and curve.stable[-1]
-    high, low = curve.p[changes]
-    assert_allclose([high, low], [x.p for x in curve.critical], rtol=0.02)
+    assert_allclose(curve.p[changes], [x.p for x in curve.critical], rtol=0.02)
     a = curve.of(amplitude)
     assert np.all(np.diff(a[changes[0] + 1 : changes[1]]) < 0.0)
 
 
 @pytest.mark.long
 def test_the_way_back_meets_the_same_folds(curve):
-    back = rom.periodic_path(across, (1.5, 1.1), period=lambda w: 2 * np.pi / w, steps=150,
-                             n=30)  # fmt: skip
+    back = rom.periodic_path(across, (1.5, 1.1), period=lambda w: 2 * np.pi / w, steps=150, n=30)
     assert back.critical[0].kind == "fold"
     assert back.critical[0].p == pytest.approx(curve.critical[1].p, rel=1e-5)
     assert back.p[0] == 1.5 and back.stable[0] and not back.stable[-1]
@@ -163,14 +148,12 @@ def self_excited(mu):
 
 
 def test_limit_cycles_are_followed_with_their_periods():
-    """Van der Pol's period grows with mu, as an independent integration has it."""
     path = rom.periodic_path(self_excited, (1.0, 1.5), guess=6.6, steps=100, step=0.5)
 
     def rates(t, y):
         return [y[1], path.p[-1] * (1 - y[0] ** 2) * y[1] - y[0]]
 
-    run = solve_ivp(rates, (0, 60), [2.0, 0.0], rtol=1e-10, atol=1e-12,
-                    events=lambda t, y: y[1])  # fmt: skip
+    run = solve_ivp(rates, (0, 60), [2.0, 0.0], rtol=1e-10, atol=1e-12, events=lambda t, y: y[1])
     period = run.t_events[0][-1] - run.t_events[0][-3]
     assert path.p[-1] == pytest.approx(1.5)
     assert path.period[-1] == pytest.approx(period, rel=2e-3)
@@ -227,7 +210,7 @@ def test_a_step_that_halves_or_doubles_an_unknown_period_is_refused(change):
     step[-1] = 0.1
     assert family.moved(at, step, 1.0).period == pytest.approx(1.1 * motion.period)
     step[-1] = change
-    refuses(SolverError, "period changes by too much", family.moved, at, step, 1.0)
+    refuses(rom.SolverError, "period changes by too much", family.moved, at, step, 1.0)
 
 
 def test_a_step_that_no_joint_allows_is_one_that_is_too_long(monkeypatch):
@@ -236,16 +219,15 @@ def test_a_step_that_no_joint_allows_is_one_that_is_too_long(monkeypatch):
     at = family.member(motion, 3.0)
 
     def torn(*_):
-        raise ModelError("joints contradict each other.")
+        raise rom.ModelError("joints contradict each other.")
 
     monkeypatch.setattr(Flow, "moved", torn)
-    with pytest.raises(SolverError, match="no start satisfies the joints: joints contradict"):
+    with pytest.raises(rom.SolverError, match="no start satisfies the joints: joints contradict"):
         family.moved(at, np.zeros(2 * family.scale.size + 1), 3.0)
 
 
 @pytest.mark.parametrize(("x", "which"), [(0.0, 0), (1.0, -1)])
 def test_which_of_two_stable_motions_is_followed_the_start_says(exact, x, which):
-    """After some periods from there; the smallest and the largest of harmonic balance."""
     w = 1.5
     begun = rom.simulate(across(w), t_end=1e-6, dt=1e-7).final
     q = begun.q + np.array([x, 0, 0, 0, 0, 0, 0])
@@ -261,7 +243,7 @@ def test_which_of_two_stable_motions_is_followed_the_start_says(exact, x, which)
 test_wrong_arguments_of_a_path_are_named = refused(
     (lambda: rom.periodic_path(across, (1.0, 1.0), period=6.0), "needs two values"),
     (lambda: rom.periodic_path(across, (1.0, 2.0), period=lambda w: -w), "period"),
-    error=ConfigError,
+    error=rom.ConfigError,
 )
 
 
@@ -272,7 +254,7 @@ def test_another_number_of_bodies_is_refused_and_what_was_found_is_kept():
             mech.add_rigid("more", mass=1.0, inertia=(1, 1, 1), at=(9, 0, 0))
         return mech
 
-    with pytest.raises(ConfigError, match=r"the bodies at 0.8") as caught:
+    with pytest.raises(rom.ConfigError, match=r"the bodies at 0.8") as caught:
         rom.periodic_path(build, (0.8, 1.2), period=lambda w: 2 * np.pi / w, steps=60)
     assert caught.value.solution.p.size >= 1
 
@@ -280,9 +262,9 @@ def test_another_number_of_bodies_is_refused_and_what_was_found_is_kept():
 def test_the_error_of_a_lost_path_holds_it():
     def build(w):
         if w > 1.0:
-            raise SolverError("no such mechanism.")
+            raise rom.SolverError("no such mechanism.")
         return across(w)
 
-    with pytest.raises(SolverError, match=r"lost behind 1: no such mechanism") as caught:
+    with pytest.raises(rom.SolverError, match=r"lost behind 1: no such mechanism") as caught:
         rom.periodic_path(build, (0.8, 1.2), period=lambda w: 2 * np.pi / w, steps=60)
     assert caught.value.solution.p[-1] <= 1.0

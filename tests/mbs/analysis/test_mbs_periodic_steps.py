@@ -11,12 +11,12 @@ import rom
 from benchmarks.units import as_mechanism
 from cases.gear_unit import rigid_unit
 from cases.mbs.parts import ORIGIN, Y, Z
-from rom.components.journal_bearing import iso_vg
 from rom.components.orbits import motion as search
 from rom.components.orbits.derivatives import by_differences, by_steps, confirmed, follows
 from rom.components.orbits.flow import Flow
 from rom.components.orbits.shooting import Return, Turns, turns_of
-from rom.errors import ModelError
+
+STIFFNESS, DAMPING, RATE = 4.0, 0.4, 1.3
 
 
 def swung(mechanism, period, steps=40, turns=None):
@@ -59,7 +59,6 @@ def test_links_that_tumble_in_space_have_the_derivatives_of_differences(more):
 
 
 def test_a_body_that_advances_is_turned_back_with_its_small_motions():
-    """A round disc on springs that has advanced by a part of a turn."""
     mech = rom.Mechanism(gravity=(0, 0, 0))
     disc = mech.add_rigid("disc", mass=1.0, inertia=(0.2, 0.2, 0.3), at=(0.05, 0.02, 0),
                           omega=(0.1, 0.2, 9.0))  # fmt: skip
@@ -70,17 +69,12 @@ def test_a_body_that_advances_is_turned_back_with_its_small_motions():
     assert_same(by_steps(found), by_differences(found), atol=2e-4)
 
 
-@pytest.fixture(scope="module")
-def geared():
-    """Films and teeth of a unit through a tooth, from its rest."""
+def test_films_and_teeth_have_the_derivatives_of_differences():
+    """Films are so thin that differences have to be finer; teeth leave out how forces turn."""
     unit = rigid_unit(speed=400.0)
     mech = as_mechanism(unit)
     flow = Flow(mech, 0.0, unit.mesh_period, 60, 0.8)
-    return Return.of(flow, Turns(), flow.begun(rom.equilibrium(mech)))
-
-
-def test_films_and_teeth_have_the_derivatives_of_differences(geared):
-    """Films are so thin that differences have to be finer; teeth leave out how forces turn."""
+    geared = Return.of(flow, Turns(), flow.begun(rom.equilibrium(mech)))
     wanted = by_differences(geared, 1e-8)
     assert_same(by_steps(geared), wanted, atol=0.03)
     found = np.sort(np.abs(confirmed(geared).multipliers))
@@ -89,7 +83,6 @@ def test_films_and_teeth_have_the_derivatives_of_differences(geared):
 
 
 def lagging(t, parameters, motion, memory, out):
-    """A force that follows the place by what it remembers."""
     out.memory[0] = memory[0] + 0.2 * (motion.position[0, 0] - memory[0])
     out.force[0, 0] = -3.0 * memory[0]
 
@@ -107,22 +100,16 @@ def test_what_steps_do_not_know_is_noticed():
     assert_allclose(confirmed(found).E, exact.E, atol=1e-5)
 
 
-def unit_with(**films):
-    """The unit with other films, and its rest."""
-    unit = rigid_unit(speed=500.0)
-    shafts = [
-        replace(rotor, bearings={k: replace(b, **films) for k, b in rotor.bearings.items()})
-        for rotor in (unit.pinion, unit.gear)
-    ]
-    return replace(unit, pinion=shafts[0], gear=shafts[1])
-
-
 def test_films_that_remember_are_refused_by_name():
     """Their filling goes around with the oil, over revolutions; heat takes longer still."""
     unit = rigid_unit(speed=500.0)
-    for mech in (as_mechanism(unit_with(cavitation="jfo")),
-                 as_mechanism(unit, oil=iso_vg(46), inlet=50.0)):  # fmt: skip
-        with pytest.raises(ModelError, match="'pinion low' remembers its oil, its heat"):
+    shafts = [
+        replace(x, bearings={k: replace(b, cavitation="jfo") for k, b in x.bearings.items()})
+        for x in (unit.pinion, unit.gear)
+    ]
+    filled = as_mechanism(replace(unit, pinion=shafts[0], gear=shafts[1]))
+    for mech in (filled, as_mechanism(unit, oil=rom.mbs.iso_vg(46), inlet=50.0)):
+        with pytest.raises(rom.ModelError, match="'pinion low' remembers its oil, its heat"):
             rom.periodic_motion(mech, period=unit.mesh_period, start=rom.equilibrium(mech))
 
 
@@ -132,7 +119,7 @@ def test_a_period_of_parts_of_teeth_is_refused(teeth):
     unit = rigid_unit(speed=600.0, torque=30.0)
     mech = as_mechanism(unit)
     begin = {"period": teeth * unit.mesh_period, "start": rom.equilibrium(mech)}
-    with pytest.raises(ModelError, match=r"does not repeat|has gone on by 1\.1 teeth"):
+    with pytest.raises(rom.ModelError, match=r"does not repeat|has gone on by 1\.1 teeth"):
         rom.periodic_motion(mech, **begin)
 
 
@@ -159,9 +146,8 @@ def test_derivatives_of_a_neighbour_count_in_the_coordinates_of_a_motion():
     found = swung(chain(2), 0.5)
     right = by_steps(found)
     kept, k = right.kept, found.chart.Zq.shape[1]
-    mixed = block_diag(
-        *(np.linalg.qr(np.random.default_rng(s).normal(size=(k, k)))[0] for s in (1, 2))
-    )
+    draws = (np.random.default_rng(seed).normal(size=(k, k)) for seed in (1, 2))
+    mixed = block_diag(*(np.linalg.qr(draw)[0] for draw in draws))
     other = replace(kept, Zq=kept.Zq @ mixed[:k, :k], Zv=kept.Zv @ mixed[k:, k:],
                     B=mixed.T @ kept.B @ mixed, E=mixed.T @ kept.E @ mixed)  # fmt: skip
     again = other.around(found)
@@ -174,15 +160,12 @@ def test_derivatives_of_a_neighbour_count_in_the_coordinates_of_a_motion():
     assert turned.around(found) is None
 
 
-STIFFNESS, DAMPING, RATE = 4.0, 0.4, 1.3
-
-
 def pushed(force=1.0):
     """A ball on springs in all directions, pushed along x."""
     mech = rom.Mechanism(gravity=(0, 0, 0))
     ball = mech.add_rigid("ball", mass=1.0, inertia=(1, 1, 1), at=ORIGIN).marker(ORIGIN)
-    mech.bushing("springs", mech.ground.marker(ORIGIN), ball, stiffness=6 * (STIFFNESS,),
-                 damping=6 * (DAMPING,))  # fmt: skip
+    base, every = mech.ground.marker(ORIGIN), np.ones(6)
+    mech.bushing("springs", base, ball, stiffness=STIFFNESS * every, damping=DAMPING * every)
     mech.force("push", ball, lambda t: (force * np.cos(RATE * t), 0, 0))
     return mech
 
@@ -219,7 +202,7 @@ def limited(longest):
     def move(found, y):
         lengths.append(float(np.abs(y).max()))
         if lengths[-1] > longest:
-            raise ModelError("too far.")
+            raise rom.ModelError("too far.")
         return moved_by(found, y)
 
     return lengths, move

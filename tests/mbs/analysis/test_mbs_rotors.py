@@ -11,7 +11,6 @@ import rom
 from cases.mbs.parts import ORIGIN, Y, Z
 from cases.refusals import refused
 from rom import rotation
-from rom.errors import ConfigError, RomWarning
 from rom.mbs.analysis.local_equations import instant
 from rom.mbs.analysis.rotors.spins import Spins
 
@@ -21,10 +20,10 @@ NACELLE_MASS, SUPPORT, LAG_SPRING = 60.0, 2.0e4, 40.0
 S, I = BLADE_MASS * ARM, BLADE_INERTIA + BLADE_MASS * ARM**2  # about the hinge
 
 
-def helicopter(n, speed, *, hinge, damping=0.0, azimuth=0.3):
-    """Blades hinged to a hub that a drive turns on a nacelle on springs, its axis upright.
+def turning(n, speed, *, hinge, damping=0.0, azimuth=0.3):
+    """Blades hinged to a hub that a drive turns on a nacelle on springs, and their steady motion.
 
-    Lag hinges are upright, too; flap hinges lie in the plane and across the blade.
+    The axis of the hub and lag hinges are upright; flap hinges lie in the plane across the blade.
     """
     mech = rom.Mechanism(gravity=ORIGIN)
     nacelle = mech.add_rigid("nacelle", mass=NACELLE_MASS, inertia=(5.0,) * 3, at=ORIGIN)
@@ -40,7 +39,7 @@ def helicopter(n, speed, *, hinge, damping=0.0, azimuth=0.3):
         if hinge == "lag":
             spring = {"stiffness": LAG_SPRING, "damping": damping}
             mech.rotational_spring(f"spring {k}", f"hinge {k}", **spring)
-    return mech
+    return mech, rom.equilibrium(mech, spin={"bearing": speed})
 
 
 def add_blade(mech, hub, k, azimuth, axis, root, centre=ORIGIN):
@@ -54,12 +53,6 @@ def add_blade(mech, hub, k, azimuth, axis, root, centre=ORIGIN):
 
 def blades(n):
     return [f"blade {k}" for k in range(n)]
-
-
-def turning(n, speed, **options):
-    """The mechanism and its steady motion."""
-    mech = helicopter(n, speed, **options)
-    return mech, rom.equilibrium(mech, spin={"bearing": speed})
 
 
 def coleman_feingold(n, speed, damping=0.0):
@@ -90,7 +83,6 @@ def test_ground_resonance_has_the_rates_of_coleman_and_feingold(n, speed, dampin
 
 
 def test_ground_resonance_grows_as_fast_in_time():
-    """Blades pushed a little in their plane: the nacelle sways more and more."""
     speed = 26.0
     mech, state = turning(3, speed, hinge="lag")
     growth = rom.linearize(mech, state, frame="world", blades=blades(3)).eigenvalues.real.max()
@@ -106,9 +98,8 @@ def test_ground_resonance_grows_as_fast_in_time():
 def test_flapping_blades_whirl_at_their_own_frequency_more_and_less_than_the_speed(n):
     """Hinged blades: alike nu W, backward (nu - 1) W, forward (nu + 1) W, +- in turn nu W."""
     speeds = np.array([6.0, 6.5, 7.0])
-    found = rom.mbs.campbell(
-        lambda w: turning(n, w, hinge="flap"), speeds, frame="world", blades=blades(n)
-    )
+    given = {"frame": "world", "blades": blades(n)}
+    found = rom.mbs.campbell(lambda w: turning(n, w, hinge="flap"), speeds, **given)
     nu = np.sqrt((BLADE_INERTIA - THIN + BLADE_MASS * ARM**2 + HUB_RADIUS * S) / I)
     sway = np.sqrt(SUPPORT / (NACELLE_MASS + HUB_MASS + n * BLADE_MASS))
     rates = {"alike": nu, "backward": nu - 1, "forward": nu + 1}
@@ -155,7 +146,6 @@ def test_a_rotor_turns_steadily_about_an_axis_that_its_support_leans(speed):
 
 
 def test_what_turns_as_a_whole_may_be_told_either_way():
-    """Lagging blades on a bearing of the ground: bodies, reactions and rates are the same."""
     mech = leaning(7.0)
     for name in ("support", "push"):
         del mech.elements[name]
@@ -171,8 +161,8 @@ def adrift():
     mech = leaning(1.0)
     disc = mech.add_rigid("disc", mass=1.0, inertia=(0.1,) * 3, at=(0, 0, 2))
     for name in ("nacelle", "hub"):
-        mech.bushing(f"to {name}", mech.parts[name].marker(ORIGIN), disc.marker(ORIGIN),
-                     stiffness=(1e3,) * 6)  # fmt: skip
+        ends = mech.parts[name].marker(ORIGIN), disc.marker(ORIGIN)
+        mech.bushing(f"to {name}", *ends, stiffness=(1e3,) * 6)
     return mech
 
 
@@ -195,7 +185,7 @@ test_spins_and_blades_that_are_none_are_refused = refused(
     (counted(["blade 0", "blade 1", "hub"]), "alike"),
     (counted([["blade 0", "hub"], ["blade 1"], ["blade 2"]]), "alike"),
     (counted([f"blade {k}" for k in (0, 2, 1, 3)]), "does not stand"),  # across, not around
-    error=ConfigError,
+    error=rom.ConfigError,
 )
 
 
@@ -229,6 +219,6 @@ def test_coefficients_that_stay_periodic_are_told():
     """On a support that is stiffer in one direction; blades counted together have constant ones."""
     mech = leaning(9.0)
     state = rom.equilibrium(mech, spin={"bearing": 9.0})
-    with pytest.warns(RomWarning, match="change with time"):
+    with pytest.warns(rom.RomWarning, match="change with time"):
         rom.linearize(mech, state)
     rom.linearize(mech, state, frame="world", blades=blades(3))

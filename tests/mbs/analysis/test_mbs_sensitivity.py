@@ -7,7 +7,7 @@ from scipy.optimize import brentq
 
 import rom
 from cases.mbs.parts import ORIGIN, X, Z, on_guide, on_hinge
-from rom.errors import ConfigError, ModelError
+from cases.refusals import refuses
 
 G = 9.81
 BAR = {"length": 1.0, "mass": 2.0, "lean": 0.3, "coil": 30.0}
@@ -75,7 +75,6 @@ def test_a_joint_that_moves_takes_the_forces_with_it():
 
 
 def test_reactions_have_derivatives_too():
-    """The hinge carries the weight."""
     weight = {"output": lambda mech, state: np.linalg.norm(state.lam[:3])}
     found = rom.equilibrium_sensitivity(bar, {"mass": 2.0, "coil": 30.0}, **weight)
     assert_allclose([found["mass"], found["coil"]], [G, 0], atol=1e-6)
@@ -137,11 +136,6 @@ def test_every_mode_of_several_has_its_own_derivative():
         assert_allclose(found[name].imag, slope, rtol=1e-6, atol=1e-9)
 
 
-def test_equal_eigenvalues_are_refused():
-    with pytest.raises(ModelError, match="two eigenvalues are equal"):
-        rom.frequency_sensitivity(lambda k: two_masses(k, 0.0), {"k": 100.0})
-
-
 def swung(length, gravity):
     """Angle of a pendulum released level, after 0.4 s; its inertia is 1.1 m l^2."""
     mech = rom.Mechanism(gravity=(0, -gravity, 0))
@@ -160,16 +154,17 @@ def test_the_end_of_a_motion_changes_as_its_equation_says():
 
 
 def test_wrong_questions_are_refused():
-    with pytest.raises(ConfigError, match=r"must be \{name: value\}"):
-        rom.motion_sensitivity(lambda: 0.0, {})
-    with pytest.raises(ConfigError, match="must have the same shape"):
-        rom.motion_sensitivity(lambda x: np.zeros(1 + (x > 1)), {"x": 1.0})
-    found = rom.motion_sensitivity(lambda x: x**3, {"x": 2.0})
+    motion, rest = rom.motion_sensitivity, rom.equilibrium_sensitivity
+    refuses(rom.ConfigError, r"must be \{name: value\}", motion, lambda: 0.0, {})
+    jumps = lambda x: np.zeros(1 + (x > 1))  # noqa: E731
+    refuses(rom.ConfigError, "must have the same shape", motion, jumps, {"x": 1.0})
+    found = motion(lambda x: x**3, {"x": 2.0})
     assert_allclose(found["x"], 12.0, rtol=1e-9)
-    with pytest.raises(ConfigError, match=r"no parameter 'y'.*'x'"):
-        found["y"]
-    with pytest.raises(ConfigError, match="bodies and joints must be the same"):
-        rom.equilibrium_sensitivity(_sometimes_two, {"x": 1.0}, lambda mech, state: 0.0)
+    refuses(rom.ConfigError, r"no parameter 'y'.*'x'", found.__getitem__, "y")
+    with pytest.raises(rom.ConfigError, match="bodies and joints must be the same"):
+        rest(_sometimes_two, {"x": 1.0}, lambda mech, state: 0.0)
+    with pytest.raises(rom.ModelError, match="two eigenvalues are equal"):
+        rom.frequency_sensitivity(lambda k: two_masses(k, 0.0), {"k": 100.0})
 
 
 def _sometimes_two(x):

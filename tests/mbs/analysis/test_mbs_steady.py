@@ -5,8 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
-from cases.mbs.parts import ORIGIN, X, Y, Z, on_guide
-from rom.errors import RomWarning
+from cases.mbs.parts import ORIGIN, X, Y, Z, on_axle, on_guide
 
 G, R, MASS = 9.81, 0.3, 2.0
 SHARES = {"disc": (0.25, 0.5), "hoop": (0.5, 1.0)}  # of m r^2: about a diameter, about the axle
@@ -79,8 +78,7 @@ def test_a_mass_on_a_driven_arm_softens_with_the_speed():
     """Counted in the axes of the arm: s^2 = W^2 - k/m."""
     speed, stiffness, mass = 7.0, 300.0, 2.0
     mech = rom.Mechanism(gravity=ORIGIN)
-    hub = mech.add_rigid("arm", mass=1.0, inertia=(0.1, 0.1, 0.1), at=ORIGIN).marker(ORIGIN)
-    mech.revolute("axle", mech.ground.marker(ORIGIN), hub, axis=Z)
+    hub = on_axle(mech, "arm", inertia=(0.1, 0.1, 0.1))
     mech.drive("motor", "axle", lambda t: speed * t)
     end = on_guide(mech, "box", mass=mass, at=0.5 * X, base=hub)
     mech.spring_damper("coil", hub, end, stiffness=stiffness)
@@ -96,5 +94,5 @@ def test_a_motion_that_is_not_steady_is_named():
     mech = wheel("disc", 2.0)
     mech.force("push", mech.part("wheel").marker((0, 0, 0)), (50.0, 0, 0))
     mech.torque("turn", mech.part("wheel").marker((0, 0, 0)), (3.0, 0, 0))
-    with pytest.warns(RomWarning, match="is not steady"):
+    with pytest.warns(rom.RomWarning, match="is not steady"):
         rom.steady_motion(mech)

@@ -12,13 +12,10 @@ from cases.mbs.mechanisms import prepared, tangents_at
 from cases.mbs.parts import ORIGIN, X, Y, Z, on_guide
 from cases.mbs.tangents import forces_at
 from cases.refusals import refused, refuses
-from rom.errors import ConfigError
-from rom.mbs.elements.contact.impact import Impact
-from rom.mbs.mechanism import Mechanism
 from rom.rotation import exp, matrix, multiply
 
 g, MASS, HEIGHT, MU, STIFFNESS = 9.81, 2.0, 0.05, 0.5, 2e4
-LAW = Impact(1e5, exponent=1.0, damping=30.0, mu=MU, tangential_stiffness=STIFFNESS,
+LAW = rom.mbs.Impact(1e5, exponent=1.0, damping=30.0, mu=MU, tangential_stiffness=STIFFNESS,
              tangential_damping=100.0)  # fmt: skip
 FEET = {f"foot {k}": (0.1 * np.cos(a), 0.1 * np.sin(a), -HEIGHT)
         for k, a in enumerate(2 * np.pi / 3 * np.arange(3))}  # fmt: skip
@@ -26,13 +23,13 @@ FEET = {f"foot {k}": (0.1 * np.cos(a), 0.1 * np.sin(a), -HEIGHT)
 
 def block(angle, law=LAW, speed=0.0):
     """A block on three points, on an incline down along x."""
-    mech = Mechanism(gravity=(g * np.sin(angle), 0, -g * np.cos(angle)))
+    mech = rom.Mechanism(gravity=(g * np.sin(angle), 0, -g * np.cos(angle)))
     sink = MASS * g * np.cos(angle) / 3 / law.stiffness
     part = mech.add_rigid("block", mass=MASS, inertia=(0.01,) * 3, at=(0, 0, HEIGHT + 1e-6 - sink),
                           velocity=(speed, 0, 0), markers=FEET)  # fmt: skip
     for foot in FEET:
-        mech.sphere_on_plane(foot, mech.ground.marker(ORIGIN), part.marker(foot), law, normal=Z,
-                             radius=1e-6)  # fmt: skip
+        ends = mech.ground.marker(ORIGIN), part.marker(foot)
+        mech.sphere_on_plane(foot, *ends, law, normal=Z, radius=1e-6)
     return mech
 
 
@@ -53,13 +50,6 @@ def test_a_block_below_the_angle_of_friction_rests(how):
     assert_allclose(sol.velocity("block")[-1], 0.0, atol=1e-6 if "rtol" in how else 1e-8)
 
 
-def block_moved(sol):
-    """The end of a run, with a speed at which it slides on."""
-    v = sol.v[-1].copy()
-    v[0] = 0.2
-    return replace(sol.final, v=v, memory=None)
-
-
 def test_equilibria_rest_where_springs_are_remembered():
     """From where bodies were added, the same place; from the end of a run, that end; pushed from
     there, further by force over stiffness."""
@@ -69,7 +59,8 @@ def test_equilibria_rest_where_springs_are_remembered():
     sol = rom.simulate(mech, t_end=0.6, dt=1e-3)
     for start in (None, sol.final):
         assert_allclose(rom.equilibrium(mech, state=start).q[:3], sol.q[-1, :3], atol=2e-9)
-    moved = rom.simulate(mech, state=block_moved(sol), t_end=1.2, dt=1e-3)
+    sliding = replace(sol.final, v=np.append(0.2, sol.v[-1][1:]), memory=None)
+    moved = rom.simulate(mech, state=sliding, t_end=1.2, dt=1e-3)
     assert_allclose([moved.energy.damping[0], moved.energy.balance[0]], 0.0, atol=1e-15)
     slid = moved.final
     again = rom.equilibrium(mech, state=slid)
@@ -103,7 +94,7 @@ def test_a_block_that_slides_sticks_after_its_braking_way():
 
 def sled(law, load, x=0.0):
     """A ball that slides along x, pressed on a plane by ``load``."""
-    mech = Mechanism(gravity=(0, 0, 0))
+    mech = rom.Mechanism(gravity=(0, 0, 0))
     sink = (load / law.stiffness) ** (1.0 / law.exponent)
     place = (x, 0, 0.01 - sink)
     made = on_guide(mech, "sled", mass=MASS, at=place, base=place, guide="way")
@@ -112,7 +103,6 @@ def sled(law, load, x=0.0):
 
 
 def dragged(path, law, load, **how):
-    """It, drawn to and fro by a given motion."""
     mech = sled(law, load)
     mech.drive("motor", "way", path)
     return rom.simulate(mech, **how)
@@ -154,9 +144,8 @@ def test_a_mass_on_a_spring_loses_two_limits_of_its_amplitude_each_half_swing():
     d = MU * load / K
     law = replace(LAW, tangential_stiffness=1e6, tangential_damping=300.0)
     mech = sled(law, load, x=5.5 * d)
-    pin = mech.ground.marker((-1.0, 0, mech.part("sled").at[2]))
-    mech.spring_damper("spring", pin, mech.part("sled").marker(ORIGIN), stiffness=K,
-                       free_length=1.0)  # fmt: skip
+    ends = mech.ground.marker((-1.0, 0, mech.part("sled").at[2])), mech.part("sled").marker(ORIGIN)
+    mech.spring_damper("spring", *ends, stiffness=K, free_length=1.0)
     sol = rom.simulate(mech, t_end=0.6, dt=5e-5)
     x, e = sol.position("sled")[:, 0] / d, sol.energy
     assert_allclose([x[0], x.min()], [5.5, -3.5], rtol=1e-3)
@@ -169,7 +158,7 @@ def test_a_mass_on_a_spring_loses_two_limits_of_its_amplitude_each_half_swing():
 def test_a_ball_rolls_down_an_incline_with_five_sevenths():
     """Friction is 2/7 m g sin(a), which stretches the spring; the touching point runs around."""
     m, radius, angle = 0.5, 0.05, 0.2
-    mech = Mechanism(gravity=(g * np.sin(angle), 0, -g * np.cos(angle)))
+    mech = rom.Mechanism(gravity=(g * np.sin(angle), 0, -g * np.cos(angle)))
     law = replace(LAW, tangential_damping=5.0)
     sink = m * g * np.cos(angle) / law.stiffness
     J = 0.4 * m * radius**2
@@ -190,7 +179,7 @@ def test_a_ball_rolls_down_an_incline_with_five_sevenths():
 
 def pair(law, shove=0.0, spin=(0.0, 0.0, 0.0)):
     """Two bars across each other, free in space, drawn together by a spring of no length."""
-    mech = Mechanism(gravity=(0, 0, 0))
+    mech = rom.Mechanism(gravity=(0, 0, 0))
     turning = np.array(spin)
     for name, z, v in (("one", 0.0, 0.0), ("two", 0.0199, shove)):
         mech.add_rigid(name, mass=0.1, inertia=(1e-5,) * 3, at=(0, 0, z), omega=turning,
@@ -231,7 +220,6 @@ def looked_at(packed, W, q, *, keep=True, v=None):
 
 
 def test_springs_turn_with_the_bodies():
-    """Both bodies turned together about the origin: the forces turn with them."""
     packed, W, q = remembered(pair(LAW))
     q[7:9] += 2e-6, -1e-6  # the second one aside
     force, clamp = looked_at(packed, W, q, keep=False)[6:9], 1e3 * (0.0199 - 0.01) / 0.0199
@@ -274,16 +262,14 @@ def test_the_limit_is_that_of_the_whole_pressure_while_bodies_meet():
     load, v = 10.0, 0.1
     packed, W, q = remembered(sled(LAW, load))
     q[0] += 1e-2
-    pressure, down = load * (1 + LAW.damping * v), -v * np.eye(6)[2]
-    assert_allclose(
-        looked_at(packed, W, q, v=down)[:3], [MU * pressure, 0.0, -pressure], rtol=1e-9, atol=1e-9
-    )
+    pressure, force = load * (1 + LAW.damping * v), looked_at(packed, W, q, v=-v * np.eye(6)[2])
+    assert_allclose(force[:3], [MU * pressure, 0.0, -pressure], rtol=1e-9, atol=1e-9)
 
 
 test_wrong_springs_are_refused = refused(
     (lambda: replace(LAW, tangential_stiffness=None), "tangential_damping = 100 needs a tang"),
     (lambda: replace(LAW, mu=0.0), "without friction holds nothing"),
-    error=ConfigError,
+    error=rom.ConfigError,
 )
 
 

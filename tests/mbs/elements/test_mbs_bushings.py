@@ -8,15 +8,14 @@ from numpy.testing import assert_allclose
 
 import rom
 from cases.mbs.mechanisms import prepared, two_soft
-from cases.mbs.parts import Z, boxed, refused_on
+from cases.mbs.parts import ORIGIN, Z, boxed, refused_on
 from cases.mbs.tangents import by_velocity, check_tangents, energy_gradient, forces_at, near
 from rom import rotation
 from rom.mbs.elements import bushings
-from rom.mbs.integrate.simulation import simulate
-from rom.mbs.mechanism import Mechanism
-from rom.mbs.results.audit import audit
 
 TILT = np.array([0.9, 0.1, -0.3, 0.3]) / np.linalg.norm([0.9, 0.1, -0.3, 0.3])
+NEAR_SIZE = 0.4  # rotations of the bushing stay well below half a turn
+DIAGONAL = (800.0, 450.0, 200.0, 10.8, 8.0, 2.8)
 
 
 def full_matrix(rng, size=30.0):
@@ -32,9 +31,6 @@ def bushed(rng, damped=False):
                  damping=full_matrix(rng, 2.0) if damped else None,
                  curves={"y": (x, 40 * x**3), "rx": (x, np.sinh(3 * x))})  # fmt: skip
     return mech
-
-
-NEAR_SIZE = 0.4  # rotations of the bushing stay well below half a turn
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -66,19 +62,15 @@ def box(mech, name="box", **more):
     return mech.add_rigid(name, **{"mass": 2.0, "inertia": (0.3, 0.5, 0.7), "at": (0, 0, 0)} | more)
 
 
-DIAGONAL = (800.0, 450.0, 200.0, 10.8, 8.0, 2.8)
-
-
 @pytest.mark.parametrize("k", range(6))
 def test_small_vibrations_have_the_frequency_of_a_spring(k):
     """Omega^2 = k / m along, k / J about each axis of the bushing."""
     omega = np.sqrt(DIAGONAL[k] / np.array([2.0, 2.0, 2.0, 0.3, 0.5, 0.7])[k])
-    mech = Mechanism(gravity=(0, 0, 0))
+    mech = rom.Mechanism(gravity=(0, 0, 0))
     kick = 1e-6 * np.eye(6)[k]
     part = box(mech, velocity=kick[:3], omega=kick[3:])
-    mech.bushing("rubber", mech.ground.marker((0, 0, 0)), part.marker((0, 0, 0)),
-                 stiffness=DIAGONAL)  # fmt: skip
-    sol = simulate(mech, t_end=1.0, dt=0.01, method="dop853", rtol=1e-10, atol=1e-18)
+    mech.bushing("rubber", mech.ground.marker(ORIGIN), part.marker(ORIGIN), stiffness=DIAGONAL)
+    sol = rom.simulate(mech, t_end=1.0, dt=0.01, method="dop853", rtol=1e-10, atol=1e-18)
     wanted = kick[k] * np.cos(omega * sol.t)
     assert_allclose(sol.v[:, k], wanted, atol=1e-5 * kick[k])
 
@@ -86,11 +78,11 @@ def test_small_vibrations_have_the_frequency_of_a_spring(k):
 def alike(joint, t_end, ways, **start):
     """Motions of a box on a joint along z, to which each way adds something of its own."""
     for add in ways:
-        mech = Mechanism(gravity=(0, 0, -9.81))
+        mech = rom.Mechanism(gravity=(0, 0, -9.81))
         ends = mech.ground.marker((0, 0, 0)), box(mech, **start).marker((0, 0, 0))
         getattr(mech, joint)("joint", *ends, axis=Z)
         add(mech, *ends)
-        yield simulate(mech, t_end=t_end, dt=1e-3)
+        yield rom.simulate(mech, t_end=t_end, dt=1e-3)
 
 
 def test_a_large_turn_about_one_axis_is_that_of_a_torsion_spring():
@@ -117,14 +109,14 @@ def test_a_load_at_rest_is_carried_by_the_full_matrix():
     """Small deflections K^-1 F under a force and a torque, after the damper has done its work."""
     rng = np.random.default_rng(2)
     K = full_matrix(rng, 3e5)
-    mech = Mechanism(gravity=(0, 0, 0))
+    mech = rom.Mechanism(gravity=(0, 0, 0))
     part = box(mech)
     o = part.marker((0, 0, 0))
     mech.bushing("rubber", mech.ground.marker((0, 0, 0)), o, stiffness=K, damping=1e-2 * K)
     load = np.array([1.0, -2.0, 0.5, 0.3, 0.2, -0.4])
     mech.force("force", o, load[:3])
     mech.torque("torque", o, load[3:])
-    q = simulate(mech, t_end=2.0, dt=1e-2, rho_inf=0.3).q[-1]
+    q = rom.simulate(mech, t_end=2.0, dt=1e-2, rho_inf=0.3).q[-1]
     assert_allclose(np.r_[q[:3], 2 * q[4:7]], np.linalg.solve(K, load), rtol=1e-4, atol=1e-10)
 
 
@@ -132,17 +124,17 @@ def test_a_curve_of_points_on_a_line_is_a_spring_and_a_bent_one_keeps_its_energy
     x = np.array([-0.2, -0.05, 0.1, 0.2])
     runs = {}
     for kind in ("spring", "line", "bent"):
-        mech = Mechanism(gravity=(0, 0, 0))
+        mech = rom.Mechanism(gravity=(0, 0, 0))
         part = box(mech, velocity=(3.0, 0, 0))
         force = 200 * x + (4e4 * x**3 if kind == "bent" else 0)
         mech.bushing("rubber", mech.ground.marker((0, 0, 0)), part.marker((0, 0, 0)),
                      stiffness=(200.0 * (kind == "spring"), 0, 0, 0, 0, 0),
                      curves=None if kind == "spring" else {"x": (x, force)})  # fmt: skip
-        runs[kind] = simulate(mech, t_end=2.0, dt=1e-3, rho_inf=1.0)
+        runs[kind] = rom.simulate(mech, t_end=2.0, dt=1e-3, rho_inf=1.0)
     assert np.abs(runs["spring"].q[:, 0]).max() > 0.25  # beyond the points
     assert_allclose(runs["line"].q, runs["spring"].q, atol=1e-10)
     assert np.abs(runs["bent"].q - runs["spring"].q).max() > 0.05
-    assert audit(runs["bent"]).ok, audit(runs["bent"])
+    assert rom.audit(runs["bent"]).ok, rom.audit(runs["bent"])
     assert np.abs(runs["bent"].energy.balance).max() < 3e-4 * 9.0
 
 

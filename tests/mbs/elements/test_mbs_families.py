@@ -12,11 +12,8 @@ from cases.long import few
 from cases.mbs.mechanisms import simulate_quietly
 from cases.paths import ROOT
 from rom.mbs.elements.family import Family, integers, rows_of
+from rom.mbs.kernels import constraints, element_calls, tables
 from rom.mbs.kernels.algebra import row, sub
-from rom.mbs.kernels.constraints import pair_stiffness, place_relative
-from rom.mbs.kernels.element_calls import energy, residuals, tangents
-from rom.mbs.kernels.tables import Array2, Index1, Table, table
-from rom.mbs.parts.bodies import Marker
 
 K, C, MASS, LENGTH = 200.0, 3.0, 2.0, 0.3
 
@@ -25,19 +22,17 @@ K, C, MASS, LENGTH = 200.0, 3.0, 2.0, 0.3
 class Cord:
     """Pulls one marker to another in all directions, with a force proportional to the gap."""
 
-    i: Marker
-    j: Marker
+    i: rom.mbs.Marker
+    j: rom.mbs.Marker
     stiffness: float
     damping: float
 
 
-@table
-class Cords(Table):
-    """All of them."""
-
-    i: Index1
-    j: Index1
-    law: Array2
+@tables.table
+class Cords(tables.Table):
+    i: tables.Index1
+    j: tables.Index1
+    law: tables.Array2
 
 
 def pack(cords, places):
@@ -48,7 +43,7 @@ def pack(cords, places):
     )
 
 
-@residuals.of(Cords)
+@element_calls.residuals.of(Cords)
 def cord_wrenches(_s, W, cords, _q, _v, _lam):
     for k in range(cords.i.size):
         i, j = cords.i[k], cords.j[k]
@@ -60,7 +55,7 @@ def cord_wrenches(_s, W, cords, _q, _v, _lam):
             W.power[2] += cords.law[k, 1] * slide[p] ** 2
 
 
-@tangents.of(Cords)
+@element_calls.tangents.of(Cords)
 def cord_tangents(s, W, cords, _lam, ck, cc):
     for k in range(cords.i.size):
         i, j = cords.i[k], cords.j[k]
@@ -68,11 +63,11 @@ def cord_tangents(s, W, cords, _lam, ck, cc):
             W.Q[:] = 0.0
             for p in range(3):
                 e = (1.0 if p == 0 else 0.0, 1.0 if p == 1 else 0.0, 1.0 if p == 2 else 0.0)
-                place_relative(W.Q, 0, p, c, e)
-            pair_stiffness(s, W, i, j, S)
+                constraints.place_relative(W.Q, 0, p, c, e)
+            constraints.pair_stiffness(s, W, i, j, S)
 
 
-@energy.of(Cords)
+@element_calls.energy.of(Cords)
 def cord_energy(_s, W, cords, _q, _v):
     total = 0.0
     for k in range(cords.i.size):
@@ -195,9 +190,8 @@ def test_it_moves_inside_an_fmu(name, tmp_path, monkeypatch):
     fmpy = pytest.importorskip("fmpy", reason="fmpy is not installed")
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT), str(ROOT / "tests")]))
     script = tmp_path / "bob.py"
-    script.write_text(
-        f"from test_mbs_families import bob, {name}\ndef mechanism():\n    return bob({name})\n"
-    )
+    text = "from test_mbs_families import bob, {0}\ndef mechanism():\n    return bob({0})\n"
+    script.write_text(text.format(name))
     archive = rom.write_fmu(script, tmp_path / "bob.fmu", outputs=["bob.c"], dt=1e-3,
                             files=[__file__])  # fmt: skip
     output = [f"bob.c.position[{k}]" for k in (1, 2, 3)]

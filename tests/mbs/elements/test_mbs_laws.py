@@ -13,37 +13,26 @@ from scipy.integrate import trapezoid
 
 import rom
 from cases.mbs.mechanisms import prepared, random_body, random_pose, random_state, simulate_quietly
-from cases.mbs.parts import on_guide
+from cases.mbs.parts import RECORD, on_guide, slipping
 from cases.mbs.tangents import check_tangents
 from cases.refusals import refused, refuses
 from rom.errors import ConfigError, SolverError
 from rom.mbs.elements import laws
 
 STIFFNESS, YIELD, REACH = 1000.0, 20.0, 0.05
+STARTS = {
+    "equilibrium": rom.equilibrium,
+    "motion": lambda mech: simulate_quietly(mech, t_end=0.1, dt=1e-3),
+    "chosen steps": lambda mech: simulate_quietly(mech, t_end=0.1, dt=None),
+}
+ENERGY, LOSSES, OWN_MEMORY, BEYOND, COUNTS, NAN = range(1, 7)
 
 
-def slipping(t, parameters, motion, memory, out):
-    """A spring in a row with dry friction along x; it remembers where the friction stands."""
-    k, limit = parameters
-    x = motion.position[1, 0] - motion.position[0, 0]
-    pull = k * (x - memory[0])
-    slip = 0.0
-    if abs(pull) > limit:
-        slip = (abs(pull) - limit) / k * np.sign(pull)
-        pull = np.sign(pull) * limit
-        out.lost[0] = abs(pull * (motion.velocity[1, 0] - motion.velocity[0, 0]))
-    out.memory[0] = memory[0] + slip
-    out.force[0, 0], out.force[1, 0] = pull, -pull
-    out.energy[0] = 0.5 * pull**2 / k
-    out.outputs[0] = slip
-
-
-def shaken(*, compiled=True, law=slipping, cycles=None, **options):
-    """A block that is driven to and fro against the law."""
+def shaken(*, compiled=True, law=slipping, **options):
     mech = rom.Mechanism(gravity=(0, 0, 0))
     ground, end = mech.ground.marker((0, 0, 0)), on_guide(mech, "block")
     mech.drive("shake", "guide", lambda t: REACH * np.sin(2 * np.pi * t))
-    more = {"parameters": (STIFFNESS, YIELD), "memory": [0.0], "outputs": ["slip"], "energy": True}
+    more = {"parameters": (STIFFNESS, YIELD), "memory": [0.0]} | RECORD
     mech.law("damper", law, ground, end, compiled=compiled, **more | options)
     return mech
 
@@ -93,13 +82,6 @@ def test_memory_goes_on_where_a_run_was_cut(compiled, dt):
         assert rest.final.base.tolist() == whole.final.base.tolist()
         np.testing.assert_array_equal(rest.q[-1], whole.q[-1])
     assert slips[0] == pytest.approx(slips[1], abs=1e-4) and abs(slips[0]) > 0.01
-
-
-def test_a_state_without_the_memory_is_refused():
-    bare = shaken(memory=(), outputs=(), law=lambda t, p, motion, memory, out: None)
-    state = simulate_quietly(bare, t_end=0.1, dt=1e-3).final
-    with pytest.raises(ConfigError, match="0 followed joint coordinates and remembered numbers"):
-        simulate_quietly(shaken(), t_end=0.2, dt=1e-3, state=state)
 
 
 C_LAW = r"""
@@ -184,7 +166,6 @@ def twisted(t, parameters, motion, memory, out):
 
 @pytest.mark.parametrize("moving", [1.0, 0.0])
 def test_differences_are_the_tangents_of_any_law(moving):
-    """Between a rigid body, a flexible one and the ground."""
     rng = np.random.default_rng(5)
     mech = rom.Mechanism(gravity=(0, 0, -9.81))
     soft = mech.add_flexible("soft", random_body(rng), **random_pose(rng))
@@ -215,13 +196,6 @@ def test_a_law_that_stops_to_be_a_number_is_named_and_the_motion_kept(compiled, 
     assert told.value.solution.t[-1] >= (0.01 if method == "dop853" else 0.04)
 
 
-STARTS = {
-    "equilibrium": rom.equilibrium,
-    "motion": lambda mech: simulate_quietly(mech, t_end=0.1, dt=1e-3),
-    "chosen steps": lambda mech: simulate_quietly(mech, t_end=0.1, dt=None),
-}
-
-
 @pytest.mark.parametrize("start", STARTS)
 def test_a_law_that_never_is_a_number_is_named_at_once(start):
     mech = hung(lambda m, a, b: m.law("hole", spoiled, a, b, parameters=[NAN], compiled=True))
@@ -236,10 +210,7 @@ REFUSED = [
     (lambda m, a, b: m.law("l", late_nan), "needs a marker"),
     (lambda m, a, b: m.law("l", None, a), "function = None of 'l' must be a function"),
     (lambda m, a, b: m.law("l", late_nan, a, tangents=3), "tangents = 3 of 'l' must be a function"),
-    (
-        lambda m, a, b: m.law("l", unknown_name, a, compiled=True),
-        "law 'l' cannot be compiled: NameError: .*'nobody' is not defined",
-    ),
+    (lambda m, a, b: m.law("l", unknown_name, a, compiled=True), "compiled: NameError: .*'nobody'"),
     (lambda m, a, b: m.law("l", late_nan, rom.mbs.Marker("nobody", (0.0, 0.0, 0.0))), "nobody"),
     (lambda m, a, b: m.add("l", 3, laws.LAWS_FAMILY), "element = 3 of 'l' must be of type Law"),
 ]
@@ -273,9 +244,6 @@ def pulling_slopes(t, parameters, motion, memory, K, C):
 def wrong_slopes(t, parameters, motion, memory, K, C):
     pulling_slopes(t, parameters, motion, memory, K, C)
     K[7, 1] *= 1.001
-
-
-ENERGY, LOSSES, OWN_MEMORY, BEYOND, COUNTS, NAN = range(1, 7)
 
 
 def spoiled(t, parameters, motion, memory, out):

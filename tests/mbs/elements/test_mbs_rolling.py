@@ -16,12 +16,11 @@ from cases.refusals import refused, refuses
 from rom.components.rolling_bearing.bearings import ROLLING_BEARINGS_FAMILY
 from rom.components.rolling_bearing.races import elliptic_stiffness
 from rom.errors import ConfigError, ModelError
-from rom.mbs import BallBearing, RollerBearing
 
 ORIGIN, Z = (0, 0, 0), (0, 0, 1)
-BALLS = BallBearing(9, 12.7e-3, 65e-3, clearance=15e-6)  # a 6209
-ANGULAR = BallBearing(13, 12.7e-3, 65e-3, contact_angle=np.radians(25))
-ROLLERS = RollerBearing(14, 10e-3, 10e-3, 65e-3, clearance=-4e-6)
+BALLS = rom.mbs.BallBearing(9, 12.7e-3, 65e-3, clearance=15e-6)  # a 6209
+ANGULAR = rom.mbs.BallBearing(13, 12.7e-3, 65e-3, contact_angle=np.radians(25))
+ROLLERS = rom.mbs.RollerBearing(14, 10e-3, 10e-3, 65e-3, clearance=-4e-6)
 
 
 def test_a_ball_on_a_plane_is_as_stiff_as_hertz_says():
@@ -53,7 +52,7 @@ def test_an_ellipse_of_contact_follows_from_the_potential_of_its_pressure():
 
 def test_curvatures_of_a_6209_are_those_of_harris():
     """Harris: curvature sums 0.202 and 0.138 per mm, deflections 0.602 and 0.658."""
-    steel = BallBearing(9, 12.7e-3, 65e-3, E=206.9e9)
+    steel = rom.mbs.BallBearing(9, 12.7e-3, 65e-3, E=206.9e9)
     for race, (total, deflection) in enumerate(((0.202, 0.602), (0.138, 0.658))):
         k = 2.15e5 * total**-0.5 * deflection**-1.5 * 1e3**1.5
         assert steel.race_stiffness(race) == pytest.approx(k, rel=1e-2)
@@ -63,7 +62,6 @@ def test_curvatures_of_a_6209_are_those_of_harris():
 
 
 def bearing(kind, loads=None, axis=Z, **more):
-    """A shaft in a bearing on the ground."""
     mech = rom.Mechanism(gravity=(0, 0, 0))
     shaft = mech.add_rigid("shaft", mass=1.0, inertia=(1e-2,) * 3, at=ORIGIN)
     mech.rolling_bearing("bearing", shaft.marker(ORIGIN), mech.ground.marker(ORIGIN), axis=axis,
@@ -116,8 +114,8 @@ def test_tangents_are_derivatives_but_for_the_turning_of_the_bearing(kind):
 @pytest.mark.parametrize(("kind", "number"), [("balls", 4.37), ("rollers", 4.08)])
 def test_the_largest_load_is_that_of_stribeck(kind, number):
     """Q_max = 4.37 F / Z of balls, 4.08 F / Z of rollers without play: many of them."""
-    made = (BallBearing(90, 2e-3, 65e-3, E=206e9) if kind == "balls"
-            else RollerBearing(90, 2e-3, 5e-3, 65e-3))  # fmt: skip
+    made = (rom.mbs.BallBearing(90, 2e-3, 65e-3, E=206e9) if kind == "balls"
+            else rom.mbs.RollerBearing(90, 2e-3, 5e-3, 65e-3))  # fmt: skip
     n = made.exponent
     whole = np.pi / quad(lambda x: np.cos(x) ** (n + 1), 0, np.pi / 2)[0]
     assert whole == pytest.approx(number, abs=5e-3)
@@ -251,7 +249,7 @@ def test_rings_that_are_not_at_one_place_are_refused():
 @pytest.mark.parametrize("phase", [0.0, 0.2, np.pi / 8])
 def test_eight_balls_bear_a_load_one_by_one(phase):
     """Under a load along y, from which the phase counts for a bearing about z."""
-    b = BallBearing(8, 12.7e-3, 65e-3, clearance=5e-6)
+    b = rom.mbs.BallBearing(8, 12.7e-3, 65e-3, clearance=5e-6)
     angles, A = phase + 2 * np.pi * np.arange(8) / 8, b.curvature_distance
 
     def loads(move):

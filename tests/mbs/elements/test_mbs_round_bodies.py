@@ -13,11 +13,11 @@ from cases.mbs.tubes import tube
 from cases.refusals import refused
 from rom.body.damping import damped
 from rom.components.gear_mesh import GearPair
-from rom.errors import ConfigError, ModelError
 from rom.rotation import matrix
 
 Z, ORIGIN = (0, 0, 1), (0, 0, 0)
 MASS, ACROSS, ABOUT = 3.0, 0.03, 0.05
+ECCENTRICITY, STIFF = 2e-4, 1.5e5
 
 
 def rotor(way, speed, **more):
@@ -177,11 +177,8 @@ test_what_is_not_round_is_refused = refused(
         lambda: spun_shaft(first_moment=shaft().first_moment + 5e-4 * shaft().mass * np.eye(3)[0]),
         "its mass centre lies 0.0005 m beside",
     ),
-    error=ModelError,
+    error=rom.ModelError,
 )
-
-
-ECCENTRICITY, STIFF = 2e-4, 1.5e5
 
 
 @pytest.mark.parametrize("ratio", [0.6, 1.4])
@@ -235,7 +232,7 @@ def test_what_holds_a_spinning_body_beside_its_axis_is_refused(how):
         if not beside:
             HOLDS[how](mech, *ends)
             continue
-        with pytest.raises(ModelError, match=r"0.0002 m beside the axis.*0.0006 kg m") as error:
+        with pytest.raises(rom.ModelError, match=r"0.0002 m beside the axis.*0.0006 kg m") as error:
             HOLDS[how](mech, *ends)
         assert "1.5 N at this speed" in error.value.hint
     mech.force("belt", rotor.marker((0.1, 0, 0)), (0, 1, 0))  # a place in space
@@ -247,7 +244,7 @@ def test_surfaces_of_spinning_bodies_that_slide_or_roll_are_refused(what):
     mech = rom.Mechanism()
     ball = mech.add_rigid("ball", mass=1, inertia=(1e-3,) * 3, at=(0, 0, 0.05), spin=(0, 9.0, 0))
     ends = mech.ground.marker(ORIGIN), ball.marker(ORIGIN)
-    with pytest.raises(ConfigError, match="'ball', which spins in its frame"):
+    with pytest.raises(rom.ConfigError, match="'ball', which spins in its frame"):
         if what == "rolling":
             mech.rolling("touch", *ends, normal=Z, radius=0.05)
         else:

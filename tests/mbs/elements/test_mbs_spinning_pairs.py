@@ -5,8 +5,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
+from cases.mbs.parts import on_axle
+from cases.refusals import refuses
 from rom.components.gear_mesh import Correction, GearPair
-from rom.errors import ConfigError, RomError
 from rom.mbs import Groove, JournalBearing
 from rom.mbs.analysis.equilibrium import _Search
 
@@ -38,7 +39,6 @@ def geared(way, speed=SPEED, torque=60.0):
 
 
 def test_teeth_of_spinning_wheels_bear_as_those_of_turning_frames():
-    """Through pitch errors and friction that reverses; both balances of energy close."""
     found = []
     for way in ("omega", "spin"):
         sol = rom.simulate(geared(way), t_end=0.012, dt=4e-6, save_every=20)
@@ -54,19 +54,19 @@ def test_speeds_that_teeth_cannot_have_are_named():
     mech = rom.Mechanism()
     ends = [mech.add_rigid(name, mass=1, inertia=(1, 1, 1), at=(x, 0, 0), spin=(0, 0, speed))
             for name, x, speed in (("a", 0, 30.0), ("b", PAIR.distance, 19.5))]  # fmt: skip
-    with pytest.raises(ConfigError, match=r"teeth 26 and 40 need 30 and -19.5"):
-        mech.gear_mesh("mesh", *(end.marker(ORIGIN) for end in ends), axis=Z, pair=PAIR,
-                       stiffness=1e10)  # fmt: skip
-    balls, rings = rom.mbs.BallBearing(9, 0.01, 0.05), (ends[0].marker(ORIGIN), mech.ground)
-    with pytest.raises(ConfigError, match="both must be one"):
-        mech.rolling_bearing("bearing", rings[0], rings[1].marker(ORIGIN), axis=(1, 0, 0),
-                             bearing=balls)  # fmt: skip
+    a, b = (end.marker(ORIGIN) for end in ends)
+    mesh = {"axis": Z, "pair": PAIR, "stiffness": 1e10}
+    words = r"teeth 26 and 40 need 30 and -19.5"
+    refuses(rom.ConfigError, words, mech.gear_mesh, "mesh", a, b, **mesh)
+    balls = {"axis": (1, 0, 0), "bearing": rom.mbs.BallBearing(9, 0.01, 0.05)}
+    rings = a, mech.ground.marker(ORIGIN)
+    refuses(rom.ConfigError, "both must be one", mech.rolling_bearing, "bearing", *rings, **balls)
 
 
 def carried(way, speed):
     """A rotor in two films under its weight."""
-    bearing = JournalBearing(0.05, 0.03, 5e-5, [Groove(0.0, 0.3), Groove(np.pi, 0.3)],
-                             cells=(40, 4))  # fmt: skip
+    grooves = [Groove(0.0, 0.3), Groove(np.pi, 0.3)]
+    bearing = JournalBearing(0.05, 0.03, 5e-5, grooves, cells=(40, 4))
     mech = rom.Mechanism(gravity=(0, -9.81, 0))
     rotor = mech.add_rigid("rotor", mass=30.0, inertia=(0.4, 0.4, 0.1), at=ORIGIN,
                            markers={"a": (0, 0, -0.1), "b": (0, 0, 0.1)},
@@ -85,14 +85,13 @@ def test_films_of_a_spinning_rotor_carry_as_those_of_a_turning_frame(speed):
     found = []
     for way in ("omega", "spin"):
         mech = carried(way, speed)
-        hub = mech.ground
+        hub = mech.ground.marker(ORIGIN)
         if way == "omega":  # kept at its speed, as what spins is
-            hub = mech.add_rigid("hub", mass=1e-3, inertia=(1e-6,) * 3, at=ORIGIN,
-                                 omega=(0, 0, speed))  # fmt: skip
-            mech.revolute("motor", mech.ground.marker(ORIGIN), hub.marker(ORIGIN), axis=Z)
+            light = {"mass": 1e-3, "inertia": (1e-6,) * 3}
+            hub = on_axle(mech, "hub", **light, axle="motor", omega=(0, 0, speed))
             mech.drive("speed", "motor", lambda t: speed * t, rate=lambda t: speed)
-        mech.bushing("coupling", hub.marker(ORIGIN), mech.part("rotor").marker(ORIGIN),
-                     stiffness=(0, 0, 0, 0, 0, 1e4))  # fmt: skip
+        end = mech.part("rotor").marker(ORIGIN)
+        mech.bushing("coupling", hub, end, stiffness=(0, 0, 0, 0, 0, 1e4))
         sol = rom.simulate(mech, t_end=0.02, dt=2e-5, save_every=10)
         assert rom.audit(sol).ok, rom.audit(sol)
         found.append(sol.position("rotor"))
@@ -109,7 +108,7 @@ def test_a_rotor_that_nothing_holds_against_its_drag_is_named_soon(build, most, 
     """Once around it has met all forces there are."""
     tangents, count = _Search.tangent, []
     monkeypatch.setattr(_Search, "tangent", lambda *x: count.append(1) or tangents(*x))
-    with pytest.raises(RomError, match=r"'rotor' turns about its own axis \(0, 0, 1\)"):
+    with pytest.raises(rom.RomError, match=r"'rotor' turns about its own axis \(0, 0, 1\)"):
         rom.equilibrium(build())
     assert len(count) < most
 
@@ -117,9 +116,8 @@ def test_a_rotor_that_nothing_holds_against_its_drag_is_named_soon(build, most, 
 def dragged(moment, around=0.0):
     """A rotor on a bushing that may hold it against turning, under a moment."""
     mech = rom.Mechanism(gravity=ORIGIN)
-    rotor = mech.add_rigid("rotor", mass=2.0, inertia=(0.01, 0.01, 0.02), at=ORIGIN)
-    mech.revolute("axle", mech.ground.marker(ORIGIN), rotor.marker(ORIGIN), axis=Z)
-    mech.torque("drag", rotor.marker(ORIGIN), (0, 0, -moment))
+    rotor = on_axle(mech, "rotor", mass=2.0, inertia=(0.01, 0.01, 0.02))
+    mech.torque("drag", rotor, (0, 0, -moment))
     if around:
         mech.rotational_spring("spring", "axle", stiffness=around)
     return mech

@@ -14,7 +14,6 @@ from cases.refusals import refuses
 from cases.solid import block
 from rom import rotation
 from rom.body.records import Surface
-from rom.errors import ConfigError, ModelError
 from rom.reduction.full_model import operators
 from rom.reduction.interfaces.connection import connect
 
@@ -78,20 +77,14 @@ def on_top(points):
     return points[:, 2] > 0.08 - 1e-9
 
 
-def top_forces(model, pressure):
-    """(3n, 1) nodal forces of a pressure on the face z = 0.08 of the full model."""
-    F = np.zeros((model.n_dofs, 1))
+def test_a_pressure_bends_a_block_as_the_full_statics_say():
+    """All points of the surface; the body knows the shape of the answer by WithLoads."""
+    model, pressure = outward_block(), 50.0
+    F, kinds = np.zeros((model.n_dofs, 1)), {"root": "rbe2", "tip": "polynomial:1"}
     for corners in model.surface.nodes[model.surface.triangles]:
         a, b, c = model.points[corners]
         if on_top(model.points[corners]).all():
             F[3 * corners + 2, 0] -= pressure * np.linalg.norm(np.cross(b - a, c - a)) / 6
-    return F
-
-
-def test_a_pressure_bends_a_block_as_the_full_statics_say():
-    """All points of the surface; the body knows the shape of the answer by WithLoads."""
-    model, pressure = outward_block(), 50.0
-    F, kinds = top_forces(model, pressure), {"root": "rbe2", "tip": "polynomial:1"}
     assert_allclose(F.sum(), -pressure * 1.0 * 0.1)
     connection = connect(operators(model), model, kinds)
     held = connection.boundary[connection.parts["root"]]
@@ -160,14 +153,14 @@ def test_messages():
     inside_out = replace(body, surface=replace(body.surface, triangles=TETRAHEDRON[:3]))
     box = mech.add_rigid("box", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0))
     for error, words, on, given in (
-        (ConfigError, "exactly one of pressure, traction and forces", body,
+        (rom.ConfigError, "exactly one of pressure, traction and forces", body,
          {"pressure": 1.0, "traction": (0, 0, 1)}),
-        (ConfigError, "chooses no triangle of the 4", body,
+        (rom.ConfigError, "chooses no triangle of the 4", body,
          {"pressure": 1.0, "where": lambda points: points[:, 0] > 1e9}),
-        (ConfigError, "no deformable interface 'top'", body, {"pressure": 1.0, "where": "top"}),
-        (ConfigError, r"needed is \(7, 3\)", body, {"forces": np.zeros(3)}),
-        (ModelError, "do not tell its inside from its outside", inside_out, {"pressure": 1.0}),
-        (ModelError, "carries no surface", replace(body, surface=None), {"pressure": 1.0}),
+        (rom.ConfigError, "no deformable interface 'top'", body, {"pressure": 1.0, "where": "top"}),
+        (rom.ConfigError, r"needed is \(7, 3\)", body, {"forces": np.zeros(3)}),
+        (rom.ModelError, "do not tell its inside from its outside", inside_out, {"pressure": 1.0}),
+        (rom.ModelError, "carries no surface", replace(body, surface=None), {"pressure": 1.0}),
     ):  # fmt: skip
         refuses(error, words, rom.surface_load, on, **given)
-    refuses(ConfigError, "is not one of body 'box'", mech.spread_load, "pull", box, load)
+    refuses(rom.ConfigError, "is not one of body 'box'", mech.spread_load, "pull", box, load)

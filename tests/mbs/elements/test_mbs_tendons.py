@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose
 
 import rom
 from cases.mbs.mechanisms import prepared, random_body, random_pose, stored_at, tangents_at
+from cases.mbs.parts import on_axle, on_guide
 from cases.mbs.tangents import by_velocity, check_tangents, elastic_forces, forces_at, near
 from cases.refusals import refuses
 from rom.components.tendons.tendons import TENDONS_FAMILY
@@ -15,6 +16,7 @@ from rom.mbs import Pulley
 G = 9.81
 SMALL = (1e-3, 1e-3, 1e-3)
 ORIGIN, Z = (0, 0, 0), (0, 0, 1)
+CORNERS = [(0.0, 0.0, 1.0), (0.3, 0.0, 1.2), (0.4, 0.2, 1.0)]
 
 
 def strung(rng, pulleys, **more):
@@ -100,24 +102,14 @@ def test_tangents_are_derivatives_of_the_forces(kind, pulleys):
     check_tangents(packed, W, state, np.eye(v.size), 1e-6)
 
 
-def weight(mech, name, at, mass=1.0, axis=Z, **pose):
+def weight(mech, name, at, mass=1.0, axis=Z):
     """A body that slides along an axis; its marker."""
-    body = mech.add_rigid(name, mass=mass, inertia=SMALL, at=at, **pose)
-    marker = body.marker(ORIGIN)
-    mech.prismatic(f"{name} slides", mech.ground.marker(at), marker, axis=axis)
-    return marker
+    return on_guide(mech, name, mass=mass, at=at, base=at, axis=axis, guide=f"{name} slides")
 
 
 def sizes(solution, name):
     """(n_t, K) size of the force on each marker."""
     return np.linalg.norm(solution.element(name).force, axis=2)
-
-
-def stored_length(mech, EA):
-    """Length of the only tendon, from its energy with a free length of 1 m."""
-    packed, W = prepared(mech)
-    energy = stored_at(packed.system, W, packed.q, 0 * packed.v)
-    return 1.0 + np.sqrt(2 * energy / EA)
 
 
 @pytest.mark.parametrize(("sense", "shift"), [(-1, 2.0), (1, 4.0)], ids=["outer", "inner"])
@@ -136,7 +128,9 @@ def test_lengths_over_two_pulleys_are_those_of_plane_geometry(sense, shift):
     first = np.pi - np.arccos(3 / 5) - up
     second = up - np.pi / 4 if sense == -1 else np.pi - np.pi / 4 - up
     wanted = 4.0 + 3.0 * first + np.sqrt(100 - shift**2) + second + 1.0
-    assert stored_length(mech, 1.0) == pytest.approx(wanted, rel=1e-12)
+    packed, W = prepared(mech)
+    stretch = np.sqrt(2 * stored_at(packed.system, W, packed.q, 0 * packed.v))
+    assert 1.0 + stretch == pytest.approx(wanted, rel=1e-12)
 
 
 def test_a_cable_is_as_long_as_its_design_at_the_start():
@@ -166,9 +160,8 @@ def test_a_sheave_that_the_rope_grips_turns_with_it(sheave):
     mech = rom.Mechanism(gravity=(0, 0, -G))
     a, b = weight(mech, "a", (-0.1, 0, -1.0), 2.0), weight(mech, "b", (0.1, 0, -1.5))
     inertia = 0.02
-    wheel = mech.add_rigid("wheel", mass=1.0, inertia=(0.02, inertia, 0.02), at=ORIGIN)
-    mech.revolute("axle", mech.ground.marker(ORIGIN), wheel.marker(ORIGIN), axis=(0, 1, 0))
-    rope = [a, Pulley(wheel.marker(ORIGIN), 0.1, (0, 1, 0), friction=sheave), b]
+    wheel = on_axle(mech, inertia=(0.02, inertia, 0.02), axis=(0, 1, 0))
+    rope = [a, Pulley(wheel, 0.1, (0, 1, 0), friction=sheave), b]
     mech.tendon("rope", rope, EA=1e5, damping=2e3, transition_speed=1e-3, pretension=13.0)
     moved = rom.simulate(mech, t_end=0.5, dt=2e-4, progress=False)
     shared = inertia / 0.1**2 if sheave else 0.0
@@ -176,9 +169,6 @@ def test_a_sheave_that_the_rope_grips_turns_with_it(sheave):
     assert moved.position("a")[-1, 2] + 1.0 == pytest.approx(wanted, rel=2e-3)
     turned = 0.1 * moved.joint("axle").angle[-1]
     assert turned == pytest.approx(wanted if sheave else 0.0, rel=3e-3, abs=1e-9)
-
-
-CORNERS = [(0.0, 0.0, 1.0), (0.3, 0.0, 1.2), (0.4, 0.2, 1.0)]
 
 
 @pytest.mark.parametrize("way", [1, -1])
@@ -209,13 +199,12 @@ def test_a_turning_drum_shifts_tension_by_its_whole_wrap(turns):
     Pieces stretch together as far as before: what the one gains the other loses.
     """
     mech = rom.Mechanism(gravity=(0, 0, 0))
-    g, R, mu, EA = mech.ground.marker, 0.2, 0.15, 1e5
-    drum = mech.add_rigid("drum", mass=1.0, inertia=(0.02,) * 3, at=ORIGIN)
-    mech.revolute("axle", g(ORIGIN), drum.marker(ORIGIN), axis=Z)
+    g, R, mu = mech.ground.marker, 0.2, 0.15
+    drum = on_axle(mech, "drum", inertia=(0.02,) * 3)
     mech.drive("speed", "axle", lambda t: 5.0 * t, rate=lambda t: 5.0 + 0 * t)
-    wheel = Pulley(drum.marker(ORIGIN), R, Z, friction=mu, turns=turns)
-    mech.tendon("rope", [g((-1, -R, 0)), wheel, g((-1, R, 0))], EA=EA, pretension=100.0,
-                transition_speed=1e-4)  # fmt: skip
+    wheel = Pulley(drum, R, Z, friction=mu, turns=turns)
+    law = {"EA": 1e5, "pretension": 100.0, "transition_speed": 1e-4}
+    mech.tendon("rope", [g((-1, -R, 0)), wheel, g((-1, R, 0))], **law)
     moved = rom.simulate(mech, t_end=1.0, dt=1e-2, progress=False)
     slack, taut = sizes(moved, "rope")[-1, [2, 0]]
     theta = np.pi * (1 + 2 * turns)

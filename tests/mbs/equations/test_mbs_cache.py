@@ -14,9 +14,8 @@ from rom.mbs.compiler import cache
 from rom.mbs.compiler.cache import CodeFiles
 from rom.mbs.kernels import compiled, stages
 
-ELSEWHERE = [
-    pytest.param(p, marks=pytest.mark.once) for p in ("own folder", "of the user", "nowhere")
-]
+PLACES = ("own folder", "of the user", "nowhere")
+ELSEWHERE = [pytest.param(place, marks=pytest.mark.once) for place in PLACES]
 OUTER = """
 from rom.toy.inner import SIZE, inside
 from rom.mbs.kernels.compiled import kernel
@@ -176,13 +175,11 @@ def test_stages_that_another_process_compiles_are_asked_for_last(monkeypatch, bu
     for k in range(3):
         function = SimpleNamespace(py_func=k)
         files[k] = SimpleNamespace(made_elsewhere=lambda k=k: k in busy)
-        kernels[k] = SimpleNamespace(
-            kernel=function, linked=False, asked=str, needed=bool, link=lambda k=k: linked.append(k)
-        )
-    kernels[3] = SimpleNamespace(
-        kernel=None, linked=False, asked=str, needed=lambda system: not system
-    )
-    kernels[4] = SimpleNamespace(kernel=None, linked=False, asked=int, needed=bool)
+        link = {"kernel": function, "needed": bool, "link": lambda k=k: linked.append(k)}
+        kernels[k] = SimpleNamespace(linked=False, asked=str, **link)
+    none = {"kernel": None, "linked": False}
+    kernels[3] = SimpleNamespace(**none, asked=str, needed=lambda system: not system)
+    kernels[4] = SimpleNamespace(**none, asked=int, needed=bool)
     monkeypatch.setattr(stages, "STAGE_KERNELS", kernels)
     monkeypatch.setattr(stages, "CODE_FILES", files)
     monkeypatch.setattr(stages, "EXPECTED_FUNCTIONS", set())
@@ -232,7 +229,6 @@ def writes(files, key, monkeypatch):
 
 @pytest.mark.parametrize("order", [(0, 1, 2, 3), (0, 2, 1, 3), (0, 2, 3, 1)])
 def test_two_writers_without_locks_never_mix_their_code(tmp_path, monkeypatch, order):
-    """Each writes two files, and in between the other one does."""
     planned = [w for key in "ab" for w in writes(files_of(tmp_path, "same"), key, monkeypatch)]
     for write, what in (planned[k] for k in order):
         write(*what)

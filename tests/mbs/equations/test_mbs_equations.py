@@ -13,30 +13,19 @@ from cases.mbs import mechanisms
 from cases.mbs.mechanisms import prepared, random_pose, random_state, two_soft
 from cases.mbs.tangents import GRAVITY, check_tangents, constraint_derivatives
 from rom import rotation
-from rom.body.rotating import rotating_matrices
-from rom.body.stiffening import elastic_loads
-from rom.mbs.equations.equations import linearize_constraints, rates
-from rom.mbs.equations.sparse_solve import signature
+from rom.body import rotating, stiffening
+from rom.mbs.equations import equations, sparse_solve
 from rom.mbs.integrate.consistent_start import initial_state
 from rom.mbs.kernels.algebra import PANEL_WIDTH, back_substitute, factorise
 from rom.mbs.mechanism import Mechanism
 
 
-def nodal_accelerations(nodes, *state):
-    """Accelerations of frame and elastic coordinates from the nodes themselves.
-
-    No inertia integral occurs in their equations, which are linear in the accelerations.
-    """
-    psi, n = np.zeros((4, 4, *nodes[0].shape)), 10
-    pull, *columns = (
-        mechanisms.nodal_residual(nodes, psi, state, a, GRAVITY) for a in (np.zeros(n), *np.eye(n))
-    )
-    return np.linalg.solve(np.array(columns).T - pull[:, None], -pull)
-
-
 def test_frame_equations_equal_direct_nodal_dynamics():
-    """C1: a dropped inertia integral, sign or transpose changes the accelerations."""
-    rng = np.random.default_rng(1)
+    """C1: a dropped inertia integral, sign or transpose changes the accelerations.
+
+    No inertia integral occurs in the equations of the nodes, which are linear in accelerations.
+    """
+    rng, psi, each = np.random.default_rng(1), np.zeros((4, 4, 7, 3)), [np.zeros(10), *np.eye(10)]
     for _ in range(5):
         nodes = mechanisms.random_nodes(rng)
         mech = Mechanism(gravity=GRAVITY)
@@ -46,8 +35,10 @@ def test_frame_equations_equal_direct_nodal_dynamics():
         packed, W = prepared(mech)
         y = np.concatenate([packed.q, packed.v, np.zeros(3)])
         a = np.zeros(10)
-        assert rates(packed.system, W, y, 0, True, a, np.zeros(0), np.zeros_like(y))
-        exact = nodal_accelerations(nodes, q, qd, pose["orientation"], pose["omega"])
+        assert equations.rates(packed.system, W, y, 0, True, a, np.zeros(0), np.zeros_like(y))
+        moving = q, qd, pose["orientation"], pose["omega"]
+        left = [mechanisms.nodal_residual(nodes, psi, moving, b, GRAVITY) for b in each]
+        exact = np.linalg.solve(np.array(left[1:]).T - left[0][:, None], -left[0])
         assert_allclose(a, exact, rtol=1e-10, atol=1e-10 * np.abs(exact).max())
 
 
@@ -77,12 +68,11 @@ def everything(rng, *, angles=True):
 
 @pytest.mark.parametrize("seed", range(3))
 def test_constraint_gradient_and_convective_term_are_derivatives_of_the_residual(seed):
-    """All kinds of rows, between flexible, rigid and ground markers."""
     rng = np.random.default_rng(seed)
     packed, W = prepared(everything(rng))
     s, (q, v, _, _) = packed.system, random_state(rng, packed)
     G, convective = constraint_derivatives(packed, W, q, v)
-    linearize_constraints(s, W, q, v)
+    equations.linearize_constraints(s, W, q, v)
     assert_allclose(W.G, G, atol=2e-8 * np.abs(G).max())
     assert_allclose(W.gamma, convective, atol=1e-7 * np.abs(convective).max())
 
@@ -101,7 +91,7 @@ def test_a_rotating_body_is_linearised_as_it_moves():
     """Stiffness and gyroscopic matrix of the body: the derivatives of its equations of motion."""
     rng = np.random.default_rng(6)
     body = mechanisms.random_body(rng, damped=False, stiffened=True).with_reference("mean-axis")
-    for load in elastic_loads(body.n_modes):  # they act on a body that is bent
+    for load in stiffening.elastic_loads(body.n_modes):  # they act on a body that is bent
         del body.K_geo[load]
     w, arm, pose = rng.normal(size=3), rng.normal(size=3), random_pose(rng)
     mech = Mechanism(gravity=(0, 0, 0))
@@ -110,7 +100,7 @@ def test_a_rotating_body_is_linearised_as_it_moves():
     a, none = np.zeros(10), np.zeros(0)
     a[:3] = rotation.matrix(pose["orientation"]) @ np.cross(w, np.cross(w, -arm))
     mechanisms.tangents_at(packed.system, W, packed.q, packed.v, a, none, (0.0, 1.0, 1.0))
-    K, G = rotating_matrices(body, w, arm)
+    K, G = rotating.rotating_matrices(body, w, arm)
     assert_allclose(W.Kt[6:, 6:], K, atol=1e-12 * np.abs(K).max())
     assert_allclose(W.S[6:, 6:], G, atol=1e-12 * np.abs(G).max())
 
@@ -126,7 +116,7 @@ def test_stiffness_of_drives_and_coils_is_exact_where_the_joint_is_closed():
     packed.system.markers.bend[:, 3:] *= 1e-3
     start = initial_state(packed, assemble=True)
     W.signal[:, 0] = 0.4
-    linearize_constraints(packed.system, W, start.q, start.v)
+    equations.linearize_constraints(packed.system, W, start.q, start.v)
     motions = null_space(W.G[:5])
     _, v, a, lam = random_state(rng, packed)
     check_tangents(packed, W, (start.q, v, a, lam), motions, 1e-6)
@@ -140,13 +130,6 @@ def solve(A, n, pivot, x):
     return True
 
 
-def solved(A, b, n):
-    """The solution with the leading (n, n) block, and what else the array holds afterwards."""
-    work, x = A.copy(), b[:n].copy()
-    assert solve(work, n, np.zeros(n, dtype=np.int64), x)
-    return x, work
-
-
 @pytest.mark.parametrize("n", [*range(1, 3 * PANEL_WIDTH + 2), 100])
 @pytest.mark.parametrize("share", [1.0, 0.15])
 def test_solutions_are_those_of_numpy(n, share):
@@ -154,11 +137,12 @@ def test_solutions_are_those_of_numpy(n, share):
     A = rng.standard_normal((n + 3, n + 3)) * (rng.random((n + 3, n + 3)) < share)
     A[:n, :n] += np.roll(np.diag(np.full(n, 3.0)), 1, axis=0)  # pivots off the diagonal
     b = rng.standard_normal(n + 3)
-    x, work = solved(A, b, n)
+    work, x = A.copy(), b[:n].copy()
+    assert solve(work, n, np.zeros(n, dtype=np.int64), x)
     condition = np.linalg.cond(A[:n, :n])
     expected = np.linalg.solve(A[:n, :n], b[:n])
     assert_allclose(x, expected, atol=1e-13 * condition * np.abs(expected).max())
-    assert np.array_equal(work[n:], A[n:])
+    assert np.array_equal(work[n:], A[n:])  # what is beside the leading block stays
     assert np.array_equal(work[:, n:], A[:, n:])
 
 
@@ -198,7 +182,7 @@ def test_signs_of_eigenvalues_are_counted_in_any_order(seed, massless):
     exact = np.linalg.eigvalsh(A)
     assert np.abs(exact).min() > 1e-8 * np.abs(exact).max()  # none of them is zero
     for order in (groups, groups[::-1], [groups[k] for k in rng.permutation(len(groups))]):
-        found = signature(csc_matrix(A), order)
+        found = sparse_solve.signature(csc_matrix(A), order)
         assert found == (np.sum(exact < 0), 0, np.sum(exact > 0))
 
 
@@ -209,4 +193,4 @@ def test_constraints_that_repeat_others_are_counted_as_zero(copies):
     G = np.vstack([G, rng.normal(size=(copies, 7)) @ G])
     A = np.block([[np.diag(rng.uniform(1, 9, 30)), G.T], [G, np.zeros((len(G),) * 2)]])
     groups = [np.arange(a, a + 5) for a in range(0, 30, 5)] + [np.arange(30, len(A))]
-    assert signature(csc_matrix(A), groups, 1e-10) == (7, copies, 30)
+    assert sparse_solve.signature(csc_matrix(A), groups, 1e-10) == (7, copies, 30)

@@ -8,19 +8,17 @@ from scipy.linalg import null_space
 import rom
 from cases.long import few
 from cases.mbs.mechanisms import prepared, random_body, simulate_quietly
-from cases.mbs.parts import X, Z, on_axle, slender
+from cases.mbs.parts import X, Y, Z, on_axle, slender
 from cases.refusals import refuses
 from rom.errors import ConfigError, ModelError, RomWarning
-from rom.mbs.equations import packing
-from rom.mbs.equations.equations import linearize_constraints
-from rom.mbs.integrate.simulation import simulate
-from rom.mbs.mechanism import Mechanism
-from rom.mbs.results.audit import audit
+from rom.mbs.equations import equations, packing
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*constraints repeat others")
 # crank, coupler, rocker, distance of the pivots [m]; start angle [rad], speed [rad/s]
 A, B, C, D = 0.1, 0.4, 0.3, 0.35
 START, SPEED = 0.6, 20.0
+GRAVITY = (3.0, 0.0, -9.81)
+LOOPS = 7  # 126 coordinates: the fewest in blocks are 100
 
 
 def elbow(phi):
@@ -35,7 +33,7 @@ def elbow(phi):
 
 def four_bar(*, repeated=True):
     """Four hinges, or hinges, a ball and a Cardan joint that only just hold it in its plane."""
-    mech = Mechanism(gravity=(0, -9.81, 0))
+    mech = rom.Mechanism(gravity=(0, -9.81, 0))
     pin, knee = elbow(np.array(START))
     crank = slender(mech, "crank", (0, 0), pin, 0.4)
     coupler = slender(mech, "coupler", pin, knee, 1.0)
@@ -54,7 +52,7 @@ def four_bar(*, repeated=True):
 
 def test_four_bar_of_hinges_warns_by_name_and_moves_as_its_closed_form():
     with pytest.warns(RomWarning, match="3 of 21 constraints .* joints O, A, B, C share"):
-        sol = simulate(four_bar(), t_end=0.4, dt=1e-3)
+        sol = rom.simulate(four_bar(), t_end=0.4, dt=1e-3)
     pin, knee = elbow(START + SPEED * sol.t)
     assert_allclose(sol.position("crank", "b")[:, :2], pin, atol=1e-9)
     assert_allclose(sol.position("rocker", "b")[:, :2], knee, atol=1e-9)
@@ -66,7 +64,7 @@ def test_four_bar_of_hinges_warns_by_name_and_moves_as_its_closed_form():
 def test_loads_of_the_repeated_four_bar_are_those_of_the_one_that_repeats_nothing():
     """In the plane equilibrium decides; out of it the least loads are none at all."""
     repeated = simulate_quietly(four_bar(), t_end=0.2, dt=1e-3)
-    single = simulate(four_bar(repeated=False), t_end=0.2, dt=1e-3)
+    single = rom.simulate(four_bar(repeated=False), t_end=0.2, dt=1e-3)
     assert single.statistics["redundant"] == 0
     for joint in "OABC":
         force, wanted = repeated.reaction(joint), single.reaction(joint)
@@ -77,28 +75,22 @@ def test_loads_of_the_repeated_four_bar_are_those_of_the_one_that_repeats_nothin
     assert_allclose(torque, single.reaction("motor")[:, 5], atol=1e-6 * np.abs(torque).max())
 
 
-def tumbling_door():
-    """A leaf on two hinges of a frame; both tumble across the line of the hinges."""
-    mech = Mechanism(gravity=(0, 0, 0))
+@pytest.mark.parametrize("method", ["generalized-alpha", "dop853"])
+def test_multipliers_stay_those_of_least_norm_while_the_hinges_tumble(method):
+    """They have no share in the loads that the hinges could exchange among themselves."""
+    mech = rom.Mechanism(gravity=(0, 0, 0))  # frame and leaf tumble across the line of the hinges
     points = {"low": (0, 0, -0.8), "high": (0, 0, 0.8)}
     frame = mech.add_rigid("frame", mass=30.0, inertia=(9.0, 8.0, 4.0), at=(0, 0, 0),
                            markers=points, omega=(2.0, 1.0, 0.5))  # fmt: skip
     leaf = mech.add_rigid("leaf", mass=20.0, inertia=(3.0, 2.0, 1.2), at=(0.4, 0, 0.1),
-                          markers={k: np.array(x) - [0.4, 0, 0.1] for k, x in points.items()},
                           omega=(2.0, 1.0, 3.0))  # fmt: skip
-    for name in points:
-        mech.revolute(name, frame.marker(name), leaf.marker(name), axis=Z)
-    return mech
-
-
-@pytest.mark.parametrize("method", ["generalized-alpha", "dop853"])
-def test_multipliers_stay_those_of_least_norm_while_the_hinges_tumble(method):
-    """They have no share in the loads that the hinges could exchange among themselves."""
-    mech = tumbling_door()
+    for name, at in points.items():
+        end = leaf.marker(np.array(at) - [0.4, 0, 0.1])
+        mech.revolute(name, frame.marker(name), end, axis=Z)
     sol = simulate_quietly(mech, t_end=1.0, dt=2e-3, method=method, save_every=50)
     packed, W = prepared(mech)
     for q, v, lam in zip(sol.q, sol.v, sol.lam, strict=True):
-        linearize_constraints(packed.system, W, q, v)
+        equations.linearize_constraints(packed.system, W, q, v)
         among = null_space(W.G.T, rcond=1e-8)
         assert among.shape[1] == 5
         assert np.abs(among.T @ lam).max() < 1e-6 * np.abs(lam).max()
@@ -108,13 +100,12 @@ def test_multipliers_stay_those_of_least_norm_while_the_hinges_tumble(method):
 
 def hinge_and_ball(*drives):
     """A box on a hinge with every given drive, and a flexible body at rest on a ball joint."""
-    mech = Mechanism(gravity=(0, 0, 0))
-    box = mech.add_rigid("box", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0),
-                         markers={"a": (0, 0, 0), "b": (1, 0, 0)})  # fmt: skip
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    box = mech.add_rigid("box", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0))
     body = random_body(np.random.default_rng(1))
     bar = mech.add_flexible("bar", body, at=X - np.asarray(body.markers["a"].point))
-    mech.revolute("hinge", mech.ground.marker((0, 0, 0)), box.marker("a"), axis=Z)
-    mech.spherical("ball", box.marker("b"), bar.marker("a"))
+    mech.revolute("hinge", mech.ground.marker((0, 0, 0)), box.marker((0, 0, 0)), axis=Z)
+    mech.spherical("ball", box.marker(X), bar.marker("a"))
     for k, function in enumerate(drives):
         mech.drive(f"motor {k}", "hinge", function)
     return mech
@@ -128,17 +119,16 @@ def hinge_and_ball(*drives):
 )  # fmt: skip
 def test_drives_of_different_speed_or_position_are_refused_by_name(drives, words):
     """Rows of the ball joint are at rest: their round-off must not hide the drives."""
-    refuses(ModelError, words, simulate, hinge_and_ball(*drives), t_end=0.01, dt=1e-3)
+    refuses(ModelError, words, rom.simulate, hinge_and_ball(*drives), t_end=0.01, dt=1e-3)
 
 
 def test_drives_that_part_on_the_way_are_seen_by_the_audit():
     sol = simulate_quietly(hinge_and_ball(lambda t: t**2, lambda t: 2 * t**2), t_end=0.05, dt=1e-3)
-    assert [r.quantity for r in audit(sol).failures] == ["largest gap in a joint / size"]
+    assert [r.quantity for r in rom.audit(sol).failures] == ["largest gap in a joint / size"]
 
 
 def coil():
-    """A wheel on a coil that turns several times."""
-    mech = Mechanism(gravity=(0, 0, 0))
+    mech = rom.Mechanism(gravity=(0, 0, 0))
     on_axle(mech, omega=(0, 0, 40.0))
     mech.rotational_spring("coil", "axle", stiffness=2.0)
     return mech
@@ -148,24 +138,20 @@ def coil():
 def test_a_state_of_the_same_bodies_with_other_joints_is_refused(build):
     """Compiled code would write beyond the end of its arrays."""
     joined = build()
-    free = Mechanism(gravity=(0, 0, 0))
+    free = rom.Mechanism(gravity=(0, 0, 0))
     free.parts.update(joined.parts)
     for one, other in ((joined, free), (free, joined)):
-        state = simulate(one, t_end=0.01, dt=1e-3).final
+        state = rom.simulate(one, t_end=0.01, dt=1e-3).final
         with pytest.raises(ConfigError, match=r"the state has \d+ coordinates.* constraints; this"):
-            simulate(other, t_end=0.02, dt=1e-3, state=state)
+            rom.simulate(other, t_end=0.02, dt=1e-3, state=state)
 
 
 def test_a_state_without_the_coil_is_refused():
     bare, wound = coil(), coil()
     bare.turns.clear()
-    state = simulate(bare, t_end=0.01, dt=1e-3).final
+    state = rom.simulate(bare, t_end=0.01, dt=1e-3).final
     words = "0 followed joint coordinates and remembered numbers; this mechanism has 1"
-    refuses(ConfigError, words, simulate, wound, t_end=0.02, dt=1e-3, state=state)
-
-
-GRAVITY = (3.0, 0.0, -9.81)
-LOOPS = 7  # 126 coordinates: the fewest in blocks are 100
+    refuses(ConfigError, words, rom.simulate, wound, t_end=0.02, dt=1e-3, state=state)
 
 
 def ladder(n, *, repeated=True):
@@ -192,12 +178,6 @@ def ladder(n, *, repeated=True):
     return mech
 
 
-@pytest.fixture
-def whole(monkeypatch):
-    """Lets mechanisms of any size have whole matrices."""
-    return lambda: monkeypatch.setattr(packing, "MAX_SHARING_WHOLE", 10_000)
-
-
 METHODS = {
     "alpha": {"dt": 2e-3},
     "steps chosen": {"rtol": 1e-6},
@@ -208,12 +188,13 @@ METHODS = {
 
 
 @pytest.mark.parametrize("method", few(3, METHODS))
-def test_blocks_move_and_carry_as_whole_matrices(method, whole):
-    """Positions, velocities and the reactions of least norm."""
+def test_blocks_move_and_carry_as_whole_matrices(method, monkeypatch):
     options = {"t_end": 0.3, **METHODS[method]}
-    blocks = rom.simulate(ladder(LOOPS), **options)
+    words = "21 of 140 constraints repeat others; joints up 0.0, .* and 20 more"
+    with pytest.warns(RomWarning, match=words):
+        blocks = rom.simulate(ladder(LOOPS), **options)
     assert blocks.packed.by_blocks and blocks.statistics["redundant"] == 3 * LOOPS
-    whole()
+    monkeypatch.setattr(packing, "MAX_SHARING_WHOLE", 10_000)
     other = rom.simulate(ladder(LOOPS), **options)
     assert not other.packed.by_blocks and other.statistics["rank"] == blocks.statistics["rank"]
     where = -1 if method == "steps chosen" else slice(None)
@@ -225,7 +206,6 @@ def test_blocks_move_and_carry_as_whole_matrices(method, whole):
 
 
 def test_many_loops_move_as_those_that_repeat_nothing():
-    """Twenty parallelograms: their planar loads, too."""
     options = {"t_end": 0.5, "dt": 2e-3}
     repeated = rom.simulate(ladder(20), **options)
     other = rom.simulate(ladder(20, repeated=False), **options)
@@ -239,23 +219,15 @@ def test_many_loops_move_as_those_that_repeat_nothing():
 def test_statics_and_small_motions_are_those_of_joints_that_repeat_nothing():
     here, there = (rom.equilibrium(ladder(20, repeated=repeated)) for repeated in (True, False))
     assert_allclose(here.q, there.q, atol=1e-9)
-    found = [
-        rom.linearize(ladder(20, repeated=repeated), state, n=4).frequencies
-        for repeated, state in ((True, here), (False, there))
-    ]
-    assert_allclose(*found, rtol=1e-8)
-
-
-def test_joints_that_share_loads_are_named_in_large_mechanisms():
-    words = "21 of 140 constraints repeat others; joints up 0.0, .* and 20 more"
-    with pytest.warns(RomWarning, match=words):
-        rom.simulate(ladder(LOOPS), t_end=1e-3, dt=1e-3)
+    found = rom.linearize(ladder(20), here, n=4).frequencies
+    exact = rom.linearize(ladder(20, repeated=False), there, n=4).frequencies
+    assert_allclose(found, exact, rtol=1e-8)
 
 
 @pytest.mark.parametrize("others", [0, LOOPS])
 def test_a_start_in_line_is_refused(others):
     """A parallelogram folded flat, alone or among others: it could go on either way."""
-    mech = ladder(others) if others else Mechanism(gravity=(0, 0, 0))
+    mech = ladder(others) if others else rom.Mechanism(gravity=(0, 0, 0))
     arm, far, bar = (
         mech.add_rigid(name, mass=1.0, inertia=(0.1,) * 3, at=(x, 0, 0))
         for name, x in (("arm", 5.5), ("far", 7.5), ("bar", 6.5))
@@ -269,7 +241,6 @@ def test_a_start_in_line_is_refused(others):
 
 
 def test_joints_that_contradict_each_other_are_named_in_large_mechanisms():
-    """The last rung is drawn a centimetre too long for its rails."""
     mech = ladder(LOOPS)
     last = mech.parts[f"rung {LOOPS - 1}"]
     wall = mech.ground.marker((2.0, 0.01, -float(LOOPS)))
@@ -287,20 +258,16 @@ def train(n, slope=0.2, apart=0.0):
     floor, behind = mech.ground.marker((0, 0, 0)), None
     for k in range(n):
         wheel = mech.add_rigid(f"wheel {k}", mass=2.0, inertia=(0.05, 0.1, 0.05), at=(k, 0, 0.3))
-        mech.rolling(f"roll {k}", floor, wheel.marker((0, 0, 0)), normal=(0, 0, 1), radius=0.3,
-                     axis=(0, 1, 0))  # fmt: skip
-        bar = mech.add_rigid(f"bar {k}", mass=1.0, inertia=(0.1,) * 3,
-                             at=(k + 0.5 + apart, 0, 0.3))  # fmt: skip
-        mech.revolute(f"axle {k}", bar.marker((-0.5, 0, 0)), wheel.marker((0, 0, 0)),
-                      axis=(0, 1, 0))  # fmt: skip
+        mech.rolling(f"roll {k}", floor, wheel.marker((0, 0, 0)), normal=Z, radius=0.3, axis=Y)
+        bar = mech.add_rigid(f"bar {k}", mass=1.0, inertia=(0.1,) * 3, at=(k + 0.5 + apart, 0, 0.3))
+        mech.revolute(f"axle {k}", bar.marker((-0.5, 0, 0)), wheel.marker((0, 0, 0)), axis=Y)
         if behind is not None:
             mech.spherical(f"link {k}", behind.marker((0.5, 0, 0)), bar.marker((-0.5, 0, 0)))
         for y in (-1, 1) if k % 3 == 2 else ():
             at = {"at": (k, y, 0.3), "inertia": (0.05, 0.1, 0.05)}
             other = mech.add_rigid(f"wheel {k}.{y}", mass=2.0, **at)
             centre = other.marker((0, 0, 0))
-            mech.rolling(f"roll {k}.{y}", floor, centre, normal=(0, 0, 1), radius=0.3,
-                         axis=(0, 1, 0))  # fmt: skip
+            mech.rolling(f"roll {k}.{y}", floor, centre, normal=Z, radius=0.3, axis=Y)
             mech.revolute(f"axle {k}.{y}", bar.marker((-0.5, y, 0)), centre, axis=(0, 1, 0))
         behind = bar
     mech.point_on_plane("end", mech.ground.marker((0, 0, 0.3)), behind.marker((0.5, 0, 0)),
@@ -308,11 +275,11 @@ def train(n, slope=0.2, apart=0.0):
     return mech
 
 
-def test_many_wheels_roll_by_blocks_as_by_whole_matrices(whole):
+def test_many_wheels_roll_by_blocks_as_by_whole_matrices(monkeypatch):
     """Down the slope with g sin(a) (sum of masses) / (sum of masses + J / r^2)."""
     options = {"t_end": 0.2, "dt": 1e-3}
     blocks = rom.simulate(train(12), **options)
-    whole()
+    monkeypatch.setattr(packing, "MAX_SHARING_WHOLE", 10_000)
     other = rom.simulate(train(12), **options)
     assert blocks.packed.by_blocks and blocks.statistics["redundant"] > 0
     assert not other.packed.by_blocks and other.statistics["rank"] == blocks.statistics["rank"]
@@ -323,10 +290,10 @@ def test_many_wheels_roll_by_blocks_as_by_whole_matrices(whole):
     assert_allclose(blocks.velocity("bar 11")[-1], [speed, 0, 0], atol=1e-7)
 
 
-def test_gaps_of_what_rolls_are_closed_as_by_whole_matrices(whole):
+def test_gaps_of_what_rolls_are_closed_as_by_whole_matrices(monkeypatch):
     """Bars given a centimetre beside their axles: bodies come together, wheels may slip for it."""
     blocks = rom.simulate(train(12, apart=0.01), t_end=1e-3, dt=1e-3, assemble=True)
-    whole()
+    monkeypatch.setattr(packing, "MAX_SHARING_WHOLE", 10_000)
     other = rom.simulate(train(12, apart=0.01), t_end=1e-3, dt=1e-3, assemble=True)
     assert blocks.packed.by_blocks and not other.packed.by_blocks
     assert np.abs(blocks.position("bar 3")[0] - [3.51, 0, 0.3]).max() > 1e-3

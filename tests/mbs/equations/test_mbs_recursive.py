@@ -12,15 +12,11 @@ import rom
 from cases.mbs.lagrange import lagrange, potential_force
 from cases.mbs.mechanisms import random_body, simeon_rod
 from rom.errors import ModelError, RomWarning
-from rom.mbs.equations import graph
-from rom.mbs.equations.equations import linearize_constraints
-from rom.mbs.equations.linear_solve import factorise_bordered, solve_bordered
+from rom.mbs.equations import equations, graph, linear_solve
 from rom.mbs.equations.packing import pack
 from rom.mbs.integrate.consistent_start import factorised, initial_state
-from rom.mbs.integrate.simulation import simulate
 from rom.mbs.integrate.step_memory import across
 from rom.mbs.kernels.work import workspace
-from rom.mbs.mechanism import Mechanism
 
 Z, GRAVITY = (0, 0, 1), 9.81
 
@@ -43,7 +39,7 @@ def add_link(mech, name, at, flexible=True, **moving):
 
 def chain(n, *, flexible=True, held=True, gravity=GRAVITY, moving=None):
     """Links in a row, hinged to each other and to the ground; velocities of each, if any."""
-    mech = Mechanism(gravity=(0, -gravity, 0))
+    mech = rom.Mechanism(gravity=(0, -gravity, 0))
     before = mech.ground.marker((0, 0, 0)) if held else None
     for k in range(n):
         given = moving[k] if moving else {}
@@ -70,7 +66,7 @@ def tied_chain(n=8):
 def tree(generations=3):
     """Flexible bodies that branch in space, with ball joints, universal joints and bushings."""
     rng = np.random.default_rng(11)
-    mech, body = Mechanism(gravity=(0, 0, -GRAVITY)), random_body(rng)
+    mech, body = rom.Mechanism(gravity=(0, 0, -GRAVITY)), random_body(rng)
     a, b = (np.asarray(body.markers[key].point) for key in "ab")
     tips = [mech.ground.marker((0, 0, 0))]
     places, made = [np.zeros(3)], 0
@@ -93,7 +89,7 @@ def tree(generations=3):
 
 def loops(cells=3):
     """Triangles of flexible links that close, one behind the other, each on the one before."""
-    mech = Mechanism(gravity=(0, -GRAVITY, 0))
+    mech = rom.Mechanism(gravity=(0, -GRAVITY, 0))
     before = mech.ground.marker((0, 0, 0))
     for k in range(cells):
         x = 0.6 * k
@@ -114,7 +110,7 @@ def loops(cells=3):
 def pinned(n=6):
     """A chain that hangs between two points; ball joints, so that nothing repeats."""
     rng = np.random.default_rng(5)
-    mech, body = Mechanism(gravity=(0, 0, -GRAVITY)), random_body(rng)
+    mech, body = rom.Mechanism(gravity=(0, 0, -GRAVITY)), random_body(rng)
     a, b = (np.asarray(body.markers[key].point) for key in "ab")
     before, at = mech.ground.marker((0, 0, 0)), -a
     for k in range(n):
@@ -153,7 +149,7 @@ def side_by_side(n, flexible=lambda k: True):
 
 def bridge():
     """Two bodies on universal joints of their own, and a ball joint between them."""
-    mech = Mechanism(gravity=(0, 0, -GRAVITY))
+    mech = rom.Mechanism(gravity=(0, 0, -GRAVITY))
     one = add_link(mech, "one", (0, 0, 0), flexible=False)
     two = add_link(mech, "two", (0.3, 0, 0), flexible=False)
     mech.universal("left", mech.ground.marker((0, 0, 0)), one.marker("a"), axis1=Z, axis2=(0, 1, 0))
@@ -178,7 +174,7 @@ def solved(monkeypatch):
     def run(mechanism, *, blocks, **options):
         monkeypatch.setattr(graph, "BLOCK_GAIN", 1e-12 if blocks else np.inf)
         assert pack(mechanism).by_blocks == blocks
-        return simulate(mechanism, **options)
+        return rom.simulate(mechanism, **options)
 
     return run
 
@@ -197,7 +193,7 @@ def test_the_smallest_pivot_of_a_joint_is_looked_at():
     """With unit masses no pivot of a body is below one; joints that share a body have smaller."""
     packed = pack(chain(12, flexible=False))
     W = workspace(packed.system, 0)
-    linearize_constraints(packed.system, W, packed.q, packed.v)
+    equations.linearize_constraints(packed.system, W, packed.q, packed.v)
     W.S[:] = 0.0
     for row in packed.system.graph.x[packed.system.graph.own]:
         W.S[row : row + 6] = np.eye(6)
@@ -256,7 +252,6 @@ def test_a_pendulum_of_rods_swings_as_lagrange_has_it(solved):
 
 
 def test_a_free_chain_keeps_momentum_and_energy(solved):
-    """Flexible links in a whirl without gravity: nothing pushes from outside."""
     moving = [{}] * 3 + [{"velocity": (0, 2, 0)}] + [{}] * 2 + [{"omega": (0, 0, 20)}, {}]
     mech = chain(8, held=False, gravity=0.0, moving=moving)
     sol = solved(mech, blocks=True, t_end=0.1, dt=2e-4, rho_inf=1.0, assemble=True)
@@ -286,8 +281,7 @@ def ladder(n):
 
 
 def star(n):
-    """Links around one hub."""
-    mech = Mechanism()
+    mech = rom.Mechanism()
     hub = mech.add_rigid("hub", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0), markers={"c": (0, 0, 0)})
     for k in range(n):
         link = add_link(mech, f"link {k}", (0, 0, 0))
@@ -324,7 +318,6 @@ def test_a_few_bodies_keep_whole_matrices():
 
 
 def test_joints_that_repeat_others_are_found_in_a_long_chain(solved):
-    """Planar four-bar of rigid links at the end of a chain: three constraints too many."""
     mech = chain(7, flexible=False)
     end = mech.parts["link 6"].marker("a")
     one = add_link(mech, "one", (1.8, 0.3, 0), flexible=False)
@@ -346,14 +339,13 @@ def test_joints_that_repeat_others_are_found_in_a_long_chain(solved):
 def test_a_chain_that_cannot_be_closed_is_refused(monkeypatch):
     monkeypatch.setattr(graph, "BLOCK_GAIN", 1e-12)
     mech = chain(5)
-    mech.distance("rope", mech.ground.marker((9, 0.1, 0)), mech.parts["link 4"].marker("b"),
-                  length=1.0)  # fmt: skip
+    ends = mech.ground.marker((9, 0.1, 0)), mech.parts["link 4"].marker("b")
+    mech.distance("rope", *ends, length=1.0)
     with pytest.raises(ModelError, match="cannot be assembled"):
         initial_state(pack(mech))
 
 
 def test_gaps_are_closed_by_the_least_motion_of_whole_matrices(monkeypatch):
-    """A chain given with gaps and wrong velocities: assembled the same way both ways."""
     starts = []
     for worth in (1e-12, np.inf):
         monkeypatch.setattr(graph, "BLOCK_GAIN", worth)
@@ -406,14 +398,14 @@ def test_random_blocks_are_solved_like_their_whole_matrix(case, weak, monkeypatc
     n, m = W.residual.size, W.value.size
     W.rhs[:n], W.part[:] = b[:n], b[n:]
     x, lam = np.zeros(n), np.zeros(m)
-    assert factorise_bordered(s, W, m) and W.by_blocks[0] == (not weak)
-    solve_bordered(s, W, m, x, lam)
+    assert linear_solve.factorise_bordered(s, W, m) and W.by_blocks[0] == (not weak)
+    linear_solve.solve_bordered(s, W, m, x, lam)
     assert_allclose(np.r_[x, lam], np.linalg.solve(A, b), atol=1e-10 * np.abs(lam).max())
 
 
 def test_a_thousand_links_move():
     """Without a matrix of their size anywhere; the mass centre falls as the reaction lets it."""
-    sol = simulate(chain(1000, flexible=False), t_end=5e-3, dt=1e-3)
+    sol = rom.simulate(chain(1000, flexible=False), t_end=5e-3, dt=1e-3)
     assert sol.packed.by_blocks and sol.q.shape[1] == 7000
     packed = sol.packed
     at = packed.system.bodies.v_at

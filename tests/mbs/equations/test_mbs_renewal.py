@@ -5,12 +5,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
-from rom.mbs import Groove, JournalBearing
 from rom.mbs.analysis.local_equations import instant
-from rom.mbs.equations import renewal
-from rom.mbs.equations.equations import evaluate, residual, tangents
-from rom.mbs.equations.linear_solve import factorise_bordered, solve_bordered
-from rom.mbs.equations.packing import pack
+from rom.mbs.equations import equations, linear_solve, packing, renewal
 from rom.mbs.equations.renewal import add_renewed, keep_pair_tangents, renew_pair_tangents
 
 Z = (0, 0, 1)
@@ -20,10 +16,9 @@ STEP = 1e-4
 def shaft(cavitation="reynolds"):
     """A heavy shaft on two films, whose bushes hang in springs."""
     mech = rom.Mechanism(gravity=(0, -9.81, 0))
-    body = mech.add_rigid(
-        "shaft", mass=40.0, inertia=(1.0, 1.05, 0.1), at=(0, 0, 0), omega=(0, 0, 300.0)
-    )
-    film = JournalBearing(0.1, 0.05, 1e-4, [Groove(np.pi / 2, 0.35)], cells=(36, 4),
+    solid = {"mass": 40.0, "inertia": (1.0, 1.05, 0.1), "at": (0, 0, 0)}
+    body = mech.add_rigid("shaft", **solid, omega=(0, 0, 300.0))
+    film = rom.mbs.JournalBearing(0.1, 0.05, 1e-4, [rom.mbs.Groove(np.pi / 2, 0.35)], cells=(36, 4),
                           cavitation=cavitation)  # fmt: skip
     for k, side in enumerate((-0.2, 0.3)):
         bush = mech.add_rigid(f"bush {k}", mass=5.0, inertia=(0.1,) * 3, at=(0, 0, side))
@@ -44,9 +39,9 @@ def _small(monkeypatch):
 def matrix(now, v, factors):
     """Iteration matrix at the start with those velocities, dense."""
     s, W, q, still, none = now.packed.system, now.W, now.packed.q, np.zeros(v.size), np.zeros(0)
-    evaluate(s, W, q, v)
-    residual(s, W, q, v, still, none)
-    tangents(s, W, v, still, none, factors)
+    equations.evaluate(s, W, q, v)
+    equations.residual(s, W, q, v, still, none)
+    equations.tangents(s, W, v, still, none, factors)
     W.S[:] += W.Kt
     return W.S.copy()
 
@@ -58,14 +53,14 @@ def solutions(mech, factors):
     fast, none = start.copy(), np.zeros(0)
     fast[[0, 1, 6, 13]] += 0.02, -0.05, 0.03, 0.01  # nothing turns otherwise
     matrix(now, start, factors)
-    assert factorise_bordered(s, W, 0)
+    assert linear_solve.factorise_bordered(s, W, 0)
     keep_pair_tangents(s, W, factors[2], factors[1])
     load, x = np.random.default_rng(1).standard_normal(start.size), np.zeros(start.size)
-    evaluate(s, W, q, fast)
-    residual(s, W, q, fast, np.zeros(fast.size), none)
+    equations.evaluate(s, W, q, fast)
+    equations.residual(s, W, q, fast, np.zeros(fast.size), none)
     assert renew_pair_tangents(s, W, factors[2], factors[1], 0)
     W.rhs[:] = load
-    solve_bordered(s, W, 0, x, none)
+    linear_solve.solve_bordered(s, W, 0, x, none)
     old = x.copy()
     add_renewed(s, W, x, none)
     return old, x, np.linalg.solve(matrix(now, fast, factors), load)
@@ -109,9 +104,9 @@ def test_a_run_goes_on_to_the_bit_from_its_middle():
 
 def test_only_large_mechanisms_with_few_films_are_renewed(monkeypatch):
     monkeypatch.setattr(renewal, "MIN_VELOCITIES", 18)
-    assert len(pack(shaft()).system.renewed) == 2
+    assert len(packing.pack(shaft()).system.renewed) == 2
     monkeypatch.setattr(renewal, "MIN_VELOCITIES", 19)
-    assert len(pack(shaft()).system.renewed) == 0
+    assert len(packing.pack(shaft()).system.renewed) == 0
     monkeypatch.setattr(renewal, "MIN_VELOCITIES", 0)
     monkeypatch.setattr(renewal, "MAX_RENEWED", 1)
-    assert len(pack(shaft()).system.renewed) == 0
+    assert len(packing.pack(shaft()).system.renewed) == 0

@@ -22,19 +22,18 @@ from rom.mbs.kernels.compiled import kernel
 from rom.mbs.kernels.stages import STAGE_KERNELS, STAGE_NAMES, link, needed_by
 from rom.mbs.kernels.tables import Array1, Array3, Index2, Table, table
 
+WRONG = [np.zeros(3), np.zeros((2, 3, 4), dtype=int)]
+WRONG += [np.zeros((4, 3, 2)).T, np.zeros((2, 3, 8))[..., ::2]]
+
 
 @table
 class Inner(Table):
-    """Numbers below another table."""
-
     x: Array1
     n: int
 
 
 @table
 class Outer(Table):
-    """A table with another one."""
-
     blocks: Array3
     at: Index2
     inner: Inner | None
@@ -53,25 +52,17 @@ def outer():
     return Outer(blocks, np.arange(6).reshape(3, 2), Inner(np.array([0.5, 1.5]), 7))
 
 
-def test_compiled_code_reads_and_writes_the_arrays_of_a_table():
+def test_compiled_code_reads_and_writes_the_arrays_of_a_table_and_of_its_copies():
     t, out = outer(), np.zeros(6)
     probed(t, out)
     np.testing.assert_array_equal(out, [t.blocks[1, 2, 3], 5, 1.5, 7, 4, 16])
     assert t.inner.x[0] == -1.0
-
-
-def test_a_table_is_copied_with_its_arrays_only():
-    t = outer()
+    t, out = outer(), np.zeros((2, 6))
     again, changed = pickle.loads(pickle.dumps(t)), t.replace(inner=Inner(np.array([3.0, 4.0]), 8))
-    out = np.zeros((2, 6))
     probed(again, out[0])
     probed(changed, out[1])
     np.testing.assert_array_equal(out, [[23, 5, 1.5, 7, 4, 16], [23, 5, 4.0, 8, 4, 16]])
     assert t.inner.x[0] == 0.5 and changed.blocks is t.blocks
-
-
-WRONG = [np.zeros(3), np.zeros((2, 3, 4), dtype=int)]
-WRONG += [np.zeros((4, 3, 2)).T, np.zeros((2, 3, 8))[..., ::2]]
 
 
 @pytest.mark.parametrize("wrong", WRONG)

@@ -11,14 +11,17 @@ from cases.long import few
 from cases.mbs import motions
 from cases.mbs.mechanisms import simulate_quietly, slider_crank
 from cases.mbs.motions import PARTS, TOP, G, free_crank, heavy_top, pendulum, wound_drive
+from cases.mbs.parts import ORIGIN
 from rom.errors import ModelError, SolverError
 from rom.mbs.integrate import adaptive_step, fixed_step
 from rom.mbs.integrate.run import Record
-from rom.mbs.integrate.simulation import simulate
-from rom.mbs.mechanism import Mechanism
 
 IMPLICIT = ["generalized-alpha", "bdf"]
 ANGLE, PENDULUM_RATE = 1.2, np.sqrt(G / 1.1)  # 1 kg m^2 of the ball's place and 0.1 of its own
+LEAPS = {pendulum: (0.3, 1e-3), heavy_top: (0.02, 1e-3), free_crank: (0.05, 1e-3)}
+LEAPS |= {slider_crank: (0.03, 1e-4), wound_drive: (0.03, 1e-4)}
+LEAPS |= {motions.swing: (0.05, 1e-3), motions.four_links: (0.3, 1e-3)}
+WAYS = [{}, {"method": "bdf"}, {"stabilised": True}, {"rho_inf": 0.5, "save_every": 3}]
 
 
 def swung(t):
@@ -35,7 +38,7 @@ def test_a_pendulum_follows_elliptic_functions_to_the_tolerance(method):
     t_end = 4 * ellipk(np.sin(ANGLE / 2) ** 2) / PENDULUM_RATE
     tolerances, found, steps = (1e-3, 1e-4, 1e-5, 1e-6), [], []
     for rtol in tolerances:
-        sol = simulate(pendulum(), t_end=t_end, rtol=rtol, method=method)
+        sol = rom.simulate(pendulum(), t_end=t_end, rtol=rtol, method=method)
         found.append(np.abs(sol.q[:, :2] - swung(sol.t)).max())
         steps.append(sol.statistics["steps"])
         assert 0.5 < np.divide(*np.diff(sol.t)[-2:]) < 2.0  # none is tiny
@@ -48,7 +51,7 @@ def test_a_pendulum_follows_elliptic_functions_to_the_tolerance(method):
 def test_a_heavy_top_keeps_energy_and_momenta_to_the_tolerance(method):
     """The spin and the momentum about the vertical are constant, which has no limit of its own."""
     rtol = 1e-6
-    sol = simulate(heavy_top(), t_end=0.5, rtol=rtol, method=method)
+    sol = rom.simulate(heavy_top(), t_end=0.5, rtol=rtol, method=method)
     mass, J, omega = TOP["mass"], np.array(TOP["inertia"]), sol.omega("top")
     x, v = sol.q[:, :3], sol.v[:, :3]
     energy = 0.5 * mass * (v**2).sum(1) + 0.5 * (J * omega**2).sum(1) + mass * G * x[:, 2]
@@ -73,12 +76,6 @@ def test_one_call_of_compiled_code_takes_many_steps(method, build, t_end, rtol, 
     monkeypatch.setattr(adaptive_step.control, "take_steps", lambda *x: calls.append(1) or take(*x))
     sol = simulate_quietly(build(), t_end=t_end, rtol=rtol, method=method)
     assert len(calls) < 0.2 * sol.statistics["steps"]
-
-
-LEAPS = {pendulum: (0.3, 1e-3), heavy_top: (0.02, 1e-3), free_crank: (0.05, 1e-3)}
-LEAPS |= {slider_crank: (0.03, 1e-4), wound_drive: (0.03, 1e-4)}
-LEAPS |= {motions.swing: (0.05, 1e-3), motions.four_links: (0.3, 1e-3)}
-WAYS = [{}, {"method": "bdf"}, {"stabilised": True}, {"rho_inf": 0.5, "save_every": 3}]
 
 
 @pytest.mark.parametrize("options", WAYS, ids=str)
@@ -150,11 +147,11 @@ def test_a_step_that_breaks_gives_back_all_that_it_had_changed(method, monkeypat
             patch.setattr(fixed_step, name, 1)
         patch.setattr(Record, "pause", lambda self: found.update({self.t: self.final.memory}))
         count = Brake(pushes_at=0.18)
-        simulate(braked(count, pendulum), **options)
+        rom.simulate(braked(count, pendulum), **options)
     pushed = int(np.argmax(np.array(count.times) > 0.18))
     for call in range(pushed - 20, pushed + 40, 5):
         with pytest.raises(SolverError) as caught:
-            simulate(braked(Brake(call, 0.18), pendulum), **options)
+            rom.simulate(braked(Brake(call, 0.18), pendulum), **options)
         state = caught.value.solution.final
         for name, x in found[state.t].arrays.items():
             assert_array_equal(state.memory.arrays[name], x, err_msg=name)
@@ -173,7 +170,7 @@ def test_a_drive_that_fails_in_a_step_to_come_fails_when_it_is_reached(method):
 
 def test_velocities_of_drives_that_contradict_each_other_later_are_named():
     """Two drives of one axle: their angles part by less than a gap may be, their rates by more."""
-    mech, o = Mechanism(), (0, 0, 0)
+    mech, o = rom.Mechanism(), (0, 0, 0)
     wheel = mech.add_rigid("wheel", mass=1.0, inertia=(1, 1, 1), at=o, markers={"a": o})
     for name, late in (("one", 0.0), ("two", 1e-12)):
         mech.revolute(name, mech.ground.marker(o), wheel.marker("a"), axis=(0, 0, 1))
@@ -188,16 +185,13 @@ def test_velocities_of_drives_that_contradict_each_other_later_are_named():
         simulate_quietly(mech, t_end=1.0, rtol=1e-3)
 
 
-# ---- dop853 --------------------------------------------------------------------------------------
-
-
 def test_dop853_keeps_its_own_steps_and_ends_at_the_end():
     exact = {"method": "dop853", "rtol": 1e-10, "atol": 1e-12}
-    sol = simulate(pendulum(), t_end=1.3, **exact)
+    sol = rom.simulate(pendulum(), t_end=1.3, **exact)
     assert sol.t[-1] == 1.3 and sol.t.size == sol.statistics["steps"] + 1
     assert np.diff(sol.t).max() > 2 * np.diff(sol.t)[0]
     assert np.abs(sol.q[:, :2] - swung(sol.t)).max() < 1e-9
-    fifth = simulate(pendulum(), t_end=1.3, save_every=5, **exact)
+    fifth = rom.simulate(pendulum(), t_end=1.3, save_every=5, **exact)
     assert_array_equal(fifth.t[:-1], sol.t[::5][: fifth.t.size - 1])
     assert_array_equal(fifth.q[-1], sol.q[-1])
     assert fifth.t[-1] == 1.3
@@ -205,11 +199,11 @@ def test_dop853_keeps_its_own_steps_and_ends_at_the_end():
 
 def test_dop853_takes_the_steps_of_scipy_on_the_same_equation():
     """A ball on a spring and a damper, along one axis: y'' = -k/m y - c/m y' - g."""
-    mech, o = Mechanism(gravity=(0, 0, -G)), (0, 0, 0)
+    mech, o = rom.Mechanism(gravity=(0, 0, -G)), (0, 0, 0)
     ball = mech.add_rigid("ball", mass=2.0, inertia=(1, 1, 1), at=o, markers={"c": o})
     below = mech.ground.marker((0, 0, -10.0))
     mech.spring_damper("spring", below, ball.marker("c"), stiffness=50.0, damping=0.7)
-    sol = simulate(mech, t_end=3.0, method="dop853", rtol=1e-9, atol=1e-11)
+    sol = rom.simulate(mech, t_end=3.0, method="dop853", rtol=1e-9, atol=1e-11)
     options = {"method": "DOP853", "t_eval": sol.t, "rtol": 1e-12, "atol": 1e-13}
     own = solve_ivp(lambda t, y: [y[1], -25 * y[0] - 0.35 * y[1] - G], (0, 3), (0, 0), **options)
     assert_allclose(sol.q[:, 2], own.y[0], rtol=0, atol=1e-8)
@@ -219,43 +213,40 @@ def test_dop853_takes_the_steps_of_scipy_on_the_same_equation():
 def test_dop853_without_an_interval_goes_on_to_the_same_bits(tmp_path):
     options = {"t_end": 0.5, "method": "dop853", "rtol": 1e-9, "save_every": 2}
     count = Brake()
-    whole = simulate(braked(count, pendulum), **options)
+    whole = rom.simulate(braked(count, pendulum), **options)
     with pytest.raises(SolverError, match="'brake' failed") as caught:
         broken = braked(Brake(len(count.times) // 2), pendulum)
-        simulate(broken, keep=rom.Keeping(tmp_path / "a"), **options)
+        rom.simulate(broken, keep=rom.Keeping(tmp_path / "a"), **options)
     assert 2 < caught.value.solution.t.size < whole.t.size
     keep = rom.Keeping(tmp_path / "a", resume=True)
-    rest = simulate(braked(Brake(), pendulum), keep=keep, **options)
+    rest = rom.simulate(braked(Brake(), pendulum), keep=keep, **options)
     for name in PARTS:
         assert_array_equal(getattr(rest, name), getattr(whole, name), err_msg=name)
     state = caught.value.solution.final
-    more = simulate(braked(Brake(), pendulum), state=state, **options)
+    more = rom.simulate(braked(Brake(), pendulum), state=state, **options)
     assert_array_equal(more.q[-1], whole.q[-1])
-
-
-def linkage_that_stops():
-    """A slider-crank whose drive turns it by 0.05 rad and holds it; bodies are given a push."""
-    mech, z = Mechanism(gravity=(0, -9.81, 0)), (0, 0, 1)
-    crank = mech.add_rigid("crank", mass=1.0, inertia=(1e-3, 1e-3, 2e-3), at=(0.05, 0, 0),
-                           markers={"p": (-0.05, 0, 0), "q": (0.05, 0, 0)},
-                           velocity=(1e-3, 0, 0))  # fmt: skip
-    rod = mech.add_rigid("rod", mass=1.0, inertia=(1e-3, 1e-3, 2e-3), at=(0.25, 0.05, 0),
-                         markers={"p": (-0.15, -0.05, 0), "q": (0.15, -0.05, 0)})  # fmt: skip
-    slider = mech.add_rigid("slider", mass=1.0, inertia=(1e-3,) * 3, at=(0.4, 0, 0),
-                            markers={"p": (0, 0, 0)})  # fmt: skip
-    mech.revolute("main", mech.ground.marker((0, 0, 0)), crank.marker("p"), axis=z)
-    mech.revolute("pin", crank.marker("q"), rod.marker("p"), axis=z)
-    mech.revolute("wrist", rod.marker("q"), slider.marker("p"), axis=z)
-    mech.prismatic("guide", mech.ground.marker((0.4, 0, 0)), slider.marker("p"), axis=(1, 0, 0))
-    mech.drive("motor", "main", lambda t: 0.05 * (1 - np.where(t < 0.1, (1 - 10 * t) ** 4, 0.0)))
-    return mech
 
 
 @pytest.mark.filterwarnings("ignore:.*constraints repeat others")
 @pytest.mark.parametrize("options", [{}, {"stabilised": True}, {"method": "bdf"}])
 def test_what_comes_to_rest_contradicts_nothing(options):
-    """Where all stand still, velocities are round-off, and so are their gaps."""
-    sol = simulate(linkage_that_stops(), t_end=0.3, assemble=True, **options)
+    """Where all stand still, velocities are round-off, and so are their gaps.
+
+    A slider-crank whose drive turns it by 0.05 rad and holds it; bodies are given a push.
+    """
+    mech, z = rom.Mechanism(gravity=(0, -9.81, 0)), (0, 0, 1)
+    crank = mech.add_rigid("crank", mass=1.0, inertia=(1e-3, 1e-3, 2e-3), at=(0.05, 0, 0),
+                           markers={"p": (-0.05, 0, 0), "q": (0.05, 0, 0)},
+                           velocity=(1e-3, 0, 0))  # fmt: skip
+    rod = mech.add_rigid("rod", mass=1.0, inertia=(1e-3, 1e-3, 2e-3), at=(0.25, 0.05, 0),
+                         markers={"p": (-0.15, -0.05, 0), "q": (0.15, -0.05, 0)})  # fmt: skip
+    slider = mech.add_rigid("slider", mass=1.0, inertia=(1e-3,) * 3, at=(0.4, 0, 0)).marker(ORIGIN)
+    mech.revolute("main", mech.ground.marker((0, 0, 0)), crank.marker("p"), axis=z)
+    mech.revolute("pin", crank.marker("q"), rod.marker("p"), axis=z)
+    mech.revolute("wrist", rod.marker("q"), slider, axis=z)
+    mech.prismatic("guide", mech.ground.marker((0.4, 0, 0)), slider, axis=(1, 0, 0))
+    mech.drive("motor", "main", lambda t: 0.05 * (1 - np.where(t < 0.1, (1 - 10 * t) ** 4, 0.0)))
+    sol = rom.simulate(mech, t_end=0.3, assemble=True, **options)
     assert sol.t[-1] == 0.3
     assert np.abs(sol.v[0]).max() > 1.0
     assert np.abs(sol.v[sol.t > 0.11]).max() < 1e-9

@@ -11,9 +11,9 @@ from cases.mbs.mechanisms import simeon_crank, simulate_quietly
 from cases.mbs.motions import flexible_four_bar, four_links, heavy_top, hub_and_panel, pendulum
 from cases.mbs.parts import ORIGIN, X, Z, on_guide
 from rom.components import cosserat
-from rom.mbs.mechanism import Mechanism
 
 STEEL_BAR = {"EI": 2800.0, "rhoA": 3.1, "n_modes": 5, "stiffened": False}  # 20 mm square
+INSTANTS = 40
 
 
 def four_bar():
@@ -24,7 +24,7 @@ def four_bar():
 
 def arm():
     """Two elastic links, the first driven; at every tolerance its steps once became too small."""
-    mech = Mechanism(gravity=(0, -9.81, 0))
+    mech = rom.Mechanism(gravity=(0, -9.81, 0))
     link = stiffened_beam(1.0, EI=500.0, rhoA=1.0, n_modes=4, stiffened=False)
     one, two = mech.add_flexible("one", link), mech.add_flexible("two", link, at=X)
     mech.revolute("shoulder", mech.ground.marker(ORIGIN), one.marker("root"), axis=Z)
@@ -40,7 +40,7 @@ def rod(n):
     section = {"stretch": (5e6, 5e6, 1.6e7), "bend": (98.0, 98.0, 75.0), "mass": 0.61}
     one = cosserat.straight(1.0, n, frame=along, inertia=(3.8e-6, 3.8e-6, 7.7e-6), **section)
     one = one._replace(inertia=cosserat.body(one).frames.inertia)
-    mech = Mechanism(gravity=(0, 0, -9.81))
+    mech = rom.Mechanism(gravity=(0, 0, -9.81))
     part = mech.add_nonlinear("rod", cosserat.body(one))
     mech.revolute("hinge", mech.ground.marker(ORIGIN), part.marker("start"), axis=(0, 1, 0))
     return mech
@@ -59,9 +59,6 @@ MECHANISMS = {
     "rod of 40": (lambda: rod(40), 0.5, 10_000),
     "rod of 100": (lambda: rod(100), 0.5, 5_000),
 }
-
-
-INSTANTS = 40
 
 
 def seen(mech, t_end, n=None, **options):
@@ -94,7 +91,7 @@ def test_finer_rods_take_no_more_steps():
 
 def test_a_step_does_not_leap_to_another_equilibrium():
     """A spring whose mass has come to rest has one on its other side, too."""
-    mech, end = Mechanism(gravity=(0, 0, 0)), 1e5
+    mech, end = rom.Mechanism(gravity=(0, 0, 0)), 1e5
     law = {"stiffness": 1e8, "damping": 1.8e4, "free_length": 1.0}
     mech.spring_damper("spring", mech.ground.marker(ORIGIN), on_guide(mech, at=1.2 * X), **law)
     sol = rom.simulate(mech, t_end=end, rtol=0.5)

@@ -8,8 +8,6 @@ import rom
 from benchmarks.units import as_mechanism
 from cases.gear_unit import rigid_unit
 from cases.long import few
-from rom.errors import SolverError
-from rom.mbs import Impact
 
 ORIGIN, X, g = (0, 0, 0), (1, 0, 0), 9.81
 METHODS = ("generalized-alpha", "bdf")
@@ -26,9 +24,7 @@ def block(mass=1.0, speed=SPEED):
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("mass", [1.0, 1e-3])
 @pytest.mark.parametrize("transition", [1e-3, 1e-7])
-def test_a_block_stops_by_friction_in_steps_far_longer_than_its_speed_takes_to_turn(
-    method, mass, transition
-):
+def test_friction_stops_a_block_in_steps_longer_than_its_speed_turns_in(method, mass, transition):
     """At v^2 / (2 mu g), after v / (mu g); and does not go back."""
     mech, h = block(mass), 1e-2
     mech.friction("shoes", "guide", mu=MU, transition_speed=transition)
@@ -78,7 +74,7 @@ def test_laws_in_python_are_asked_again_for_every_part_of_a_correction():
 def test_a_block_that_strikes_a_stop_in_long_steps_comes_to_rest_on_it(k, restitution, h):
     """Where a constant load and the stop balance: F = k d."""
     mech, load = block(0.01, 0.3), 0.2
-    law = Impact(k, 1.0, restitution=restitution, impact_speed=0.3)
+    law = rom.mbs.Impact(k, 1.0, restitution=restitution, impact_speed=0.3)
     mech.stop("stop", "guide", law, lower=-1e-3, upper=1e-3)
     mech.force("load", mech.part("block").marker(ORIGIN), (load, 0, 0))
     sol = rom.simulate(mech, t_end=1.0, dt=h, rho_inf=0.0)
@@ -88,7 +84,6 @@ def test_a_block_that_strikes_a_stop_in_long_steps_comes_to_rest_on_it(k, restit
 
 @pytest.mark.parametrize(("rpm", "steps"), few(1, [(300, 110), (500, 80), (725, 50)]))
 def test_teeth_and_films_are_stepped_through_at_speeds_where_teeth_leave(rpm, steps):
-    """Teeth bear the torque over the base radius, in the mean."""
     unit = rigid_unit(speed=rpm * np.pi / 30)
     mech, T = as_mechanism(unit), unit.mesh_period
     sol = rom.simulate(mech, state=rom.equilibrium(mech), t_end=12 * T, dt=T / steps, rho_inf=0.6)
@@ -99,6 +94,6 @@ def test_teeth_and_films_are_stepped_through_at_speeds_where_teeth_leave(rpm, st
 def test_a_force_that_jumps_has_no_balance_and_is_refused_before_the_last_correction():
     mech = block()
     mech.motor("motor", "guide", lambda t, x, v: -5.0 * np.sign(v), compiled=True)
-    with pytest.raises(SolverError, match=r"did not converge in [34]\d corrections") as caught:
+    with pytest.raises(rom.SolverError, match=r"did not converge in [34]\d corrections") as caught:
         rom.simulate(mech, t_end=1.0, dt=1e-2)
     assert caught.value.solution.t[-1] == pytest.approx(SPEED / 5.0, abs=1.1e-2)

@@ -19,7 +19,6 @@ from rom.mbs.results.interpolation import vector_rate
 
 @pytest.mark.parametrize("method", ["generalized-alpha", "dop853"])
 def test_a_bouncing_ball_touches_the_floor_when_it_must(method):
-    """Falls from 1 m and loses a fifth of its speed each time; times in closed form."""
     mech, state, times, e = falling(), None, [], 0.8
     for _ in range(4):
         sol = simulate(mech, t_end=10.0, dt=0.013, method=method, state=state)

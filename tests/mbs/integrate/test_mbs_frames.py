@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+import rom
 from cases.beam import stiffened_beam
 from cases.long import ROM_LONG, few
 from cases.mbs.mechanisms import simulate_quietly
 from cases.mbs.motions import flexible_four_bar, hub_and_panel
 from cases.mbs.parts import Z, turned
+from cases.mbs.slender import assembled
 from cases.refusals import refuses
 from rom import rotation
-from rom.errors import ConfigError
 from rom.mbs.integrate.simulation import release, simulate
-from rom.mbs.mechanism import Mechanism
 
 FRAMES = ("root", "tip", ("root", "tip"), "mean-axis", "buckens")
 SEEDS = [0, 2, 1, *range(3, 100)]  # of the mechanisms drawn
@@ -23,15 +23,14 @@ RTOL = 1e-4
 def beams(rng, frame, n):
     """Beams of 0.5 to 1.5 m; as flexible each that they bend by a hundredth in their motions."""
     sizes = rng.uniform(0.5, 1.5, n)
-    return [
-        stiffened_beam(L, EI=150 * L**2, rhoA=1 / L, n_modes=3, stiffened=False)
-        .with_reference(frame) for L in sizes
-    ]  # fmt: skip
+    given = {"n_modes": 3, "stiffened": False}
+    made = (stiffened_beam(L, EI=150 * L**2, rhoA=1 / L, **given) for L in sizes)
+    return [beam.with_reference(frame) for beam in made]
 
 
 def chain(rng, frame):
     """One to three beams under a hinge, then ball joints; a spring holds the end."""
-    mech, last, at = Mechanism(gravity=(0, -9.81, 0)), None, np.zeros(3)
+    mech, last, at = rom.Mechanism(gravity=(0, -9.81, 0)), None, np.zeros(3)
     for k, body in enumerate(beams(rng, frame, rng.integers(1, 4))):
         A = turned(rng.uniform(-1, 1))
         part = mech.add_flexible(f"beam {k}", body, at=at, orientation=A)
@@ -55,7 +54,7 @@ def loop(rng, frame):
 
 def hub(rng, frame):
     """A free hub that turns, with one or two panels on hinges and springs."""
-    mech = Mechanism(gravity=(0, 0, 0))
+    mech = rom.Mechanism(gravity=(0, 0, 0))
     turning = np.r_[rng.normal(size=2) * 0.3, rng.uniform(1, 4)]
     arms = {"right": (0.3, 0, 0), "left": (-0.3, 0, 0)}
     centre = mech.add_rigid("hub", mass=5, inertia=(0.4, 0.5, 0.6), at=(0, 0, 0), markers=arms,
@@ -127,8 +126,6 @@ def test_a_hinged_panel_leaves_the_momentum_of_its_hub(frame):
 
 
 def test_a_state_of_an_older_file_is_refused_where_frames_have_changed(tmp_path, monkeypatch):
-    import rom
-
     for frame in ("root", "mean-axis"):
         mech = drawn(0, frame)
         state = moved(mech, dt=1e-2).final
@@ -145,15 +142,14 @@ def test_a_state_of_an_older_file_is_refused_where_frames_have_changed(tmp_path,
             if frame == "mean-axis" and name in ("simulate", "release"):
                 go_on(mech, old)
             elif frame == "root":
-                refuses(ConfigError, r"'beam 0'.*on mean axes", go_on, mech, old)
+                refuses(rom.ConfigError, r"'beam 0'.*on mean axes", go_on, mech, old)
 
 
 def test_loads_count_in_the_frame_of_the_user():
-    """A hanging cantilever turned by its own tip against the frame on it."""
     body = stiffened_beam(EI=30.0, n_modes=6, stiffened=False)
     found = {}
     for frame in ("root", "tip"):
-        mech = Mechanism(gravity=(0, -9.81, 0))
+        mech = rom.Mechanism(gravity=(0, -9.81, 0))
         beam = mech.add_flexible("beam", body.with_reference(frame))
         mech.fixed("wall", mech.ground.marker((0, 0, 0)), beam.marker("root"))
         sol = moved(mech, dt=1e-2)
@@ -168,16 +164,13 @@ def test_loads_count_in_the_frame_of_the_user():
 
 @pytest.mark.fenicsx
 def test_stress_with_its_inertial_part_is_the_same_in_any_frame():
-    import rom
-    from cases.mbs.slender import assembled
-
     body = rom.reduce(
         assembled((1.0, 0.02, 0.02), (6, 1, 1)), method=rom.CraigBampton(n_modes=2),
         interfaces={"root": "rbe2", "tip": "rbe2"}, stress=True, certify=False,
     )  # fmt: skip
     fields = []
     for frame in ("mean-axis", "root", "tip"):
-        mech = Mechanism(gravity=(0, -9.81, 0))
+        mech = rom.Mechanism(gravity=(0, -9.81, 0))
         bar = mech.add_flexible("bar", body.with_reference(frame))
         mech.revolute("hinge", mech.ground.marker((0, 0, 0)), bar.marker("root"), axis=Z)
         fields.append(moved(mech, dt=1e-3).stress("bar", -1))

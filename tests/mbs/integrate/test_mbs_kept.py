@@ -3,6 +3,7 @@
 import os
 import random
 import signal
+from functools import cache
 
 import numpy as np
 import pytest
@@ -16,7 +17,6 @@ from cases.refusals import refuses
 from rom.errors import ConfigError, InterruptedRun, ResourceError, RomError, SolverError
 from rom.mbs.integrate import keeping, simulation
 from rom.mbs.integrate.run import Record
-from rom.mbs.mechanism import Mechanism
 
 FAULTS_EACH = 10 if ROM_LONG else 1
 
@@ -72,7 +72,7 @@ def mechanism(where, broken):
     """Two bodies on hinges, with all that a user may hand over; one of it breaks."""
     laws = dict.fromkeys(("force", "motor", "drive", "event", "load"), lambda t, value: value)
     laws[where] = broken
-    mech = Mechanism()
+    mech = rom.Mechanism()
     arm = {"mass": 1.0, "inertia": (0.1,) * 3, "markers": {"a": (-0.5, 0, 0), "b": (0.5, 0, 0)}}
     one, two = (mech.add_rigid(name, at=(x, 0, 0), **arm) for name, x in (("1", 0.5), ("2", 1.5)))
     three = mech.add_rigid("3", at=(0, 2, 0), mass=1.0, inertia=(1, 1, 1), markers={"c": (0, 0, 0)})
@@ -92,17 +92,9 @@ def run(where, broken, options, **more):
     return simulate_quietly(mechanism(where, broken), t_end=T_END, **options, **more)
 
 
-@pytest.fixture(scope="module")
-def whole():
-    """The motions that nothing interrupts, by method."""
-    found = {}
-
-    def of(method):
-        if method not in found:
-            found[method] = run("force", Broken(), METHODS[method])
-        return found[method]
-
-    return of
+@cache
+def whole(method):
+    return run("force", Broken(), METHODS[method])
 
 
 def same(one, other):
@@ -121,7 +113,7 @@ def same(one, other):
 @pytest.mark.parametrize("where", ["force", "motor", "drive", "event", "load"])
 @pytest.mark.parametrize("method", METHODS)
 def test_a_function_that_breaks_is_named_and_the_repaired_run_has_the_same_bits(
-    method, where, whole, tmp_path, monkeypatch
+    method, where, tmp_path, monkeypatch
 ):
     reference, rng = whole(method), random.Random(method + where)
     monkeypatch.setattr(os, "fsync", lambda _: None)  # whole files are tested elsewhere
@@ -163,9 +155,7 @@ def failed(where, method, fault, at, folder):
 
 @pytest.mark.parametrize("where", ["force", "motor", "drive", "event", "load"])
 @pytest.mark.parametrize("method", METHODS)
-def test_a_function_that_breaks_at_once_leaves_no_motion_beyond_the_start(
-    method, where, monkeypatch
-):
+def test_a_function_that_breaks_at_once_leaves_no_motion_but_the_start(method, where, monkeypatch):
     monkeypatch.setattr(Broken, "at", -1.0)
     monkeypatch.setattr(Broken, "fault", staticmethod(FAULTS["exception"][0]))
     says = f"'{where}' failed at t = 0 s: ZeroDivisionError"
@@ -214,9 +204,7 @@ def test_a_warning_that_is_an_error_does_not_take_the_motion_with_it(monkeypatch
         ({"dt": 1e-9, "t_start": 1e9 - 1, "t_end": 1e9}, ConfigError, "is lost beside t = 1e"),
     ],
 )
-def test_more_than_can_be_computed_or_kept_is_refused_before_it_is_tried(
-    options, kind, words, method
-):
+def test_more_than_can_be_computed_or_kept_is_refused_before_a_try(options, kind, words, method):
     refuses(kind, words, rom.simulate, ball(), method=method, **{"t_end": 1.0} | options)
 
 

@@ -11,9 +11,12 @@ import rom
 from cases.mbs.mechanisms import simeon_crank, simulate_quietly, slider_crank
 from cases.mbs.motions import PARTS, four_links, swing, wound_drive
 from cases.refusals import refuses
-from rom.errors import FileFormatError, QualityGateError
 
 CASES = [(swing, 1e-2), (simeon_crank, 1e-5), (wound_drive, 1e-3), (four_links, 1e-3)]
+PLAIN = [{}, {"rho_inf": 0.6}, {"method": "bdf"}]
+# drives need their rates for these: differences end where a run ends
+RATED = [{"stabilised": True}, {"method": "bdf", "order": 1}, {"method": "bdf", "order": 5}]
+RUNS = [*product(CASES, PLAIN), *product([CASES[0], (slider_crank, 1e-3)], RATED)]
 
 
 def pieces(build, dt, path, **options):
@@ -22,12 +25,6 @@ def pieces(build, dt, path, **options):
     state = simulate_quietly(build(), t_end=23 * dt, dt=dt, **options).final
     state = rom.load_state(rom.save_state(state, path))
     return whole, simulate_quietly(build(), t_end=60 * dt, dt=dt, state=state, **options)
-
-
-PLAIN = [{}, {"rho_inf": 0.6}, {"method": "bdf"}]
-# drives need their rates for these: differences end where a run ends
-RATED = [{"stabilised": True}, {"method": "bdf", "order": 1}, {"method": "bdf", "order": 5}]
-RUNS = [*product(CASES, PLAIN), *product([CASES[0], (slider_crank, 1e-3)], RATED)]
 
 
 def told(x):
@@ -80,10 +77,10 @@ def test_a_state_file_says_what_is_wrong_with_it(tmp_path):
     (tmp_path / "flipped.npz").write_bytes(data[:at] + b"\x01" + data[at + 1 :])
     (tmp_path / "cut.npz").write_bytes(data[: len(data) // 2])
     for name in ("flipped", "cut", "none"):
-        with pytest.raises(FileFormatError, match=r"not a complete state file|no such file"):
+        with pytest.raises(rom.FileFormatError, match=r"not a complete state file|no such file"):
             rom.load_state(tmp_path / f"{name}.npz")
-    refuses(FileFormatError, "schema 'rom-state'", rom.load, path)
-    with pytest.raises(QualityGateError, match="v of the state must be finite"):
+    refuses(rom.FileFormatError, "schema 'rom-state'", rom.load, path)
+    with pytest.raises(rom.QualityGateError, match="v of the state must be finite"):
         rom.save_state(replace(state, v=state.v * np.nan), path)
     assert path.read_bytes() == data
     assert {p.stem for p in tmp_path.iterdir()} == {"a", "b", "cut", "flipped"}

@@ -10,8 +10,8 @@ from numpy.testing import assert_allclose
 
 import rom
 from cases.mbs.mechanisms import lattice, lattice_body, slider_crank
+from cases.mbs.parts import on_guide
 from cases.refusals import refuses
-from rom.errors import ModelError, RomWarning
 
 Z = (0, 0, 1)
 
@@ -40,9 +40,9 @@ def response(mech, **options):
 @pytest.mark.parametrize("asked", [moved, rom.linearize, rom.steady_motion, response])
 def test_a_start_far_from_joints_or_drives_is_refused_unless_asked_for(asked):
     for fault, name in (({"gap": 0.0051}, "pin"), ({"angle": 0.3}, "turn")):
-        with pytest.raises(ModelError, match=rf"^{name}: the start contra.*open by .*=True"):
+        with pytest.raises(rom.ModelError, match=rf"^{name}: the start contra.*open by .*=True"):
             asked(rod_on_a_pin(**fault))
-        with warnings.catch_warnings(action="error", category=RomWarning):
+        with warnings.catch_warnings(action="error", category=rom.RomWarning):
             asked(rod_on_a_pin(**fault | {"rate": 0.0}), assemble=True)
 
 
@@ -61,16 +61,16 @@ def test_statics_begin_where_drives_say_and_not_where_joints_are_open():
     assert_allclose(sol.drive_load("turn")[0], 9.81 * 0.5 * np.cos(0.3), rtol=1e-6)
     for asked in (rom.equilibrium, partial(rom.inverse_dynamics, t=[0.0, 1.0]),
                   partial(rom.periodic_motion, period=0.1)):  # fmt: skip
-        with pytest.raises(ModelError, match=r"^pin: the start contradicts joints and drives"):
+        with pytest.raises(rom.ModelError, match=r"^pin: the start contradicts joints and drives"):
             asked(rod_on_a_pin(gap=0.05, angle=0.3, rate=0.0))
 
 
 def test_a_state_that_new_joints_do_not_fit_is_refused_unless_asked_for():
     state = rom.equilibrium(rod_on_a_pin(angle=0.3))
-    with pytest.raises(ModelError, match=r"^turn: the start contradicts"):
+    with pytest.raises(rom.ModelError, match=r"^turn: the start contradicts"):
         rom.release(rod_on_a_pin(angle=0.4), state)
-    assert_allclose(rom.release(rod_on_a_pin(angle=0.4), state, assemble=True).q[1],
-                    0.5 * np.sin(0.4), atol=1e-12)  # fmt: skip
+    height = rom.release(rod_on_a_pin(angle=0.4), state, assemble=True).q[1]
+    assert_allclose(height, 0.5 * np.sin(0.4), atol=1e-12)
 
 
 @pytest.mark.parametrize(("omega", "rate", "told"), [
@@ -80,7 +80,7 @@ def test_a_given_velocity_that_a_drive_contradicts_is_told_or_refused(omega, rat
     """A rod that was given none has the one of its drive."""
     mech, said = rod_on_a_pin(omega=omega, rate=rate), f"the velocity of 'rod' changes by {told} of"
     if told and float(told) > 1e-2:
-        refuses(ModelError, f"^rod: the start contradicts .*{said}", moved, mech)
+        refuses(rom.ModelError, f"^rod: the start contradicts .*{said}", moved, mech)
     with warnings.catch_warnings(record=True, action="always") as caught:
         sol = moved(mech, assemble=bool(told) and float(told) > 1e-2)
     assert [said in str(w.message) for w in caught] == [True] * (told == "0.005")
@@ -91,15 +91,13 @@ def test_what_moves_a_light_body_counts_as_much_as_what_moves_a_heavy_one():
     """Speeds are compared, not momenta; a body next to rest is compared with the fastest."""
     for mass, slow, refused in ((1e3, 0.0, True), (1e-6, 0.0, True), (1.0, 3.999, False)):
         mech = rod_on_a_pin(omega=4.0)
-        light = mech.add_rigid("light", mass=mass, inertia=(mass,) * 3, at=(0, 0, 1),
-                               velocity=(slow or 2.0, 0, 0))  # fmt: skip
-        mech.prismatic("rail", mech.ground.marker((0, 0, 1)), light.marker((0, 0, 0)),
-                       axis=(1, 0, 0))  # fmt: skip
+        given = {"mass": mass, "at": (0, 0, 1), "base": (0, 0, 1), "guide": "rail"}
+        on_guide(mech, "light", **given, velocity=(slow or 2.0, 0, 0))
         mech.drive("push", "rail", lambda t: 4.0 * t)
         if refused:
-            refuses(ModelError, r"^light: .*'light' changes by [\d.]+ of", moved, mech)
+            refuses(rom.ModelError, r"^light: .*'light' changes by [\d.]+ of", moved, mech)
         else:
-            with pytest.warns(RomWarning, match="the velocity of 'light' changes by 0.000"):
+            with pytest.warns(rom.RomWarning, match="the velocity of 'light' changes by 0.000"):
                 moved(mech)
 
 
@@ -114,7 +112,6 @@ def flexible(gaps, fixed=("n0",)):
 
 
 def test_closing_a_gap_does_not_strain_a_body_that_can_follow():
-    """The load on the hinge is that of the rod drawn where it belongs."""
     drawn, opened = (moved(flexible([gap]), assemble=True) for gap in (0.0, 0.1))
     assert np.abs(opened.elastic("rod")[0]).max() < 1e-15
     assert_allclose(opened.reaction("n0")[0, :3], drawn.reaction("n0")[0, :3], atol=1e-9)
@@ -122,7 +119,7 @@ def test_closing_a_gap_does_not_strain_a_body_that_can_follow():
 
 def test_a_strain_that_closing_needs_is_told():
     held, gaps = ("n0", "n1", "n12"), (0.0, 0.0, 1e-3)
-    with pytest.warns(RomWarning, match="it bends 'rod' by"):
+    with pytest.warns(rom.RomWarning, match="it bends 'rod' by"):
         sol = moved(flexible(gaps, held))
     assert_allclose(sol.position("rod", "n12")[0, 0], 1.0 + 1e-3, atol=1e-12)
 
@@ -146,10 +143,10 @@ def geared_disc(speed, rate=None, body=None):
 
 
 def test_speeds_of_spins_and_diagrams_are_those_that_drives_prescribe():
-    with pytest.raises(ModelError, match=r"^motor: the velocities of joints and drives contra"):
+    with pytest.raises(rom.ModelError, match=r"^motor: the velocities of joints and drives contra"):
         rom.equilibrium(geared_disc(0.0, 100.0), spin={"axle": 50.0})
     assert rom.equilibrium(geared_disc(0.0, 50.0), spin={"axle": 50.0}).v[5] == 50.0
-    with pytest.warns(RomWarning, match="no body turns at the speed 50 rad/s"):
+    with pytest.warns(rom.RomWarning, match="no body turns at the speed 50 rad/s"):
         rom.campbell(lambda speed: geared_disc(100.0), [50.0, 100.0], frame="world")
 
 
@@ -157,7 +154,7 @@ def test_speeds_of_spins_and_diagrams_are_those_that_drives_prescribe():
 def test_a_reduced_body_that_spins_is_not_counted_in_axes_of_the_world(asked):
     """Its shapes turn: 443.6 and 557.5 Hz were said of a shaft of 511.4 and 512.0 Hz."""
     mech = geared_disc(50.0, body=lattice_body(lattice(stiffness=4e4)))
-    with pytest.raises(ModelError, match=r"^disc: it spins at .* rad.s and its shapes turn"):
+    with pytest.raises(rom.ModelError, match=r"^disc: it spins at .* rad.s and its shapes turn"):
         asked(mech, frame="world", assemble=True)
 
 

@@ -8,43 +8,34 @@ from numba import njit
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 
-from cases.mbs.mechanisms import prepared, random_body, simulate_quietly, slider_crank
-from cases.mbs.motions import G, errors, falling, four_links, free_crank, heavy_top, pendulum
+import rom
+from cases.mbs.mechanisms import prepared, simulate_quietly, slider_crank
+from cases.mbs.motions import G, errors, falling, four_links, free_crank, heavy_top, pendulum, swing
 from cases.mbs.parts import on_guide
 from rom import rotation
-from rom.errors import SolverError
 from rom.mbs.equations.packing import pack
-from rom.mbs.integrate.adaptive_step import _Run
-from rom.mbs.integrate.generalized_alpha import bdf_coefficients, coefficients, turn_columns
-from rom.mbs.integrate.simulation import simulate
-from rom.mbs.integrate.step_control import LENGTH, increment
-from rom.mbs.integrate.step_memory import across, shift_ahead
+from rom.mbs.integrate import adaptive_step, generalized_alpha, step_control, step_memory
 from rom.mbs.kernels.work import HAS_FACTOR, STEPS, Step, workspace
-from rom.mbs.mechanism import Mechanism
 
 IMPLICIT = ["generalized-alpha", "bdf"]
+STATISTICS = ("steps", "iterations", "factorisations", "rejected", "shortest", "longest")
 
 
 class End(NamedTuple):
-    """Velocities and accelerations at an end of a step."""
-
     v: np.ndarray
     a: np.ndarray
 
 
 @njit
 def increment_between(s, h, left, right, out):
-    increment(s, h, left, right, out)
-
-
-STATISTICS = ("steps", "iterations", "factorisations", "rejected", "shortest", "longest")
+    step_control.increment(s, h, left, right, out)
 
 
 def test_dop853_has_its_order_in_the_error_per_tolerance():
     """Errors go with the tolerance; steps with its eighth root."""
-    exact = simulate(heavy_top(), t_end=0.2, dt=0.05, method="dop853")
+    exact = rom.simulate(heavy_top(), t_end=0.2, dt=0.05, method="dop853")
     options = ({"rtol": tol, "atol": tol} for tol in (1e-5, 1e-9))
-    runs = [simulate(heavy_top(), t_end=0.2, dt=0.05, method="dop853", **o) for o in options]
+    runs = [rom.simulate(heavy_top(), t_end=0.2, dt=0.05, method="dop853", **o) for o in options]
     steps = [run.statistics["steps"] for run in runs]
     assert 1e4 ** (1 / 9) < steps[1] / steps[0] < 1e4 ** (1 / 7)
     assert errors(runs[1], exact, "q")[0] < 1e-3 * errors(runs[0], exact, "q")[0]
@@ -54,8 +45,8 @@ def test_dop853_has_its_order_in_the_error_per_tolerance():
 def test_the_very_first_step_has_the_order_already(method):
     table = []
     for h in (4e-4, 2e-4, 1e-4):
-        sol = simulate(heavy_top(), t_end=h, dt=h, method=method, tolerance=1e-12)
-        exact = simulate(heavy_top(), t_end=h, dt=h, method="dop853")
+        sol = rom.simulate(heavy_top(), t_end=h, dt=h, method=method, tolerance=1e-12)
+        exact = rom.simulate(heavy_top(), t_end=h, dt=h, method="dop853")
         table.append(errors(sol, exact, ("a", "lam")))
     order = np.log2(np.array(table)[:-1] / np.array(table)[1:])
     assert (order[-1] > 1.8).all()
@@ -89,23 +80,23 @@ def test_the_increment_of_a_step_is_known_to_fourth_order():
 def test_another_length_of_steps_prepares_the_method_for_it(build, t_end, monkeypatch):
     """Acceleration a + (alpha_m - alpha_f) h da/dt, velocity ahead across constraints only."""
     seen = []
-    original = _Run.chunk
+    original = adaptive_step._Run.chunk
 
     def chunk(self, limit):
-        before = self.now.number[LENGTH]
-        taken, h = original(self, 1), self.now.number[LENGTH]
+        before = self.now.number[step_control.LENGTH]
+        taken, h = original(self, 1), self.now.number[step_control.LENGTH]
         if self.T.count[STEPS] < 5 or h == before or self.T.count[HAS_FACTOR]:
             return taken
         now, T, record = self.record.final, self.T, self.record
         lag = (T.method[3] - T.method[4]) * h * self.now.jerk
-        ahead = h**2 * shift_ahead(record, now, T.method, self.now.jerk)
-        across_ahead = across(record, workspace(record.packed.system, 0), now, ahead)
+        ahead = h**2 * step_memory.shift_ahead(record, now, T.method, self.now.jerk)
+        across_ahead = step_memory.across(record, workspace(record.packed.system, 0), now, ahead)
         moved = (T.a - now.a, lag), (T.v - now.v, across_ahead)
         seen.append([np.linalg.norm(x - known) / np.linalg.norm(known) for x, known in moved])
         return taken
 
-    monkeypatch.setattr(_Run, "chunk", chunk)
-    simulate(build(), t_end=t_end, rtol=1e-3, rho_inf=0.0)
+    monkeypatch.setattr(adaptive_step._Run, "chunk", chunk)
+    rom.simulate(build(), t_end=t_end, rtol=1e-3, rho_inf=0.0)
     assert len(seen) > 2
     assert (np.max(seen, axis=0) < [0.3, 1e-6]).all()
 
@@ -113,13 +104,13 @@ def test_another_length_of_steps_prepares_the_method_for_it(build, t_end, monkey
 @pytest.mark.parametrize("before", [0.1, 0.25, 0.4])
 def test_weights_of_bdf_differentiate_parabolas_exactly(before):
     h = 0.2
-    method, weights = bdf_coefficients(h, before)
+    method, weights = generalized_alpha.bdf_coefficients(h, before)
     t = np.array([0.0, -h, -h - before])
     values = np.array([np.ones(3), t, t**2])
     assert_allclose(values @ weights, [0.0, 1.0, 0.0], atol=1e-13)
     _, beta, gamma, *_ = method
     assert_allclose([gamma / (beta * h), 1 / (beta * h**2)], [weights[0], weights[0] ** 2])
-    assert_allclose(bdf_coefficients(h, 0.0)[1], [1 / h, -1 / h, 0])
+    assert_allclose(generalized_alpha.bdf_coefficients(h, 0.0)[1], [1 / h, -1 / h, 0])
 
 
 @pytest.mark.parametrize("method", IMPLICIT)
@@ -158,18 +149,18 @@ def test_events_are_found_with_chosen_steps(method):
     """Free fall: every step is exact for generalised-alpha."""
     atol = 1e-10 if method != "bdf" else 1e-5
     for terminal, end in ((True, np.sqrt(2 / G)), (False, 1.0)):
-        sol = simulate(falling(terminal), t_end=1.0, method=method, rtol=1e-5)
+        sol = rom.simulate(falling(terminal), t_end=1.0, method=method, rtol=1e-5)
         assert_allclose([sol.t[-1], *sol.events["floor"].t], [end, np.sqrt(2 / G)], atol=atol)
         assert sol.status.startswith("Stopped by event 'floor'") == terminal
         assert (np.diff(sol.t) > 0).all()
 
 
 def test_a_variable_run_goes_on_and_saves_less_if_asked():
-    half = simulate(pendulum(), t_end=0.5, rtol=1e-3)
-    rest = simulate(pendulum(), t_end=1.0, rtol=1e-3, state=half.final)
-    exact = simulate(pendulum(), t_end=1.0, dt=0.5, method="dop853")
+    half = rom.simulate(pendulum(), t_end=0.5, rtol=1e-3)
+    rest = rom.simulate(pendulum(), t_end=1.0, rtol=1e-3, state=half.final)
+    exact = rom.simulate(pendulum(), t_end=1.0, dt=0.5, method="dop853")
     assert np.abs(rest.q[-1] - exact.q[-1]).max() < 2e-3
-    some = simulate(pendulum(), t_end=0.5, rtol=1e-3, save_every=7)
+    some = rom.simulate(pendulum(), t_end=0.5, rtol=1e-3, save_every=7)
     assert_array_equal(some.t[:-1], half.t[::7][: some.t.size - 1])
     assert some.t[-1] == 0.5
 
@@ -181,8 +172,8 @@ def test_a_force_that_jumps_all_the_time_makes_the_step_too_small(method):
 
     mech, says = pendulum(), r"the step became too small at t = .* its error"
     mech.user_force("noise", jumping, mech.parts["bob"].marker("tip"))
-    with pytest.raises(SolverError, match=says) as caught:
-        simulate(mech, t_end=1.0, method=method, rtol=1e-6)
+    with pytest.raises(rom.SolverError, match=says) as caught:
+        rom.simulate(mech, t_end=1.0, method=method, rtol=1e-6)
     assert caught.value.solution.t[-1] < 1.0
 
 
@@ -190,11 +181,11 @@ def test_a_force_that_jumps_all_the_time_makes_the_step_too_small(method):
 def test_a_first_step_that_is_far_too_long_is_shortened_until_it_fits(method):
     """A vibration of a millisecond in a run of a day: exp(-w D t) times a sine."""
     w, D, x0, day = 1e4, 0.9, 0.2, 86400.0
-    mech = Mechanism(gravity=(0, 0, 0))
+    mech = rom.Mechanism(gravity=(0, 0, 0))
     law = {"stiffness": w**2, "damping": 2 * D * w, "free_length": 1.0}
     mass = on_guide(mech, at=(1 + x0, 0, 0))
     mech.spring_damper("spring", mech.ground.marker((0, 0, 0)), mass, **law)
-    sol = simulate(mech, t_end=day, method=method, rtol=1.0, save_every=20)
+    sol = rom.simulate(mech, t_end=day, method=method, rtol=1.0, save_every=20)
     fast, t = w * np.sqrt(1 - D**2), sol.t
     exact = x0 * np.exp(-D * w * t) * (np.cos(fast * t) + D * w / fast * np.sin(fast * t))
     assert_allclose(sol.position("mass")[:, 0] - 1.0, exact, atol=1e-6 * x0)
@@ -203,7 +194,7 @@ def test_a_first_step_that_is_far_too_long_is_shortened_until_it_fits(method):
 
 @njit
 def turned_columns(s, W, T):
-    turn_columns(s, W, T, 1)
+    generalized_alpha.turn_columns(s, W, T, 1)
 
 
 def change(psi, delta):
@@ -211,23 +202,15 @@ def change(psi, delta):
     return rotation.log(rotation.multiply(rotation.exp(-psi), rotation.exp(psi + delta)))
 
 
-def hung():
-    """A flexible body on a ball joint."""
-    mech = Mechanism()
-    one = mech.add_flexible("one", random_body(np.random.default_rng(5)))
-    mech.spherical("hook", mech.ground.marker(mech.design_point(one.marker("a"))), one.marker("a"))
-    return prepared(mech)
-
-
 def test_columns_of_rotations_count_in_increments_of_the_rotation_vector():
     """A wrong tangent only makes Newton slower: no motion would tell."""
     rng = np.random.default_rng(6)
-    packed, W = hung()
+    packed, W = prepared(swing())
     n, m = packed.v.size, W.value.size
     psi = rng.normal(size=n)
     vectors = [np.zeros(k) for k in (packed.q.size, n, n, n, m, packed.q.size, n, n, m)]
     counts = np.zeros(11, dtype=np.int64)
-    constants = (np.zeros(4), coefficients(1e-3, 0.9), np.zeros(3))
+    constants = (np.zeros(4), generalized_alpha.coefficients(1e-3, 0.9), np.zeros(3))
     history = np.zeros((2, 1, n)), np.zeros(n)
     T = Step(*vectors, psi, np.zeros(3), np.zeros(3), counts, *constants, *history)
     W.Kt[:], W.UG[:] = rng.normal(size=(n, n)), rng.normal(size=(m, n))

@@ -14,17 +14,17 @@ from cases.mbs import mechanisms
 from cases.mbs.mechanisms import lattice, lattice_body
 from cases.solid import CORNERS, GAUSS, block, reduced, shape_functions
 from rom import rotation
-from rom.mbs.integrate.simulation import simulate
-from rom.mbs.mechanism import Mechanism
-from rom.model import Material
 
 EXACT = {"method": "dop853", "rtol": 1e-9, "atol": 1e-11}
 GRAVITY = np.array([0.0, 0.0, -9.81])
+SIZE, CELLS = np.array([1.0, 0.15, 0.12]), np.array([6, 1, 1])
+ANGLE, T_TURN, T_END = 0.3, 0.4, 0.5  # the hinge turns so far [rad] in so long [s]
+TIMES = np.linspace(0.0, T_END, 26)
 
 
 def pendulum(data):
     """The lattice hung by its first node, released level."""
-    mech = Mechanism(gravity=GRAVITY)
+    mech = rom.Mechanism(gravity=GRAVITY)
     bar = mech.add_flexible("bar", lattice_body(data))
     mech.spherical("hook", mech.ground.marker(tuple(data[0][0])), bar.marker("n0"))
     return mech
@@ -37,7 +37,7 @@ def difference_of_the_pendulum(stiffness):
     times = np.linspace(0, 0.5, 26)
     weight = masses[:, None] * GRAVITY
     full = mechanisms.lattice_motion(data, times, x, 0 * x, lambda t, y: weight, held=(0,))
-    sol = simulate(pendulum(data), t_end=0.5, dt=0.02, **EXACT)
+    sol = rom.simulate(pendulum(data), t_end=0.5, dt=0.02, **EXACT)
     tip = sol.position("bar", "n14")
     return np.abs(tip - full[:, 14]).max(), full[:, 14], data
 
@@ -85,12 +85,12 @@ def test_spinning_bar_stretches_as_the_unreduced_model_does():
     times = np.linspace(0, 0.05, 51)
     v0 = np.cross(spin, x - centre)
     full = mechanisms.lattice_motion(data, times, x, v0, lambda t, y: 0.0 * y)
-    mech = Mechanism(gravity=(0, 0, 0))
+    mech = rom.Mechanism(gravity=(0, 0, 0))
     mech.add_flexible("bar", lattice_body(data), omega=spin, velocity=np.cross(spin, -centre))
     # nodes as joints of nothing: springs without stiffness make them markers of the run
     bar = mech.parts["bar"]
     mech.spring_damper("probe", bar.marker("n0"), bar.marker("n14"), stiffness=0.0)
-    sol = simulate(mech, t_end=0.05, dt=1e-3, **EXACT)
+    sol = rom.simulate(mech, t_end=0.05, dt=1e-3, **EXACT)
     length = np.linalg.norm(sol.position("bar", "n14") - sol.position("bar", "n0"), axis=1)
     wanted = np.linalg.norm(full[:, 14] - full[:, 0], axis=1)
     stretch = np.ptp(wanted)
@@ -104,7 +104,7 @@ def chain_of_two(gravity=(0.0, 0.0, -9.81), turn=None, shift=(0.0, 0.0, 0.0)):
     data = lattice(stiffness=2e4)
     A = np.eye(3) if turn is None else turn
     shift, tip = np.asarray(shift), data[0][14]
-    mech = Mechanism(gravity=A @ gravity)
+    mech = rom.Mechanism(gravity=A @ gravity)
     bar = mech.add_flexible(
         "bar", lattice_body(data), at=shift, orientation=A, omega=(0.5, 0, 1.0),
         velocity=A @ np.cross((0.5, 0, 1.0), -data[0][0]),
@@ -121,7 +121,7 @@ def chain_of_two(gravity=(0.0, 0.0, -9.81), turn=None, shift=(0.0, 0.0, 0.0)):
 
 def test_energy_does_not_drift_over_ten_thousand_steps():
     """rho_inf = 1: balance within 1e-6 of what is exchanged, no trend; joints stay closed."""
-    sol = simulate(chain_of_two(), t_end=1.0, dt=1e-4, rho_inf=1.0, save_every=10)
+    sol = rom.simulate(chain_of_two(), t_end=1.0, dt=1e-4, rho_inf=1.0, save_every=10)
     energy = sol.energy
     exchanged = np.ptp(energy.potential)
     assert sol.statistics["steps"] == 10_000
@@ -135,8 +135,8 @@ def test_energy_does_not_drift_over_ten_thousand_steps():
 def test_a_turned_and_shifted_mechanism_moves_turned_and_shifted():
     A = rotation.matrix(rotation.exp(np.array([0.7, -1.1, 0.4])))
     shift = np.array([3.0, -2.0, 5.0])
-    here = simulate(chain_of_two(), t_end=0.2, dt=1e-3)
-    there = simulate(chain_of_two(turn=A, shift=shift), t_end=0.2, dt=1e-3)
+    here = rom.simulate(chain_of_two(), t_end=0.2, dt=1e-3)
+    there = rom.simulate(chain_of_two(turn=A, shift=shift), t_end=0.2, dt=1e-3)
     assert_allclose(there.position("ball"), shift + here.position("ball") @ A.T, atol=1e-9)
     size = np.abs(here.elastic("bar")).max()
     assert size > 1e-4
@@ -149,14 +149,14 @@ def test_momentum_gets_better_with_the_step_down_to_the_smallest():
     """Second order, 1e-8 at last; increments that stop at the round-off of positions leave 1e-6."""
     drift = []
     for dt in (1e-3, 1e-4, 1e-5):
-        mech = Mechanism(gravity=(0, 0, 0))
+        mech = rom.Mechanism(gravity=(0, 0, 0))
         rng = np.random.default_rng(11)
         body = mechanisms.random_body(rng, damped=False)
         mech.add_flexible(
             "one", body, at=(0.1, 0.2, 0.3), velocity=(1, 2, -1),
             omega=(1.0, -0.5, 0.3), q=0.01 * rng.normal(size=4), qd=0.1 * rng.normal(size=4),
         )  # fmt: skip
-        sol = simulate(mech, t_end=0.2, dt=dt, rho_inf=1.0, save_every=20)
+        sol = rom.simulate(mech, t_end=0.2, dt=dt, rho_inf=1.0, save_every=20)
         drift.append([np.abs(p - p[0]).max() / np.abs(p).max() for p in sol.momentum])
     drift = np.array(drift)
     assert (drift[1] < drift[0] / 50).all()
@@ -166,13 +166,12 @@ def test_momentum_gets_better_with_the_step_down_to_the_smallest():
 @pytest.fixture(scope="module")
 def beam():
     """A slender block on the hinge side "root", reduced to rigid ends and ten modes."""
-    model = block(size=(1.0, 0.02, 0.02), cells=(16, 1, 1))
-    return reduced(4, model, reference="root")
+    return reduced(4, block(size=(1.0, 0.02, 0.02), cells=(16, 1, 1)), reference="root")
 
 
 def hinged(length, add):
     """What ``add`` makes a bar, on a hinge about z with a ball at its tip, gravity across."""
-    mech = Mechanism(gravity=(0, -9.81, 0))
+    mech = rom.Mechanism(gravity=(0, -9.81, 0))
     bar = add(mech)
     ball = mech.add_rigid("ball", mass=0.5, inertia=(1e-4,) * 3, at=length)
     mech.revolute("hinge", mech.ground.marker((0, 0, 0)), bar.marker("root"), axis=(0, 0, 1))
@@ -191,14 +190,14 @@ def test_small_swings_have_the_frequencies_of_the_hinged_body(beam):
     sway = shape[1] + np.cross(shape[3:6].T, tip.point)[:, 1] + tip.translation[1] @ shape[6:]
     k = 1 + np.flatnonzero(np.abs(sway[1:]) > 1e-3)[0]
     amplitude = 1e-6
-    mech = Mechanism(gravity=(0, 0, 0))
+    mech = rom.Mechanism(gravity=(0, 0, 0))
     start = amplitude * shape[:, k]
     place = {"at": start[:3] - beam.marker("root").point, "orientation": rotation.exp(start[3:6])}
     bar = mech.add_flexible("bar", beam, **place, q=start[6:])
     mech.revolute("hinge", mech.ground.marker((0, 0, 0)), bar.marker("root"), axis=(0, 0, 1))
     mech.spring_damper("probe", bar.marker("root"), bar.marker("tip"), stiffness=0.0)
     period = 2 * np.pi / omega[k]
-    sol = simulate(mech, t_end=3 * period, dt=period / 200, rho_inf=1.0)
+    sol = rom.simulate(mech, t_end=3 * period, dt=period / 200, rho_inf=1.0)
     y = sol.position("bar", "tip")[:, 1]
     i = np.flatnonzero(np.diff(np.sign(y)))
     crossings = sol.t[i] - y[i] * (sol.t[i + 1] - sol.t[i]) / (y[i + 1] - y[i])
@@ -210,7 +209,7 @@ def test_the_stiff_limit_is_the_rigid_body(beam):
     stiff = replace(beam, K=1e6 * beam.K, omega=1e3 * beam.omega)
     root, tip = beam.marker("root").point, beam.marker("tip").point
     mech = hinged(tip - root, lambda mech: mech.add_flexible("bar", stiff, at=-root))
-    flexible = simulate(mech, t_end=0.3, dt=1e-3, rho_inf=0.5)
+    flexible = rom.simulate(mech, t_end=0.3, dt=1e-3, rho_inf=0.5)
     c = beam.first_moment / beam.mass
     central = beam.inertia - beam.mass * (c @ c * np.eye(3) - np.outer(c, c))
     solid = {"mass": beam.mass, "inertia": central, "at": c - root}
@@ -219,11 +218,6 @@ def test_the_stiff_limit_is_the_rigid_body(beam):
     rigid = mechanisms.simulate_quietly(mech, t_end=0.3, dt=1e-3, rho_inf=0.5)
     assert_allclose(flexible.position("ball"), rigid.position("ball"), atol=1e-5)
     assert np.abs(rigid.position("ball")[-1] - rigid.position("ball")[0]).max() > 0.1
-
-
-SIZE, CELLS = np.array([1.0, 0.15, 0.12]), np.array([6, 1, 1])
-ANGLE, T_TURN, T_END = 0.3, 0.4, 0.5  # the hinge turns so far [rad] in so long [s]
-TIMES = np.linspace(0.0, T_END, 26)
 
 
 def turning(t):
@@ -240,9 +234,7 @@ class Solid:
         self.model, self.C = block(SIZE, CELLS, material), material.stiffness
         number = np.arange(self.model.n_dofs // 3).reshape(CELLS + 1)
         steps = ((CORNERS + 1) / 2).astype(int)
-        self.nodes = np.array(
-            [[number[tuple(np.array(c) + s)] for s in steps] for c in np.ndindex(*CELLS)]
-        )
+        self.nodes = np.array([[number[tuple(c + s)] for s in steps] for c in np.ndindex(*CELLS)])
         h = SIZE / CELLS
         points = np.array(np.meshgrid(GAUSS, GAUSS, GAUSS)).reshape(3, -1).T
         self.dN = np.array([shape_functions(xi)[1] * 2 / h for xi in points])
@@ -298,38 +290,31 @@ def reduced_motion(model):
         model, method=rom.CraigBampton(30), interfaces={"root": "rbe2", "tip": "rbe3"},
         reference="root", certify=False,
     )  # fmt: skip
-    mech = Mechanism(gravity=(0, 0, 0))
+    mech = rom.Mechanism(gravity=(0, 0, 0))
     bar = mech.add_flexible("bar", body, at=-body.marker("root").point)
     mech.revolute("hinge", mech.ground.marker((0, 0, 0)), bar.marker("root"), axis=(0, 0, 1))
     mech.drive("motor", "hinge", lambda t: turning(t)[0])
     mech.spring_damper("probe", mech.ground.marker((0, 0, 0)), bar.marker("tip"), stiffness=0.0)
-    return simulate(mech, t_end=T_END, dt=1e-4, save_every=200).position("bar", "tip")
+    return rom.simulate(mech, t_end=T_END, dt=1e-4, save_every=200).position("bar", "tip")
 
 
 def test_small_displacements_have_the_linear_forces():
-    solid = Solid(Material(E=2e7, nu=0.3, rho=1000.0))
+    solid = Solid(rom.Material(E=2e7, nu=0.3, rho=1000.0))
     u = 1e-7 * np.random.default_rng(5).normal(size=solid.model.points.shape)
     assert_allclose(solid.forces(u).ravel(), solid.model.K @ u.ravel(), rtol=1e-4, atol=1e-5)
 
 
-@pytest.fixture(scope="module")
-def gaps():
-    """Largest difference of the tip, and its largest elastic motion, for two stiffnesses [m]."""
-    found = []
-    for E in (2e7, 8e7):
-        solid = Solid(Material(E=E, nu=0.3, rho=1000.0))
-        full, ours = solid.moved(), reduced_motion(solid.model)
-        phi = np.array([turning(t)[0] for t in TIMES])
-        rigid = np.column_stack([np.cos(phi), np.sin(phi), 0 * phi])
-        found.append((np.abs(ours - full).max(), np.abs(full - rigid).max()))
-    return np.array(found)
-
-
 @pytest.mark.long
 @pytest.mark.once
-def test_a_driven_bar_moves_like_its_finite_elements(gaps):
+def test_a_driven_bar_moves_like_its_finite_elements():
     """What is left is of second order: four times stiffer, at least eight times less."""
-    (soft, bent), (stiff, _) = gaps
+    found, phi = [], np.array([turning(t)[0] for t in TIMES])
+    rigid = np.column_stack([np.cos(phi), np.sin(phi), 0 * phi])
+    for E in (2e7, 8e7):
+        solid = Solid(rom.Material(E=E, nu=0.3, rho=1000.0))
+        full, ours = solid.moved(), reduced_motion(solid.model)
+        found.append((np.abs(ours - full).max(), np.abs(full - rigid).max()))
+    (soft, bent), (stiff, _) = found
     assert bent > 0.01
     assert soft < 0.05 * bent
     assert stiff < 1.1 * soft / 4**1.5

@@ -16,8 +16,6 @@ from cases.mbs.tangents import forces_at, shifted
 from cases.mbs.tubes import tube
 from cases.refusals import refuses
 from rom.components.journal_bearing.films.journals import FIRST_CONTENT, KNOWN, TIME
-from rom.config.mechanism import read_mechanism
-from rom.errors import ConfigError
 from rom.mbs import Groove, JournalBearing
 
 DIAMETER, LENGTH, CLEARANCE, OUTER = 0.04, 0.04, 4e-5, 0.03
@@ -26,6 +24,12 @@ SPEED, OIL, LOAD = 300.0, 0.02, (0.0, -2000.0)
 CELLS = (24, 2, 6)  # of the bush; its bore ends a cell before the ends
 SOFT_FILM = {"axis": (0, 0, 1), "oil": OIL, "elastic_bush": True}
 NONE = np.zeros(0)
+# by ROSS: load [N], modulus [Pa], eccentricity [1], attitude [degrees], largest pressure [MPa]
+ROSS = [
+    (10638.3, None, 0.45904, 49.200, 2.4443),
+    (10638.3, 1e9, 0.50002, 39.915, 2.3617),
+    (23148.1, 2e9, 0.69580, 31.346, 5.7459),
+]
 
 
 def bearing(cells=(60, 8), grooves=(), **more):
@@ -34,7 +38,6 @@ def bearing(cells=(60, 8), grooves=(), **more):
 
 @cache
 def ring(E=SOFT, cells=CELLS):
-    """A bush of this modulus."""
     material = rom.Material(E=E, nu=0.3, rho=2000.0)
     return tube(DIAMETER / 2, OUTER, LENGTH * cells[2] / (cells[2] - 2), cells, material)
 
@@ -53,9 +56,6 @@ def at_rest(body, b=None, load=LOAD, speed=SPEED, **more):
     film = rom.mbs.snapshot(mech, state).journal_bearing("film")
     at = prepared(mech)[0].system.bodies.q_at[list(mech.parts).index("shaft")]
     return state.q[at : at + 2], film
-
-
-# --- limits ---
 
 
 @pytest.mark.filterwarnings("ignore:the speed of sound")
@@ -96,15 +96,10 @@ def test_a_film_opens_by_what_nodes_under_its_cells_move_outwards():
     assert np.ptp(outwards.reshape(24, 3), axis=1).max() > 0.1 * np.abs(outwards).max()
 
 
-# --- tangents and energy ---
-
-
 def pair(law, reference="mean-axis"):
     """A journal in a soft bush, both anywhere, beside another in the ground.
 
-    Returns:
-        The system, its work, coordinates, velocities, units of motions, and where the soft film
-        remembers.
+    The last two are units of motions, and where the soft film remembers.
     """
     mech = rom.Mechanism(gravity=ORIGIN)
     own = {"mass": 0.2, "inertia": (1e-4, 2e-4, 3e-4)}
@@ -136,7 +131,6 @@ def pair(law, reference="mean-axis"):
 @pytest.mark.parametrize(("law", "passed"), [("none", 0.0), ("reynolds", 0.0), ("jfo", 0.0),
                                              ("jfo", 1e-3)])  # fmt: skip
 def test_tangents_are_the_derivatives(law, passed):
-    """Forces on bodies and bore by motions and bending, and by their rates."""
     packed, W, q, v, scale, memory = pair(law)
 
     def force(dq, dv):
@@ -191,9 +185,6 @@ def test_a_free_pair_keeps_momentum_and_energy():
     assert rom.audit(sol).ok
 
 
-# --- a film and an elastic bush of another program ---
-
-
 @cache
 def compliance(E, cells):
     """Radial motion of the nodes of the bore by radial forces on them; their angles and heights."""
@@ -208,14 +199,6 @@ def compliance(E, cells):
         R[3 * bore.ravel() + axis, np.arange(bore.size)] = np.repeat(along, n_z - 1)
     C = R[free].T @ splu(model.K[free][:, free].tocsc()).solve(R[free])
     return C, theta, model.points[bore[0], 2]
-
-
-def spread(theta, z, n, m):
-    """Smooth motion of a grid of n times m + 1 points by that of the nodes of a bore."""
-    ring_of = np.vstack([np.eye(len(theta)), np.eye(len(theta))[:1]])
-    around = CubicSpline(np.append(theta, 2 * np.pi), ring_of, bc_type="periodic")
-    along = CubicSpline(z, np.eye(len(z)))
-    return np.kron(around(2 * np.pi / n * np.arange(n)), along(np.linspace(z[0], z[-1], m + 1)))
 
 
 def pressure(h, active):
@@ -248,7 +231,10 @@ def elastic_film(at, E, cells, n=96, m=16):
     C, P = np.zeros((0, 0)), np.zeros((n * m + n, 0))
     if E is not None:
         C, theta, z = compliance(E, cells)
-        P = spread(theta, z, n, m)
+        ring_of = np.vstack([np.eye(len(theta)), np.eye(len(theta))[:1]])
+        around = CubicSpline(np.append(theta, 2 * np.pi), ring_of, bc_type="periodic")
+        places = 2 * np.pi / n * np.arange(n), np.linspace(z[0], z[-1], m + 1)
+        P = np.kron(around(places[0]), CubicSpline(z, np.eye(len(z)))(places[1]))
     rigid = CLEARANCE - at[0] * np.cos(angle) - at[1] * np.sin(angle) + np.zeros((n, m + 1))
     area = np.pi * DIAMETER / n * LENGTH / m
     w, active = 0 * rigid, np.ones(n * (m - 1), dtype=bool)
@@ -294,16 +280,6 @@ def test_more_functions_come_closer_to_all_nodes():
     assert by_peak[0] > 0.03 and by_peak[3] < 2e-3
 
 
-# --- ROSS ---
-
-# load [N], modulus [Pa], eccentricity [1], attitude [degrees], largest pressure [MPa]
-ROSS = [
-    (10638.3, None, 0.45904, 49.200, 2.4443),
-    (10638.3, 1e9, 0.50002, 39.915, 2.3617),
-    (23148.1, 2e9, 0.69580, 31.346, 5.7459),
-]
-
-
 @cache
 def liner(E):
     """A thin liner in a rigid housing, which gives way by t p (1 - nu^2) / E with nu = 0.3.
@@ -330,9 +306,6 @@ def test_a_bearing_with_a_liner_is_that_of_ross(load, E, eccentricity, attitude,
     assert found.pressure[0] == pytest.approx(1e6 * largest, rel=8e-3)
 
 
-# --- what is refused ---
-
-
 @pytest.mark.parametrize(("given", "words"), [
     ({"kind": "rbe2"}, "'bore' of body 'bush', has no functions by which it could deform"),
     ({"kind": "rbe3"}, "has no functions"),
@@ -350,7 +323,7 @@ def test_what_is_no_elastic_bush_is_refused_by_name(given, words):
     shaft, _ = (mech.add_rigid(name, **solid) for name in ("shaft", "block"))
     on = given.pop("on")
     end = mech.part(on).marker("bore" if on == "bush" else ORIGIN)
-    with pytest.raises(ConfigError, match=words):
+    with pytest.raises(rom.ConfigError, match=words):
         mech.journal_bearing("mainbearing", shaft.marker(ORIGIN), end, **SOFT_FILM | given)
 
 
@@ -378,7 +351,7 @@ def test_a_file_asks_for_an_elastic_bush(tmp_path):
     body = bush(rom.FourierLegendre(1, 1), SOFT, (16, 1, 6))
     rom.save(body, tmp_path / "bush.rom.npz")
     (tmp_path / "m.toml").write_text(ENTRY)
-    made = read_mechanism(tmp_path / "m.toml").mechanism().journal_bearings["film"]
+    made = rom.read_mechanism(tmp_path / "m.toml").mechanism().journal_bearings["film"]
     mech = rom.Mechanism()
     part = mech.add_flexible("bush", body, at=ORIGIN)
     shaft = mech.add_rigid("shaft", mass=1.0, inertia=(0.1,) * 3, at=ORIGIN)
@@ -400,4 +373,4 @@ def test_a_file_that_asks_in_vain_is_told_where(kind, given, instead, words, tmp
     kind = kind or rom.FourierLegendre(1, 1)
     rom.save(bush(kind, SOFT, (16, 1, 6)), tmp_path / "bush.rom.npz")
     (tmp_path / "m.toml").write_text(ENTRY.replace(given, instead, 1) if given else ENTRY)
-    refuses(ConfigError, words, lambda: read_mechanism(tmp_path / "m.toml").mechanism())
+    refuses(rom.ConfigError, words, lambda: rom.read_mechanism(tmp_path / "m.toml").mechanism())

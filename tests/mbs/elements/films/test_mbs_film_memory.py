@@ -10,13 +10,12 @@ import rom
 from cases.mbs.films import SPEED, VISCOSITY, held_rotor, on_ground
 from cases.mbs.mechanisms import prepared, residual_at
 from rom.components.journal_bearing.films.journals import FIRST_CONTENT
-from rom.mbs import Groove, JournalBearing
 
 C = 1e-4  # clearance [m]
 
 
 def bearing(grooves, cells=(60, 6), **more):
-    return JournalBearing(0.1, 0.05, C, grooves, cells=cells, cavitation="jfo", **more)
+    return rom.mbs.JournalBearing(0.1, 0.05, C, grooves, cells=cells, cavitation="jfo", **more)
 
 
 def contents(sol):
@@ -64,8 +63,7 @@ def driven_film(b, speed, t, x, y):
 @pytest.mark.parametrize("speed", [SPEED, -SPEED, 0.0])
 @pytest.mark.parametrize("aligned", [True, False])
 def test_oil_that_comes_in_stays_or_leaves(speed, aligned):
-    """In every cell: a journal that is led around and out of its oil."""
-    b = bearing([Groove(1.0, 0.3, 2e4, share=0.5)], aligned=aligned)
+    b = bearing([rom.mbs.Groove(1.0, 0.3, 2e4, share=0.5)], aligned=aligned)
     t = np.arange(0, 0.1, 1e-3)
     x, y = C * (0.3 + 0.4 * np.sin(80 * t)), C * 0.5 * np.sin(50 * t)
     content, into = driven_film(b, speed, t, x, y)
@@ -81,7 +79,7 @@ def test_oil_that_comes_in_stays_or_leaves(speed, aligned):
 
 def test_a_simulated_motion_keeps_the_same_oil():
     """Driven by joints, step by step as above; its last corrections are the difference."""
-    b = bearing([Groove(1.0, 0.3, 2e4, share=0.5)])
+    b = bearing([rom.mbs.Groove(1.0, 0.3, 2e4, share=0.5)])
     t = np.arange(0, 0.05, 1e-3)
     moves = [lambda t: C * (0.3 + 0.4 * np.sin(80 * t)), lambda t: C * 0.5 * np.sin(50 * t)]
     mech = held_rotor(b, (0, 0), speed=SPEED, oil=VISCOSITY, moves=moves)
@@ -92,7 +90,6 @@ def test_a_simulated_motion_keeps_the_same_oil():
 
 
 def emptied(sol):
-    """The last state of a motion, its film without oil."""
     base, at = sol.final.base.copy(), len(sol.packed.places.coordinates) + FIRST_CONTENT
     base[at:] = 0.0
     return replace(sol.final, base=base, memory=None, algorithmic=None)
@@ -100,8 +97,7 @@ def emptied(sol):
 
 @pytest.mark.parametrize("speed", [SPEED, -SPEED])
 def test_oil_from_a_groove_travels_with_half_the_speed(speed):
-    """Around a centred journal, into an empty film: what has come in, and where it ends."""
-    b = bearing([Groove(np.pi, 0.1)], (240, 2), aligned=True)
+    b = bearing([rom.mbs.Groove(np.pi, 0.1)], (240, 2), aligned=True)
     still = (lambda t: 0.0, lambda t: 0.0)
     mech = held_rotor(b, (0, 0), speed=speed, oil=VISCOSITY, moves=still)
     begun = rom.simulate(mech, t_end=1e-3, dt=5e-4, progress=False)
@@ -118,7 +114,7 @@ def test_oil_from_a_groove_travels_with_half_the_speed(speed):
 
 
 def test_a_film_that_was_empty_carries_less_until_oil_has_come():
-    b = bearing([Groove(np.pi, 0.3)], (60, 4), aligned=True)
+    b = bearing([rom.mbs.Groove(np.pi, 0.3)], (60, 4), aligned=True)
     place = (lambda t: 0.6 * C, lambda t: 0.0)
     mech = held_rotor(b, (0, 0), speed=SPEED, oil=VISCOSITY, moves=place)
     begun = rom.simulate(mech, t_end=1e-3, dt=5e-4, progress=False)
@@ -130,7 +126,7 @@ def test_a_film_that_was_empty_carries_less_until_oil_has_come():
 
 
 def test_a_motion_that_is_interrupted_remembers_its_oil():
-    b = bearing([Groove(1.0, 0.3)], (40, 4), aligned=True)
+    b = bearing([rom.mbs.Groove(1.0, 0.3)], (40, 4), aligned=True)
     mech = held_rotor(b, (0, 0), speed=SPEED, oil=VISCOSITY,
                       moves=(lambda t: C * 0.5 * np.sin(80 * t), lambda t: 0.2 * C))  # fmt: skip
     whole = rom.simulate(mech, t_end=0.04, dt=1e-3, progress=False)
@@ -144,7 +140,7 @@ def test_a_motion_that_is_interrupted_remembers_its_oil():
 
 def test_steps_of_half_the_length_differ_half_as_much():
     """Backward Euler of the filling: first order."""
-    b = bearing([Groove(1.0, 0.3)], (40, 4), aligned=True)
+    b = bearing([rom.mbs.Groove(1.0, 0.3)], (40, 4), aligned=True)
     moves = (lambda t: C * (0.3 + 0.2 * np.sin(80 * t)), lambda t: 0.2 * C)
     mech = held_rotor(b, (0, 0), speed=SPEED, oil=VISCOSITY, moves=moves)
     peaks = []
@@ -156,7 +152,7 @@ def test_steps_of_half_the_length_differ_half_as_much():
 
 def test_loads_asked_for_afterwards_are_those_of_the_motion():
     """They follow from the oil at the instant before, not from a film that stays."""
-    b = bearing([Groove(1.0, 0.3)], (40, 4), aligned=True)
+    b = bearing([rom.mbs.Groove(1.0, 0.3)], (40, 4), aligned=True)
     moves = (lambda t: C * (0.3 + 0.5 * np.sin(80 * t)), lambda t: 0.2 * C)
     mech = held_rotor(b, (0, 0), speed=SPEED, oil=VISCOSITY, moves=moves)
     sol = rom.simulate(mech, t_end=0.03, dt=1e-3, progress=False)

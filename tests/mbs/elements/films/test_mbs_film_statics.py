@@ -13,7 +13,6 @@ from cases.long import few
 from cases.mbs.films import SPEED, VISCOSITY, held_rotor, resting
 from cases.refusals import refused
 from rom.components import journal_bearing as component
-from rom.errors import ModelError
 from rom.mbs import Groove, JournalBearing, iso_vg
 
 
@@ -66,7 +65,6 @@ def test_coefficients_of_lund_and_thomsen(row):
 
 
 def test_coefficients_are_those_of_the_component():
-    """K and C of a mechanism by its tangents, those of the film alone; the same place."""
     b = bearing(0.5, [Groove(2.0, 0.3, 1e5)], (60, 6))
     alone = component.equilibrium(b, (3000.0, 0.0), speed=SPEED, viscosity=VISCOSITY)
     state, K, C = resting(rotor(b, 3000.0), SPEED)
@@ -127,12 +125,11 @@ test_lobes_that_leave_no_room_are_named = refused(
     (lambda: rom.mbs.multilobe(0, 0.4), "must be at least 1"),
     (lambda: bearing(bore=lambda angles: 0 * angles), "bore must be > 0"),
     (lambda: bearing(bore=rom.mbs.multilobe(3, 0.4), preload=0.5), "a bore of its own"),
-    error=ModelError,
+    error=rom.ModelError,
 )
 
 
 def test_three_lobes_are_alike():
-    """Turned by a third of a turn, load and film together, the journal rests alike."""
     b = bearing(1.0, [Groove(2 * np.pi * (k + 0.5) / 3, 0.2) for k in range(3)], (120, 8),
                 bore=rom.mbs.multilobe(3, 0.4))  # fmt: skip
     turn = np.array([[-0.5, -np.sqrt(0.75)], [np.sqrt(0.75), -0.5]])
@@ -140,9 +137,6 @@ def test_three_lobes_are_alike():
     found = [resting(held_rotor(b, W, speed=SPEED, oil=VISCOSITY), SPEED)[0] for W in loads]
     assert_allclose(found[1].q[:2], turn @ found[0].q[:2], rtol=1e-8)
     assert b.grid.bore.min() == pytest.approx(0.6, abs=1e-12)
-
-
-# --- whirl in time ---
 
 
 @pytest.mark.parametrize(("w", "after"), few(2, [(2.50, 0.00054), (2.65, 0.126), (2.55, 0.0033)]))
@@ -159,9 +153,6 @@ def test_a_rigid_rotor_whirls_beyond_the_threshold(w, after):
     sol = rom.simulate(mech, t_end=6.0, dt=1e-3, state=replace(state, q=q), progress=False)
     away = (sol.journal_bearing("film").motion[:, :2] - state.q[:2]) / b.clearance
     assert np.hypot(*away[-500:].T).max() == pytest.approx(after, rel=0.12)
-
-
-# --- heat ---
 
 
 @pytest.mark.parametrize("pressure", [0.0, 2e5])
@@ -182,7 +173,6 @@ def test_the_temperature_is_the_one_that_the_film_makes(pressure):
 
 
 def test_the_temperature_follows_with_its_time():
-    """From cold oil in a bearing whose journal is held, towards what its power keeps up."""
     oil, b, lag = iso_vg(46), bearing(0.5, [Groove(2.0, 0.3)], (40, 4)), 0.2
     moves = (lambda t: 0.4e-4, lambda t: 0.3e-4)
     mech = held_rotor(b, (0, 0), speed=300.0, oil=oil, inlet=40.0, thermal_time=lag, moves=moves)
@@ -198,7 +188,6 @@ def test_the_temperature_follows_with_its_time():
 
 
 def test_each_film_has_its_own_oil():
-    """Two bearings of a shaft, one with hot oil: they share the load as each film says."""
     b = bearing(0.5, [Groove(np.pi, 0.3)], (60, 6))
     mech = held_rotor(b, (4000.0, 0.0), speed=300.0, oil=1.0)
     mech.elements.pop("film")

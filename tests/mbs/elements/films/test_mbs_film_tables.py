@@ -9,16 +9,13 @@ from cases.mbs.films import NONE, ORIGIN, Pair, held_rotor, on_ground, resting
 from cases.mbs.mechanisms import prepared, residual_at, tangents_at
 from cases.refusals import refused, refuses
 from rom.components.journal_bearing.films.tabulated import MAX_TILT_SHARE
-from rom.config.mechanism import read_mechanism
-from rom.errors import ConfigError, SolverError
-from rom.mbs import Groove, JournalBearing, iso_vg, multilobe
 
-SIDES = [Groove(np.pi / 2, 0.35), Groove(-np.pi / 2, 0.35)]
+SIDES = [rom.mbs.Groove(np.pi / 2, 0.35), rom.mbs.Groove(-np.pi / 2, 0.35)]
 SPEED, OIL, CLEARANCE = 100.0, 0.03, 1e-4
 
 
 def bearing(law="reynolds", grooves=SIDES, **more):
-    return JournalBearing(0.1, 0.05, CLEARANCE, grooves, law, cells=(60, 4), **more)
+    return rom.mbs.JournalBearing(0.1, 0.05, CLEARANCE, grooves, law, cells=(60, 4), **more)
 
 
 def loads(b, motion, rate, spin, **more):
@@ -72,8 +69,7 @@ def test_what_a_table_leaves_out_of_tilts_falls_with_their_square():
             upright = motion * [1, 1, 0, 0], rate * [1, 1, 0, 0], spin
             known, flat = (loads(b, *one)[0] for one in (state, upright))
             found = loads(b, *state, tabulated=True)[0]
-            off.append([np.linalg.norm(known[:2] - flat[:2]),
-                        np.linalg.norm((known - found)[3:5])])  # fmt: skip
+            off.append([np.linalg.norm(known[:2] - flat[:2]), np.linalg.norm((known - found)[3:5])])
             share.append(np.linalg.norm((known - found)[3:5]) / np.linalg.norm(known[3:5]))
             assert_allclose(found[:2], flat[:2], atol=2e-3 * np.linalg.norm(flat[:2]))
         ratios.append(np.divide(*off))
@@ -82,7 +78,6 @@ def test_what_a_table_leaves_out_of_tilts_falls_with_their_square():
 
 
 def test_slopes_of_all_answers_are_those_of_the_table():
-    """Forces, moments and torque by motions, rates and the spin, in clearances."""
     b, rng, d = bearing(), np.random.default_rng(8), 1e-5
     for _ in range(3):
         motion, rate, spin = random_state(rng, 0.2)
@@ -121,8 +116,7 @@ def test_a_full_film_is_that_of_the_cells_up_to_the_last_node():
 
 
 def test_every_film_has_its_own_table():
-    """A wide and a narrow bearing of one mechanism, as each alone."""
-    wide, narrow = bearing(), JournalBearing(0.1, 0.03, CLEARANCE, SIDES, cells=(40, 3))
+    wide, narrow = bearing(), rom.mbs.JournalBearing(0.1, 0.03, CLEARANCE, SIDES, cells=(40, 3))
     found = []
     for some in ((wide,), (narrow,), (wide, narrow)):
         mech = rom.Mechanism(gravity=ORIGIN)
@@ -152,7 +146,7 @@ def test_an_end_that_comes_too_close_leaves_the_table():
         found, _, film = loads(bearing(), motion, np.zeros(4), SPEED, tabulated=True)
         assert np.isfinite(found).all() == (e < 0.99)
     mech = held_rotor(bearing(), (1e5, 0.0), speed=SPEED, oil=1e-3, tabulated=True)
-    refuses(SolverError, "'film'.* leaves its table", rom.simulate, mech, t_end=0.1, dt=1e-4)
+    refuses(rom.SolverError, "'film'.* leaves its table", rom.simulate, mech, t_end=0.1, dt=1e-4)
 
 
 def test_a_rotor_rests_and_is_stiff_as_on_the_film_that_is_solved():
@@ -171,7 +165,6 @@ def test_a_rotor_rests_and_is_stiff_as_on_the_film_that_is_solved():
 
 
 def test_a_motion_is_that_of_the_film_that_is_solved():
-    """A rotor that is let go beside its rest, to a thousandth of the clearance."""
     moved = []
     for tabulated in (False, True):
         mech = held_rotor(bearing(), (3000.0, 0.0), speed=SPEED, oil=OIL, tabulated=tabulated)
@@ -183,17 +176,14 @@ def test_a_motion_is_that_of_the_film_that_is_solved():
 
 
 def test_the_temperature_is_that_of_the_film_that_is_solved():
-    oil, found = iso_vg(46), []
+    oil, found = rom.mbs.iso_vg(46), []
     for tabulated in (False, True):
-        mech = held_rotor(bearing(), (3000.0, 0.0), speed=300.0, oil=oil, inlet=40.0,
-                          tabulated=tabulated)  # fmt: skip
+        given = {"speed": 300.0, "oil": oil, "inlet": 40.0, "tabulated": tabulated}
+        mech = held_rotor(bearing(), (3000.0, 0.0), **given)
         state = rom.equilibrium(mech, spin={"turn": 300.0})
         found.append(rom.mbs.snapshot(mech, state).journal_bearing("film"))
     assert found[0].temperature[0] > 42.0
     assert found[1].temperature[0] == pytest.approx(found[0].temperature[0], abs=0.02)
-
-
-# --- what is refused ---
 
 
 def read(elastic_bush=False, **sizes):
@@ -203,12 +193,12 @@ def read(elastic_bush=False, **sizes):
 
 test_films_that_are_more_than_a_table_are_refused = refused(
     (read(law="jfo"), "'main' conserves its oil"),
-    (read(grooves=[Groove(0.0, 0.3, 1e5)]), "'main' has grooves with pressure"),
+    (read(grooves=[rom.mbs.Groove(0.0, 0.3, 1e5)]), "'main' has grooves with pressure"),
     (read(preload=0.3), "'main' has a bore that is not round"),
-    (read(bore=multilobe(3, 0.2)), "'main' has a bore that is not round"),
+    (read(bore=rom.mbs.multilobe(3, 0.2)), "'main' has a bore that is not round"),
     (read(bore=lambda angle: 0.9 + 0 * angle), "'main' has a bore that is not"),
     (read(elastic_bush=True), "bush of bearing 'main' bends"),
-    error=ConfigError,
+    error=rom.ConfigError,
 )
 
 
@@ -234,9 +224,9 @@ t_end = 1
 def test_a_file_asks_for_a_table(tmp_path):
     """The same as from Python, for a bearing of twice the size, too; and with its line if not."""
     (tmp_path / "m.toml").write_text(FILE)
-    made = read_mechanism(tmp_path / "m.toml").mechanism().journal_bearings["film"]
-    mech = on_ground(JournalBearing(0.2, 0.1, 1e-4, SIDES, cells=(60, 4)), tabulated=True)
+    made = rom.read_mechanism(tmp_path / "m.toml").mechanism().journal_bearings["film"]
+    mech = on_ground(rom.mbs.JournalBearing(0.2, 0.1, 1e-4, SIDES, cells=(60, 4)), tabulated=True)
     assert_allclose(made.table, mech.journal_bearings["film"].table, rtol=1e-9, atol=1e-12)
     (tmp_path / "m.toml").write_text(FILE.replace('"reynolds"', '"jfo"'))
-    made = read_mechanism(tmp_path / "m.toml").mechanism
-    refuses(ConfigError, "m.toml:7: bearing 'film' conserves its oil", made)
+    made = rom.read_mechanism(tmp_path / "m.toml").mechanism
+    refuses(rom.ConfigError, "m.toml:7: bearing 'film' conserves its oil", made)

@@ -12,7 +12,6 @@ from cases.mbs.mechanisms import prepared
 from cases.mbs.tangents import assert_forces_are_the_gradient, by_position, by_velocity, shifted
 from rom.components.gear_mesh import Correction, GearPair, Hertz
 from rom.components.gear_mesh.gears.meshes import GEAR_MESHES_FAMILY
-from rom.components.journal_bearing.films.bearing import Groove, JournalBearing
 
 K = 1.3e10
 PAIRS = {
@@ -21,6 +20,7 @@ PAIRS = {
     "left": GearPair((26, 40), 4e-3, 0.03, helix=-0.2, thinning=5e-5),
     "internal": GearPair((24, -72), 2e-3, 0.02, thinning=2e-5),
 }
+STEEP = Hertz(((1e-4, 1e-4), (5e-3, 5e-3), (1e-4, 5e-4)))
 
 
 def waves(seed, *shape):
@@ -51,7 +51,6 @@ CASES = [("spur", "plain"), ("spur", "relieved"), ("spur", "measured"), ("helica
 
 
 def wheels(kind, options, **more):
-    """Two free wheels in mesh."""
     given = {"stiffness": TABLE, "entry": 0.1, "cells": 7} | OPTIONS[options] | more
     return free_wheels(PAIRS[kind], **given)
 
@@ -70,7 +69,6 @@ def placed(packed, pair, back, seed, tilts=3e-4):
 @pytest.mark.parametrize(("kind", "options"), CASES)
 @pytest.mark.parametrize("back", [False, True], ids=["working", "back"])
 def test_forces_are_the_gradient_of_the_energy(kind, options, back):
-    """Wherever the wheels are, whatever lies between them; no force or moment is left over."""
     packed, W = prepared(wheels(kind, options))
     pair, mesh = PAIRS[kind], packed.elements[GEAR_MESHES_FAMILY]
     for seed in range(3):
@@ -89,9 +87,6 @@ def test_tangents_are_differences_of_forces(kind, options, losses):
     assert_allclose(found, stiff, atol=1e-3 * np.abs(stiff).max())
     found, loss = by_velocity(packed, W, q, v)
     assert_allclose(found, loss, atol=1e-6 * max(np.abs(loss).max(), 1.0))
-
-
-STEEP = Hertz(((1e-4, 1e-4), (5e-3, 5e-3), (1e-4, 5e-4)))
 
 
 @pytest.mark.parametrize("kind", ["spur", "helical", "internal"])
@@ -114,7 +109,6 @@ def test_tangents_without_tilts_know_how_forces_turn(kind, more):
 @pytest.mark.parametrize("kind", PAIRS)
 @pytest.mark.parametrize("losses", [{}, LOSSES], ids=["elastic", "lossy"])
 def test_wheels_that_hit_and_part_keep_energy_and_momentum(kind, losses):
-    """Fast wheels whose lines come and go under load, with relief, pitch errors and run-out."""
     pitch = (1e-6 * np.arange(PAIRS[kind].teeth[0]) % 7, ())
     flanks = Correction((15e-6, 10e-6), (4e-3, 3e-3), 2.0, 4e-6, 5e-6, pitch,
                         run_out=((2e-6, 0.4), (0.0, 0.0)))  # fmt: skip
@@ -139,13 +133,12 @@ def test_wheels_that_hit_and_part_keep_energy_and_momentum(kind, losses):
 
 
 def test_a_pinion_in_oil_films_whose_teeth_rub_hit_and_part_keeps_the_energy():
-    """Works of weight and motor, losses in films and on flanks, energy in teeth, in one balance."""
     pair, mech = GearPair((26, 40), 4e-3, 0.03, 0.2, thinning=5e-6), rom.Mechanism()
     pinion = mech.add_rigid("pinion", mass=4.0, inertia=(8e-3, 8e-3, 5e-3), at=ORIGIN,
                             omega=(0, 0, 100.0))  # fmt: skip
     gear = mech.add_rigid("gear", mass=9.0, inertia=(0.02,) * 3, at=(pair.distance, 0, 0),
                           omega=(0, 0, 3.0 - 65.0))  # fmt: skip
-    film = JournalBearing(0.04, 0.02, 8e-5, [Groove(np.pi / 2, 0.3)], cells=(24, 4))
+    film = rom.mbs.JournalBearing(0.04, 0.02, 8e-5, [rom.mbs.Groove(np.pi / 2, 0.3)], cells=(24, 4))
     for name, z in (("front", -0.03), ("back", 0.03)):
         ends = pinion.marker((0, 0, z)), mech.ground.marker((0, 0, z))
         mech.journal_bearing(name, *ends, axis=Z, bearing=film, oil=0.02)

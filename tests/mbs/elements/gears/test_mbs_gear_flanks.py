@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.interpolate import RegularGridInterpolator
-from scipy.optimize import brentq
+from scipy.optimize import brentq, lsq_linear
 
 import rom
 from cases.components.geared import ORIGIN, free_wheels
@@ -16,15 +16,14 @@ from cases.mbs.tangents import shifted
 from cases.refusals import refused, refuses
 from rom.components import gear_mesh
 from rom.components.gear_mesh import Correction, GearPair, Hertz, bending_table, contact_compliance
-from rom.components.gear_mesh.gears.meshes import GEAR_MESHES_FAMILY
-from rom.components.gear_mesh.gears.table import PHASE
-from rom.errors import ConfigError, ModelError
+from rom.components.gear_mesh.gears import meshes, table
 
 K = 1.3e10
 SPUR = GearPair((26, 40), 4e-3, 0.03, thinning=5e-5)
 RING = GearPair((24, -72), 2e-3, 0.02, thinning=2e-5)
 CELLS = 6
 HELIX_OF_BASE = replace(SPUR, helix=0.35).base_helix
+LOAD = 3e5  # along the line of action, over the face [N/m]
 
 
 def wheels(pair=SPUR, at=(ORIGIN, ORIGIN), **more):
@@ -36,7 +35,7 @@ def wheels(pair=SPUR, at=(ORIGIN, ORIGIN), **more):
 def load_at(found, turns, phase=None):
     """Sum of the normal forces when the wheels have turned [N]."""
     if phase is not None:
-        found[0].elements[GEAR_MESHES_FAMILY].size[0, PHASE] = phase
+        found[0].elements[meshes.GEAR_MESHES_FAMILY].size[0, table.PHASE] = phase
     return load_moved(found, dict(zip((5, 11), turns, strict=True)))
 
 
@@ -46,7 +45,7 @@ def load_moved(found, moves):
     delta, none = np.zeros(12), np.zeros(12)
     delta[list(moves)] = list(moves.values())
     residual_at(packed.system, W, shifted(packed, packed.q, delta), none, none, np.zeros(0))
-    return packed.elements[GEAR_MESHES_FAMILY].load[0]
+    return packed.elements[meshes.GEAR_MESHES_FAMILY].load[0]
 
 
 def on_grid(values, tooth, u, z, width):
@@ -146,7 +145,7 @@ def test_a_file_of_numbers_is_a_map(tmp_path):
     for text, words in (("1,2\n3\n", ""), ("1,2\n3,x\n", "'x'")):
         path.write_text(text)
         found = rf"pinion\.csv is no map of flanks: .*{words}"
-        refuses(ModelError, found, gear_mesh.flank_map, path)
+        refuses(rom.ModelError, found, gear_mesh.flank_map, path)
 
 
 @pytest.mark.parametrize("pair", [SPUR, RING], ids=["external", "internal"])
@@ -178,7 +177,6 @@ def test_run_out_is_what_a_wheel_off_its_axis_does(pair, wheel, back):
 
 
 def test_shifts_and_tilts_alone_press_flanks():
-    """Of wheels that have not turned; by hand."""
     helical, depth, lean = replace(SPUR, helix=0.35), 1e-5, 1e-3
     phase, length = 0.5 * sum(helical.path) / helical.rb[0], helical.width / np.cos(HELIX_OF_BASE)
     for side, gap in ((1.0, 0.0), (-1.0, helical.backlash * np.cos(HELIX_OF_BASE))):
@@ -255,7 +253,7 @@ def test_bending_with_hertz_is_that_of_weber_and_banaschek_at_one_load(teeth, mo
 
 def test_helical_teeth_are_rounder_in_their_normal_section():
     """Radii of curvature are those of the transverse section over the cosine of the base helix."""
-    pair, h, F = replace(SPUR, helix=0.5), (4e-3, 3e-3), 2e5
+    pair, h, F = replace(SPUR, helix=0.5, gear_helix=-0.5), (4e-3, 3e-3), 2e5
     hertz = Hertz(h)
     found = hertz.constants(pair)
     s = np.linspace(*pair.path, len(found))
@@ -281,11 +279,10 @@ def steps(touching):
 
 @pytest.mark.parametrize("n", [2, 21])
 def test_coupling_does_nothing_to_an_even_load(n):
+    flat = np.zeros(2 * n + 1)
     for more in ({}, {"hertz": Hertz((4e-3, 3e-3))}):
-        even = pressed(np.zeros(2 * n + 1), 1e-5, **more)
-        assert pressed(np.zeros(2 * n + 1), 1e-5, coupling=6e-3, **more) == pytest.approx(
-            even, rel=1e-9
-        )
+        even = pressed(flat, 1e-5, **more)
+        assert pressed(flat, 1e-5, coupling=6e-3, **more) == pytest.approx(even, rel=1e-9)
 
 
 @pytest.mark.parametrize("length", [2e-3, 8e-3, 0.03])
@@ -314,8 +311,6 @@ def test_a_load_at_the_end_of_the_foundation():
 
 def test_slices_beside_a_ridge_lift_off():
     """What a foundation bears under a crowned flank, against its quadratic programme."""
-    from scipy.optimize import lsq_linear
-
     n, length, depth = 40, 6e-3, 1e-5
     z = (np.arange(n) + 0.5) / n - 0.5
     gap = 4e-5 * (2 * z) ** 2
@@ -330,9 +325,6 @@ def test_slices_beside_a_ridge_lift_off():
     assert load == pytest.approx((A.T @ A @ w).sum(), rel=1e-6)
 
 
-NAN = np.full((4, 3), np.nan)
-
-
 def cut(**flanks):
     return lambda: wheels(correction=Correction(**flanks))
 
@@ -340,18 +332,14 @@ def cut(**flanks):
 test_what_no_flank_is_like_is_refused = refused(
     (cut(maps=(np.zeros((25, 4, 3)), None)), r"\(25, 4, 3\).*or \(26"),
     (cut(maps=(None, np.zeros(4))), r"working flanks of the gear .*\(4,\)"),
-    (cut(back_maps=(NAN, None)), "back flanks of the pinion .* 12 values"),
+    (cut(back_maps=(np.full((4, 3), np.nan), None)), "back flanks of the pinion .* 12 values"),
     (cut(pitch=(np.full(26, np.nan), ())), "is not finite"),
     (cut(run_out=((1e-3, 0.0), (0, 0))), "run-out 0.001 m of 'mesh'"),
     (lambda: wheels(coupling=1.0), "at least 0 and at most 0.03"),
     (lambda: wheels(conservative=True), "energy of mesh 'mesh' would jump"),
     (lambda: gear_mesh.Mesh(SPUR, K, Correction(maps=(np.eye(2), None))), "are for elements"),
-    error=(ConfigError, ModelError),
+    error=(rom.ConfigError, rom.ModelError),
 )
-
-
-def test_a_hand_that_fits_is_taken():
-    assert replace(SPUR, helix=0.3, gear_helix=-0.3).gear_helix == -0.3
 
 
 def test_depths_of_teeth_are_those_of_the_compliance():
@@ -359,11 +347,6 @@ def test_depths_of_teeth_are_those_of_the_compliance():
     middle = 0.5 * sum(SPUR.path)
     radius = float(np.hypot(SPUR.rb[0], middle))
     assert hertz.depths[1, 0] == pytest.approx(gear_mesh.tooth_compliance(SPUR, 0, radius)[2])
-
-
-# --- stiffness in a mechanism ---
-
-LOAD = 3e5  # along the line of action, over the face [N/m]
 
 
 def stiffness_of(pair, phase, law):

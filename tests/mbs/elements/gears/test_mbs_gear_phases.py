@@ -10,6 +10,12 @@ from rom.components.gear_mesh import GearPair
 from rom.errors import ModelError
 
 Z, ORIGIN, MODULE, WIDTH = (0, 0, 1), (0, 0, 0), 2e-3, 0.02
+PLACES = {
+    "3 in phase": ((24, 24, 72), np.arange(3) * 2 * np.pi / 3),
+    "3 in turn": ((28, 26, 80), np.arange(3) * 2 * np.pi / 3),
+    "4 against": ((30, 21, 72), np.round(np.arange(4) / 4 * 102) * 2 * np.pi / 102),
+    "5 in turn": ((31, 24, 79), np.arange(5) * 2 * np.pi / 5),
+}
 
 
 def train(teeth, places, *, axis=1, thinning=0.0, turned=0.0, phase=None):
@@ -39,14 +45,6 @@ def pitches(mech, name):
 def apart(x):
     """Nearest whole number left out."""
     return (np.asarray(x) + 0.5) % 1 - 0.5
-
-
-PLACES = {
-    "3 in phase": ((24, 24, 72), np.arange(3) * 2 * np.pi / 3),
-    "3 in turn": ((28, 26, 80), np.arange(3) * 2 * np.pi / 3),
-    "4 against": ((30, 21, 72), np.round(np.arange(4) / 4 * 102) * 2 * np.pi / 102),
-    "5 in turn": ((31, 24, 79), np.arange(5) * 2 * np.pi / 5),
-}
 
 
 @pytest.mark.parametrize("axis", [1, -1])

@@ -11,6 +11,7 @@ from scipy.sparse.linalg import splu
 
 import rom
 from cases.mbs.mechanisms import prepared, residual_at
+from cases.mbs.parts import on_axle
 from cases.mbs.tangents import by_position, by_velocity, elastic_forces, shifted
 from cases.mbs.tubes import tube
 from cases.refusals import refuses
@@ -42,15 +43,11 @@ def driven(body, turned=0.0):
     mech = rom.Mechanism(gravity=(0, 0, 0))
     p = np.cos(turned / 2), 0, 0, np.sin(turned / 2)
     shaft = mech.add_flexible("pinion", body, at=(0, 0, 0), orientation=p)
-    gear = mech.add_rigid("gear", mass=5.0, inertia=(0.01, 0.01, 0.02), at=(PAIR.distance, 0, 0),
-                          markers={"middle": (0, 0, 0)})  # fmt: skip
     mech.fixed("end", mech.ground.marker((0, 0, -LENGTH / 2)), shaft.marker("low"))
-    mech.revolute("axis", mech.ground.marker((PAIR.distance, 0, 0)), gear.marker("middle"),
-                  axis=(0, 0, 1))  # fmt: skip
+    gear = on_axle(mech, "gear", mass=5.0, inertia=(0.01, 0.01, 0.02), at=(PAIR.distance, 0, 0))
     given = {"stiffness": K, "phase": PHASE, "entry": 0.0, "cells": SLICES}
-    mech.gear_mesh("mesh", shaft.marker("rim"), gear.marker("middle"), axis=(0, 0, 1), pair=PAIR,
-                   **given)  # fmt: skip
-    mech.torque("load", gear.marker("middle"), (0, 0, TORQUE))
+    mech.gear_mesh("mesh", shaft.marker("rim"), gear, axis=(0, 0, 1), pair=PAIR, **given)
+    mech.torque("load", gear, (0, 0, TORQUE))
     return mech
 
 
@@ -223,7 +220,6 @@ def test_tangents_of_rims_are_differences_of_their_forces(rub):
 
 
 def test_a_rack_presses_a_rim_as_a_gear_without_end_does():
-    """Forces and torque on the body of the pinion, as by a gear of 1e5 teeth."""
     found = []
     for pair in (RackPair(26, 3e-3, 0.06), GearPair((26, 100_000), 3e-3, 0.06)):
         body = reduced(rom.FourierLegendre(2, 2))
@@ -240,7 +236,6 @@ def test_a_rack_presses_a_rim_as_a_gear_without_end_does():
 
 
 def test_free_wheels_with_soft_rims_keep_momentum_and_energy():
-    """Their teeth hit and part again; what damping and sliding take away is counted."""
     losses = {"damping": 1e-6, "friction": 0.1, "transition_speed": 0.1}
     mech = soft_wheels(rom.Guyan(), "mean-axis", omega=(20.0, 1.0), stiffness=1e9, **losses)
     sol = rom.simulate(mech, t_end=2e-4, method="dop853", rtol=1e-8, atol=1e-10)

@@ -35,27 +35,6 @@ def centres():
             "output": middle + TWO.distance * way + height * Z}  # fmt: skip
 
 
-def train():
-    mech = rom.Mechanism(gravity=(0, 0, 0))
-    for name, at in centres().items():
-        mass, across, about, wheels, bearings = SHAFTS[name]
-        points = {wheel: (0, 0, z) for wheel, z in wheels.items()}
-        points |= {f"bearing {k}": (0, 0, z) for k, z in enumerate(bearings)}
-        shaft = mech.add_rigid(name, mass=mass, inertia=(across, across, about), at=at,
-                               markers=points)  # fmt: skip
-        for k, z in enumerate(bearings):
-            ends = mech.ground.marker(at + z * Z), shaft.marker(f"bearing {k}")
-            mech.bushing(f"{name} {k}", *ends, stiffness=(*BEARING, 0, 0, 0))
-    for name, pair, phase, axis, pinion, gear in MESHES:
-        ends = (mech.part(shaft).marker(name) for shaft in (pinion, gear))
-        mech.gear_mesh(name, *ends, axis=axis, pair=pair, stiffness=K, phase=phase, entry=0.0,
-                       cells=40)  # fmt: skip
-    mech.bushing("coupling", mech.ground.marker((0, 0, 0)), mech.part("input").marker((0, 0, 0)),
-                 stiffness=(0, 0, 0, 0, 0, COUPLING))  # fmt: skip
-    mech.torque("load", mech.part("output").marker("two"), (0, 0, -RATIO * TORQUE))
-    return mech
-
-
 def approach(pair, phase, axis, line):
     """Stiffness (m,) and rows V (m, 12) of strips of all lines: how both wheels come together."""
     c, rb, alpha = line, pair.rb[0], pair.alpha
@@ -109,6 +88,22 @@ def lumped():
 
 def test_two_stages_vibrate_as_a_lumped_model():
     """All 18 motions in space, of helical and spur teeth on stages that are folded."""
-    mech = train()
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    for name, at in centres().items():
+        mass, across, about, wheels, bearings = SHAFTS[name]
+        points = {wheel: (0, 0, z) for wheel, z in wheels.items()}
+        points |= {f"bearing {k}": (0, 0, z) for k, z in enumerate(bearings)}
+        shaft = mech.add_rigid(name, mass=mass, inertia=(across, across, about), at=at,
+                               markers=points)  # fmt: skip
+        for k, z in enumerate(bearings):
+            ends = mech.ground.marker(at + z * Z), shaft.marker(f"bearing {k}")
+            mech.bushing(f"{name} {k}", *ends, stiffness=(*BEARING, 0, 0, 0))
+    for name, pair, phase, axis, pinion, gear in MESHES:
+        ends = (mech.part(shaft).marker(name) for shaft in (pinion, gear))
+        mech.gear_mesh(name, *ends, axis=axis, pair=pair, stiffness=K, phase=phase, entry=0.0,
+                       cells=40)  # fmt: skip
+    mech.bushing("coupling", mech.ground.marker((0, 0, 0)), mech.part("input").marker((0, 0, 0)),
+                 stiffness=(0, 0, 0, 0, 0, COUPLING))  # fmt: skip
+    mech.torque("load", mech.part("output").marker("two"), (0, 0, -RATIO * TORQUE))
     found = np.sort(rom.linearize(mech, rom.equilibrium(mech)).frequencies)
     assert_allclose(found, lumped(), rtol=5e-5)

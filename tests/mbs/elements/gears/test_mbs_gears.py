@@ -25,6 +25,8 @@ FLANKS = Correction(relief=(15e-6, 10e-6), extent=(2e-3, 3e-3), power=1.5, crown
 K = 1.3e10
 STILL = np.zeros(12)
 LAW = {"stiffness": K, "entry": 0.0, "conservative": False}
+SUN = GearPair((24, 24), 2e-3, 0.02, thinning=2e-5)
+RING = GearPair((24, -72), 2e-3, 0.02, thinning=2e-5)
 
 
 def wheels(pair=SPUR, turned=None, **more):
@@ -101,19 +103,17 @@ def test_forces_of_helical_teeth_are_those_of_the_textbook(helix, turn):
     assert_allclose(found[11] / r2, along, rtol=1e-3)
 
 
-@pytest.mark.parametrize(
-    ("teeth", "helix", "width"), [((26, 40), 0.35, 0.05), ((20, 40), 0.0, 0.02)]
-)
-def test_contact_ratios_are_those_of_the_textbook(teeth, helix, width):
+@pytest.mark.parametrize(("teeth", "helix", "b"), [((26, 40), 0.35, 0.05), ((20, 40), 0.0, 0.02)])
+def test_contact_ratios_are_those_of_the_textbook(teeth, helix, b):
     """ISO 21771: paths outside both pitch points over the pitch, and b sin(beta) / (pi m_n)."""
     m, a_n = 4e-3, np.radians(20.0)
-    pair = GearPair(teeth, m, width, helix=helix)
+    pair = GearPair(teeth, m, b, helix=helix)
     a_t = np.arctan(np.tan(a_n) / np.cos(helix))
     r = np.array(teeth) * m / np.cos(helix) / 2
     beyond = np.sqrt((r + m) ** 2 - (r * np.cos(a_t)) ** 2) - r * np.sin(a_t)
     ratio = beyond.sum() * np.cos(helix) / (np.pi * m * np.cos(a_t))
     assert pair.contact_ratio == pytest.approx(ratio, rel=1e-9)
-    assert pair.overlap == pytest.approx(width * np.sin(helix) / (np.pi * m), rel=1e-9)
+    assert pair.overlap == pytest.approx(b * np.sin(helix) / (np.pi * m), rel=1e-9)
     assert 1.2 < pair.contact_ratio < 2.0  # standard teeth of twenty degrees
 
 
@@ -146,7 +146,6 @@ def test_tangents_are_derivatives_but_for_the_turning_of_forces(damping):
 
 
 def geared(pair=SPUR, inertia=(2e-3, 9e-3), **more):
-    """Two wheels on fixed axles, in mesh."""
     mech = rom.Mechanism(gravity=(0, 0, 0))
     ends = [
         on_axle(mech, name, inertia=(J, J, J), axle=f"{name} axle", at=(x, 0, 0))
@@ -176,7 +175,6 @@ def test_the_mesh_vibrates_as_a_spring_along_the_line_of_action():
 
 
 def test_many_turns_keep_the_ratio_of_the_teeth_and_the_torque():
-    """Driven at constant speed against a brake: ten turns of the pinion."""
     mech = geared(damping=2e-5, correction=Correction(relief=(1e-5, 1e-5), extent=(2e-3, 2e-3)))
     mech.drive("speed", "pinion axle", lambda t: 60.0 * t, rate=lambda t: 60.0 + 0 * t)
     mech.motor("brake", "gear axle", lambda t, x, v: 80.0 - 2.0 * (v + 60.0 * 26 / 40))
@@ -243,10 +241,6 @@ def test_what_is_no_mesh_is_refused():
                                (a, {}, "connects body 'a' with itself")):  # fmt: skip
         refuses(ConfigError, words, mech.gear_mesh, "mesh", a, other, **given | more)
     assert not mech.gear_meshes
-
-
-SUN = GearPair((24, 24), 2e-3, 0.02, thinning=2e-5)
-RING = GearPair((24, -72), 2e-3, 0.02, thinning=2e-5)
 
 
 def test_an_internal_gear_is_one_of_negative_radii():
@@ -384,7 +378,6 @@ def approach_of_curves(pair, s, moved_to, turns):
 @pytest.mark.parametrize("pair", [SPUR, RING], ids=["external", "internal"])
 @pytest.mark.parametrize("seed", range(4))
 def test_the_approach_is_that_of_two_involute_curves(pair, seed):
-    """Of one pair of teeth, wherever the wheels move in their plane."""
     rng = np.random.default_rng(seed)
     A, B = pair.path
     s = A + (0.45 + 0.1 * rng.random()) * (B - A)
@@ -498,8 +491,8 @@ def test_a_planetary_train_vibrates_as_its_lumped_model(planets):
         angle = 2 * np.pi * k / planets
         at = 0.048 * np.array([np.cos(angle), np.sin(angle), 0.0])
         planet = body(f"planet {k}", at).marker(ORIGIN)
-        mech.bushing(f"pin {k}", parts["carrier"].marker(at), planet,
-                     stiffness=(1e8, 1e8, 0, 0, 0, 0))  # fmt: skip
+        ends = parts["carrier"].marker(at), planet
+        mech.bushing(f"pin {k}", *ends, stiffness=(1e8, 1e8, 0, 0, 0, 0))
         law = {"stiffness": 5e8 / SUN.width, "entry": 0.0, "conservative": False}
         mech.gear_mesh(f"sun {k}", parts["sun"].marker(ORIGIN), planet, axis=Z, pair=SUN,
                        phase=one_line(SUN), **law)  # fmt: skip

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 import rom
 from cases.mbs import tangents
-from cases.mbs.mechanisms import nodal_body, prepared, random_body, random_pose, random_state
+from cases.mbs.mechanisms import prepared, random_body, random_pose, random_state
 from cases.mbs.tangents import check_tangents, difference, forces_at, shifted
 from cases.mbs.trusses import FREE, MASSES, NODES, START, bar_forces, covariance_of, truss
 from cases.refusals import refuses
@@ -23,9 +23,6 @@ from rom.errors import ModelError, RomWarning
 from rom.mbs.equations.equations import evaluate, linearize_constraints
 from rom.mbs.kernels.algebra import row
 from rom.mbs.kernels.markers import nearest_rotation
-
-# corners of a plate and a point off it, seen from the first; the third turns about it in the plane
-PLATE = np.array([[0.0, 0, 0], [1.0, 0, 0], [1.1, 0.8, 0], [-0.1, 0.7, 0]])
 
 
 def fitted(body, rng, flat=True):
@@ -115,53 +112,32 @@ def test_constraints_and_tangents_at_fitted_markers_are_exact(flat):
     check_tangents(packed, W, state, np.eye(v.size), 1e-6)
 
 
-def plate():
-    """Four masses whose elastic coordinates carry any deformation, and a marker on all."""
-    free = [(1, 0), (2, 0), (2, 1), (3, 0), (3, 1), (3, 2)]
-    shapes = np.zeros((len(free), *PLATE.shape))
-    for k, place in enumerate(free):
-        shapes[(k, *place)] = 1.0
-    K = 30.0 * np.eye(len(free))
-    means = {"mean": (PLATE.mean(axis=0), shapes.mean(axis=1).T, np.zeros((3, len(free))))}
-    body = nodal_body(PLATE, np.diag([0.7, 0.4, 0.5, 0.3]), shapes, K, markers=means)
-    found = covariance_of(PLATE, np.moveaxis(shapes, 0, 2))
-    body.markers["mean"] = replace(body.markers["mean"], covariance=found)
-    return body
-
-
 @pytest.mark.filterwarnings("ignore::rom.errors.RomWarning")
 def test_a_rotor_on_a_marker_that_turns_far_keeps_energy_and_momentum():
     """On a hinge with a spring: they drift if axes, rates and moments are not of one kind."""
     mech = rom.Mechanism(gravity=(0, 0, 0))
-    part = mech.add_flexible(
-        "plate", plate(), omega=(0.4, -1.0, 0.7), q=[0.2, -0.3, 0.4, 0.3, -0.2, 0.5]
-    )
+    part = mech.add_flexible("truss", truss(), omega=(0.4, -1.0, 0.7), q=START)
     middle = part.point(part.marker("mean"))
-    rotor = mech.add_rigid("rotor", mass=0.4, inertia=(0.03, 0.05, 0.04), at=middle,
-                           markers={"c": (0, 0, 0)})  # fmt: skip
+    solid = {"mass": 0.4, "inertia": (0.03, 0.05, 0.04), "markers": {"c": (0, 0, 0)}}
+    rotor = mech.add_rigid("rotor", **solid, at=middle)
     mech.revolute("hinge", part.marker("mean"), rotor.marker("c"), axis=(0, 0, 1))
     mech.rotational_spring("coil", "hinge", stiffness=0.6)
     solution = rom.simulate(mech, t_end=2.0, dt=0.02, method="dop853", assemble=True)
     total, (_, angular) = solution.energy.total, solution.momentum
     assert_allclose(total, total[0], rtol=1e-8)
     assert_allclose(angular, np.tile(angular[0], (len(angular), 1)), atol=1e-8)
-    turn = np.einsum("tij,tik->tjk", solution.axes("plate", "mean"), solution.axes("rotor", "c"))
+    turn = np.einsum("tij,tik->tjk", solution.axes("truss", "mean"), solution.axes("rotor", "c"))
     assert_allclose(turn[:, 2, 2], 1.0, atol=1e-9)
     assert np.ptp(solution.joint("hinge").angle) > 0.1
 
 
-@pytest.fixture(scope="module")
-def tumbling():
-    mech = rom.Mechanism(gravity=(0, 0, 0))
-    part = mech.add_flexible(
-        "truss", truss(), omega=(0.5, -2.0, 1.5), velocity=(0.3, 0, -0.2), q=START
-    )
-    return mech, part
+def test_a_truss_tumbles_as_its_masses_do():
+    """Newton's law for the masses in the world knows no frame: strains reach 0.3.
 
-
-def test_a_truss_tumbles_as_its_masses_do(tumbling):
-    """Newton's law for the masses in the world knows no frame: strains reach 0.3."""
-    mech, part = tumbling
+    The implicit integrator loses energy by the square of its step.
+    """
+    mech, moving = rom.Mechanism(gravity=(0, 0, 0)), {"velocity": (0.3, 0, -0.2), "q": START}
+    part = mech.add_flexible("truss", truss(), omega=(0.5, -2.0, 1.5), **moving)
     with warnings.catch_warnings(action="error"):  # deformations beyond a tenth are its purpose
         solution = rom.simulate(mech, t_end=2.0, dt=0.1, method="dop853")
     x0 = NODES.copy()
@@ -185,12 +161,9 @@ def test_a_truss_tumbles_as_its_masses_do(tumbling):
     assert_allclose(solution.momentum[1], solution.momentum[1][:1].repeat(21, 0), atol=1e-8)
     kinetic = 0.5 * MASSES @ (v0**2).sum(axis=1)
     assert_allclose(total[0], kinetic + bar_forces(x0)[1], rtol=1e-12)
-
-
-def test_the_implicit_integrator_loses_energy_by_the_square_of_its_step(tumbling):
     lost = []
     for dt in (2e-3, 1e-3):
-        total = rom.simulate(tumbling[0], t_end=2.0, dt=dt, rho_inf=1.0).energy.total
+        total = rom.simulate(mech, t_end=2.0, dt=dt, rho_inf=1.0).energy.total
         lost.append(np.abs(total / total[0] - 1).max())
     assert lost[1] < 2e-4 and lost[0] == pytest.approx(4 * lost[1], rel=0.05)
 
@@ -201,17 +174,12 @@ def with_quartic(body, seed):
     return replace(body, quartic=Quartic(body.K, cubic, quartic))
 
 
-def several():
-    """Two bodies of four coordinates with one energy, and one of six, turned in space."""
+def test_forces_are_slopes_of_the_energy_and_tangents_those_of_the_forces():
+    """Of two bodies of four coordinates with one energy, and one of six, turned in space."""
     rng, mech = np.random.default_rng(4), rom.Mechanism()
     same = with_quartic(random_body(rng), 5)
     for name, body in (("a", same), ("b", with_quartic(random_body(rng, 6), 6)), ("c", same)):
         mech.add_flexible(name, body, **random_pose(rng))
-    return mech, rng
-
-
-def test_forces_are_slopes_of_the_energy_and_tangents_those_of_the_forces():
-    mech, rng = several()
     packed, W = prepared(mech)
     q, v, a, lam = random_state(rng, packed)
     check_tangents(packed, W, (q, v, a, lam), np.eye(v.size), 1e-6)
@@ -233,7 +201,6 @@ def test_forces_are_slopes_of_the_energy_and_tangents_those_of_the_forces():
 
 
 def test_equilibrium_in_a_mechanism_is_that_of_the_body():
-    """Wherever its frame is put: the first node held, a dead force on the last one."""
     body, force = truss(), np.array([2.0, -3.0, 4.0])
     expected = follow(body.quartic, np.array([force @ body.markers["n3"].translation]))[0]
     A = rotation.matrix(np.array([0.5, 0.5, -0.5, 0.5]))

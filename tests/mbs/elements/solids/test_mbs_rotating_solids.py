@@ -45,7 +45,6 @@ def turning(speed, held):
 
 
 def steady(speed, held):
-    """The mechanism, and its steady state."""
     mech = rom.Mechanism(gravity=(0, 0, 0))
     root, place = held(mech)
     mech.revolute("shaft", mech.ground.marker(place), root, axis=(0, 0, 1))
