@@ -174,12 +174,26 @@ def _limited(kind: Quantity | Whole, taken: Taken | None) -> Taken:
     words = kind.words if isinstance(kind, Whole) else one.words
 
     def take(value: object) -> object:
-        found = one.take(value)
+        found = one.take(_in_si(value, kind.unit) if isinstance(kind, Quantity) else value)
         if fault := kind.fault(found):
             raise Unfit(value, words, sentence=fault, error=kind.error)
         return float(found) if one is PLAIN_KINDS[float] else found
 
     return Taken(words, take)
+
+
+def _in_si(value: object, unit: str) -> object:
+    """A quantity such as "210 GPa", alone or in a row, as a number in SI."""
+    if isinstance(value, list | tuple) and any(isinstance(x, str | list | tuple) for x in value):
+        return [_in_si(x, unit) for x in value]
+    if not isinstance(value, str) or unit == "1":
+        return value
+    from rom.units import in_si
+
+    try:
+        return in_si(value, unit)
+    except ConfigError as error:
+        raise Unfit(value, "", sentence=f": {error}") from None
 
 
 def _one_of(several: list[Taken | None]) -> Taken | None:

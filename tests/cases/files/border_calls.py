@@ -378,6 +378,7 @@ GIVEN = {  # callable -> legal values of its own
         "damping": 0.01, "at": [1],
     },
     "ModalDamping.matrix": dict,
+    "Mechanism.marker": lambda: {"place": "arm.a"},
     "Solution.*": lambda: {"body": "arm", "t": 1e-3, "marker": "a", "instant": 0, "name": "hinge"},
     "Solution.drive_load": lambda: {"name": "shaker"},
 }  # fmt: skip
