@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import Number, finite, number, positive
+from rom.arguments import Number, finite, number, plain, positive
 from rom.errors import MaterialError, warn
 from rom.plausible import (
     FOAM_SPEED,
@@ -18,7 +18,7 @@ from rom.plausible import (
     STIFF_DENSITY,
     WAVE_SPEED,
 )
-from rom.units import SYSTEMS, UnitSystem, plain, unit_system
+from rom.units import SYSTEMS, UnitSystem, unit_system
 
 Array = npt.NDArray[np.float64]
 

@@ -5,7 +5,6 @@ import re
 from dataclasses import dataclass
 from difflib import get_close_matches
 from fractions import Fraction
-from typing import Any
 from unicodedata import normalize
 
 from rom.arguments import one_of
@@ -177,17 +176,6 @@ def in_si(text: str, wanted: str) -> float:
     if not math.isfinite(value):
         raise ConfigError(f"{text!r} is too large: at most 1e308 {wanted} can be told.")
     return value
-
-
-def plain(name: str, value: object, wanted: str) -> Any:
-    """A quantity in SI, where it is a text; anything else as it is. As `in_si` otherwise."""
-    if not isinstance(value, str):
-        return value
-    try:
-        return in_si(value, wanted)
-    except ConfigError as error:
-        error.where = error.where or name
-        raise
 
 
 NAMES = {

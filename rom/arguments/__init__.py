@@ -38,6 +38,7 @@ from rom.arguments.values import not_negative as not_negative
 from rom.arguments.values import number as number
 from rom.arguments.values import one_each as one_each
 from rom.arguments.values import one_of as one_of
+from rom.arguments.values import plain as plain
 from rom.arguments.values import positive as positive
 from rom.arguments.values import rows_at as rows_at
 from rom.arguments.values import shortened as shortened

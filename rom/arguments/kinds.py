@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rom.arguments.quantities import Quantity, Whole
-from rom.arguments.values import shortened
+from rom.arguments.values import plain, shortened
 from rom.errors import ConfigError, RomError
 
 MAX_NUMBER = 1e150  # the square of it is still a finite number
@@ -186,12 +186,8 @@ def _in_si(value: object, unit: str) -> object:
     """A quantity such as "210 GPa", alone or in a row, as a number in SI."""
     if isinstance(value, list | tuple) and any(isinstance(x, str | list | tuple) for x in value):
         return [_in_si(x, unit) for x in value]
-    if not isinstance(value, str) or unit == "1":
-        return value
-    from rom.units import in_si
-
     try:
-        return in_si(value, unit)
+        return value if unit == "1" else plain("", value, unit)
     except ConfigError as error:
         raise Unfit(value, "", sentence=f": {error}") from None
 

@@ -29,6 +29,19 @@ def shortened(value: object) -> str:
     return text if len(text) <= SHOWN_LENGTH else f"{text[: SHOWN_LENGTH - 3]}..."
 
 
+def plain(name: str, value: object, unit: str) -> Any:
+    """A quantity in SI, where it is a text such as "210 GPa"; anything else as it is."""
+    if not isinstance(value, str):
+        return value
+    from rom.units import in_si
+
+    try:
+        return in_si(value, unit)
+    except ConfigError as error:
+        error.where = error.where or name
+        raise
+
+
 def whole(name: str, value: Any, low: int = 0, high: int | None = None, *, reason: str = "") -> int:
     """The value as a whole number within a range; a reason for that is the rest of a sentence."""
     kind, fits = Whole(low, high), isinstance(value, Integral) and not isinstance(value, bool)

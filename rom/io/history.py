@@ -107,9 +107,7 @@ def _library(name: str) -> Any:
     try:
         return import_module(name)
     except ModuleNotFoundError as error:
-        raise ResourceError(
-            f"{name} is not installed.", hint="pip install 'fenicsx-rom[data]'."
-        ) from error
+        raise ResourceError(f"{name} is not installed.", hint=f"pip install {name}") from error
 
 
 def channels(solution: Any) -> Iterator[Channel]:

@@ -16,11 +16,10 @@ from typing import Annotated
 
 import numpy as np
 
-from rom.arguments import NotNegative, typed
+from rom.arguments import NotNegative, plain, typed
 from rom.components.masonry.block_contact import Bonds, Contacts
 from rom.errors import ConfigError, FileFormatError, RomError
 from rom.model import Array, Index
-from rom.units import plain
 
 # of the distance at which corners are watched: stones nearer than that are glued
 BOND_GAP_RATIO = 0.02

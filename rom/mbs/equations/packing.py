@@ -185,6 +185,7 @@ class Packed:
     def marker(self, place: str) -> Marker:
         """The marker "body.place"."""
         known = {f"{marker.body}.{marker.place}": marker for marker in self.markers}
+        known |= {m.body: m for m in self.markers if m.place == (0.0, 0.0, 0.0)}
         check_known(place, known, "no such marker; there are")
         return known[place]
 
