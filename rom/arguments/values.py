@@ -13,6 +13,7 @@ import numpy.typing as npt
 from rom import rotation
 from rom.arguments.quantities import Between, NotNegative, Positive, Quantity, Shape, Whole
 from rom.errors import ConfigError, QualityGateError, RomError
+from rom.units import in_si
 
 Array = npt.NDArray[np.float64]  # not from rom.model, whose records are checked here
 SHOWN_LENGTH = 60  # letters of a wrong value in a message
@@ -31,12 +32,8 @@ def shortened(value: object) -> str:
 
 def plain(name: str, value: object, unit: str) -> Any:
     """A quantity in SI, where it is a text such as "210 GPa"; anything else as it is."""
-    if not isinstance(value, str):
-        return value
-    from rom.units import in_si
-
     try:
-        return in_si(value, unit)
+        return in_si(value, unit) if isinstance(value, str) else value
     except ConfigError as error:
         error.where = error.where or name
         raise

@@ -336,6 +336,8 @@ class Mechanism(Methods, metaclass=Open, kind="methods", bound=bound):
             >>> ball = mech.add_rigid("ball", mass=1, inertia=(1, 1, 1), at=(0, 0, 0),
             ...                       markers={"hook": (0, 0, 0.1)})
             >>> mech.spherical("hung", "ground", "ball.hook")
+            >>> mech.marker("ball.hook")
+            Marker(body='ball', place='hook')
         """
         bodies = {GROUND: self.ground} | self.parts
         body = max((b for b in bodies if f"{place}.".startswith(f"{b}.")), key=len, default="")
