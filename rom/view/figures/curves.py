@@ -73,17 +73,19 @@ def history(  # noqa: PLR0913  keywords of one picture
     Raises:
         ConfigError: if lengths differ, or pictures cannot be made here.
     """
+    motion: Any = t
+    shown: Any = panels
     if hasattr(t, "mechanism"):
         title, caption = title or "Motion over time", caption or OF_MOTIONS
-        t, panels = t.t, _panels_of(t, panels)
-    t = np.asarray(t, dtype=float)
-    names = [list(filter(None, curves)) for _, curves in panels]
+        motion, shown = motion.t, _panels_of(motion, panels)
+    times = np.asarray(motion, dtype=float)
+    names = [list(filter(None, curves)) for _, curves in shown]
     figure, areas = _panels(ax, names, "history", title, caption, beside)
-    numbers = numbered([list(curves) for _, curves in panels])
-    for axes, (label, curves), looks in zip(areas, panels, numbers, strict=True):
-        _histories(axes, t, curves, looks)
+    numbers = numbered([list(curves) for _, curves in shown])
+    for axes, (label, curves), looks in zip(areas, shown, numbers, strict=True):
+        _histories(axes, times, curves, looks)
         axes.set_ylabel(label)
-        axes.set_xlim(t[0], t[-1])
+        axes.set_xlim(times[0], times[-1])
     _complete(areas, over or "time [s]", ax)
     return figure
 
