@@ -2,12 +2,12 @@
 
 from dataclasses import dataclass
 from math import sqrt
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import Number, finite, number, orthonormal, positive
+from rom.arguments import Number, finite, number, orthonormal, plain, positive
 from rom.errors import MaterialError, warn
 from rom.plausible import (
     FOAM_SPEED,
@@ -25,12 +25,12 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Material:
-    """Isotropic linear elastic solid.
+    """Isotropic linear elastic solid; ``Material.steel`` and others of `SOLIDS` are ready made.
 
     Attributes:
-        E: Young's modulus [Pa].
+        E: Young's modulus [Pa], or a text such as "210 GPa".
         nu: Poisson's ratio [1].
-        rho: density [kg/m^3].
+        rho: density [kg/m^3], or a text such as "7.85 g/cm^3".
 
     Raises:
         MaterialError: for E <= 0, rho <= 0, nu outside (-1, 0.5), or a number that is not finite.
@@ -47,10 +47,15 @@ class Material:
     E: Annotated[float, Number("Pa")]
     nu: float
     rho: Annotated[float, Number("kg/m^3")]
+    aluminium: ClassVar["Material"]
+    nylon: ClassVar["Material"]
+    steel: ClassVar["Material"]
+    titanium: ClassVar["Material"]
 
     def __post_init__(self) -> None:
-        positive("E", self.E, error=MaterialError)
-        positive("rho", self.rho, error=MaterialError)
+        for name, unit in (("E", "Pa"), ("rho", "kg/m^3")):
+            object.__setattr__(self, name, plain(name, getattr(self, name), unit))
+            positive(name, getattr(self, name), error=MaterialError)
         number("nu", self.nu, error=MaterialError)
         if not -1.0 < self.nu < 0.5:
             text = f"nu = {self.nu:g} is outside (-1, 0.5): the strain energy would be negative"
@@ -97,6 +102,14 @@ class Material:
         return sqrt(self.E / self.rho)
 
 
+SOLIDS = {  # handbook values: E [Pa], nu, rho [kg/m^3]
+    "aluminium": (70e9, 0.33, 2700.0),
+    "nylon": (2.8e9, 0.4, 1140.0),
+    "steel": (210e9, 0.3, 7850.0),
+    "titanium": (114e9, 0.34, 4430.0),
+}
+
+
 @dataclass(frozen=True, slots=True)
 class Orthotropic:
     """Orthotropic linear elastic solid with principal axes 1, 2, 3.
@@ -123,10 +136,14 @@ class Orthotropic:
     axes: Any = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
     def __post_init__(self) -> None:
+        for name in ("E", "G"):
+            given = tuple(plain(name, x, "Pa") for x in getattr(self, name))
+            object.__setattr__(self, name, given)
         for name in ("E", "nu", "G"):
             lowest = finite(name, getattr(self, name), (3,), error=MaterialError).min()
             if name != "nu":
                 positive(name, lowest, error=MaterialError)
+        object.__setattr__(self, "rho", plain("rho", self.rho, "kg/m^3"))
         positive("rho", self.rho, error=MaterialError)
         orthonormal("axes", finite("axes", self.axes, None), error=MaterialError)
         lowest = np.linalg.eigvalsh(self._compliance()).min()
@@ -222,3 +239,7 @@ def _strain_rotation(Q: Array) -> Array:
             value = Q[i, k] * Q[j, m] + (Q[i, m] * Q[j, k] if k != m else 0.0)
             T[row, column] = value * (1.0 if i == j else 2.0) / (1.0 if k == m else 2.0)
     return T
+
+
+for _name, _numbers in SOLIDS.items():
+    setattr(Material, _name, Material(*_numbers))

@@ -7,8 +7,8 @@ from difflib import get_close_matches
 from fractions import Fraction
 from unicodedata import normalize
 
-from rom.arguments import one_of
 from rom.errors import ConfigError
+from rom.names import check_known
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +52,8 @@ def unit_system(name: str) -> UnitSystem:
     Raises:
         ConfigError: listing the names that exist.
     """
-    return SYSTEMS[one_of("unit system", name, SYSTEMS)]
+    check_known(name, SYSTEMS, f"unit system {name!r} does not exist; known are")
+    return SYSTEMS[name]
 
 
 BASES = ("kg", "m", "s", "rad", "cycle")  # "cycle" keeps hertz and radians per second apart

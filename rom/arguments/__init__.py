@@ -45,6 +45,7 @@ from rom.arguments.values import one_each as one_each
 from rom.arguments.values import one_given as one_given
 from rom.arguments.values import one_of as one_of
 from rom.arguments.values import orthonormal as orthonormal
+from rom.arguments.values import plain as plain
 from rom.arguments.values import positive as positive
 from rom.arguments.values import rows_at as rows_at
 from rom.arguments.values import shortened as shortened

@@ -6,20 +6,25 @@ about attributes and subscripts. The border is the public function, and there th
 
 import types
 from collections.abc import Callable
+from dataclasses import fields
 from difflib import get_close_matches
 from functools import wraps
 from inspect import Parameter
-from typing import TypeVar
+from typing import Any, TypeVar
+
+import numpy as np
 
 from rom.arguments.kinds import Taken, Unfit, call_of, parameters_of, taken_by
 from rom.arguments.values import is_number, shortened
-from rom.errors import ConfigError, UnknownNameError
+from rom.errors import ConfigError, RomError, UnknownNameError
+from rom.names import offered
 from rom.plausible import USUAL, warn_outside
 
 Public = TypeVar("Public", bound=Callable[..., object])
 Record = TypeVar("Record")
 Given = tuple[object, ...]  # arguments by place
 Named = dict[str, object]  # and by name
+LONGEST_SHOWN = 200  # letters of a value in a record
 MAX_NEAR = 6  # names that are offered for an unknown one
 OF_STATES = "Ask rom.snapshot(mechanism, state), which has what motions have."
 NAMES_ELSEWHERE = {  # class: {name that its objects do not have: what to write instead}
@@ -50,6 +55,8 @@ def typed(public: Public) -> Public:
         return _typed_function(public)  # type: ignore[return-value]
     if "__getattr__" not in vars(public):
         public.__getattr__ = _unknown  # type: ignore[attr-defined]
+    if hasattr(vars(public).get("__repr__"), "__wrapped__"):  # made by dataclass
+        public.__repr__ = _shown  # type: ignore[assignment]
     members = {name: member for base in public.__mro__[::-1] for name, member in vars(base).items()}
     for name, member in members.items():
         if name.startswith("_") and (name != "__init__" or name not in vars(public)):
@@ -84,6 +91,19 @@ def _unknown(record: object, name: str) -> object:
     raise UnknownNameError(f"{text}.", hint=hint)
 
 
+def _shown(record: Any) -> str:
+    """A record in one line: arrays by their sizes, anything else as it is if that is short."""
+    values = {one.name: getattr(record, one.name) for one in fields(record) if one.repr}
+    words = (f"{name}={_shown_value(value)}" for name, value in values.items())
+    return f"{type(record).__qualname__}({', '.join(words)})"
+
+
+def _shown_value(value: object) -> str:
+    if isinstance(value, np.ndarray) and value.size > 1:
+        return f"[{' x '.join(map(str, value.shape))}]"
+    return text if len(text := repr(value)) <= LONGEST_SHOWN else shortened(value)
+
+
 def _typed_function(function: Callable[..., object]) -> Callable[..., object]:
     border: list[_Border] = []
 
@@ -91,7 +111,10 @@ def _typed_function(function: Callable[..., object]) -> Callable[..., object]:
     def at_border(*args: object, **named: object) -> object:
         if not border:
             border.append(_Border(function))
-        taken, named = border[0].passed(args, named)
+        try:
+            taken, named = border[0].passed(args, named)
+        except (RomError, TypeError) as error:  # the traceback ends where the user made the call
+            raise error.with_traceback(None) from None
         return function(*taken, **named)
 
     return at_border
@@ -112,17 +135,20 @@ class _Border:
         self.rest = rest or [("", None)]  # more than Python will let through
         self.places = [(p.name, takes[p.name]) for p in parameters if p.kind in BY_PLACE]
         self.takes = takes
+        self.markers = {p.name for p in parameters if "Marker" in str(p.annotation)}
         owner = function.__qualname__.removesuffix(".__init__").split(".")[-1]
         ranges = ((p, USUAL.get(f"{owner}.{p}", USUAL.get(p))) for p in takes)
         self.usual = {p: limits for p, limits in ranges if limits}
 
     def passed(self, args: Given, named: Named) -> tuple[list[object], Named]:
         """The arguments as the function gets them."""
-        for name, value in named.items():
-            owners = getattr(type(value), "TAKEN_BY", None)
-            if owners and name not in self.takes and not self.more:
-                text = f"{name} = {shortened(value)} is for {owners} alone."
+        unknown = [] if self.more else [name for name in named if name not in self.takes]
+        for name in unknown:
+            if owners := getattr(type(named[name]), "TAKEN_BY", None):
+                text = f"{name} = {shortened(named[name])} is for {owners} alone."
                 raise ConfigError(text, where=self._label(args, named), hint=f"Leave {name} out.")
+        if self.markers and args:
+            args, named = self._with_markers(args, named)
         given = zip(self._places(len(args)), args, strict=True)
         try:
             taken = [_taken(name, take, value) for (name, take), value in given]
@@ -134,10 +160,36 @@ class _Border:
                 text, hint = unfit.place + unfit.sentence, ""
             if isinstance(unfit.value, type):
                 text, hint = f"{unfit.place}: {call_of(unfit.value)}", ""
-            raise unfit.error(text, where=where, hint=hint) from unfit.__cause__
+            raise unfit.error(text, where=where, hint=hint) from None
+        if unknown:
+            free = [known for known in self.takes if known not in named and known != "self"]
+            text = f"{self._label(args[:1], {})}() got an unexpected keyword argument"
+            raise TypeError(f"{text} {unknown[0]!r}; there are {offered(free, unknown[0])}")
         if self.usual:
             self._doubt(taken, more)
         return taken, more
+
+    def _with_markers(self, args: Given, named: Named) -> tuple[Given, Named]:
+        """Markers in place of their names, as what the first argument is of has them."""
+        owners = (getattr(args[0], name, None) for name in ("mechanism", "packed"))
+        owner = next((one for one in owners if one is not None), args[0])
+        find = getattr(owner, "marker", None)
+
+        def found(name: str, value: object) -> object:
+            if name in self.markers and isinstance(value, list | tuple):
+                return [found(name, x) for x in value]
+            if find is None or name not in self.markers or not isinstance(value, str):
+                return value
+            try:
+                return find(value)
+            except ConfigError as error:
+                error.message = f"{name} = {value!r}: {error.message}"
+                error.where = self._label(args, named)
+                raise
+
+        places = zip(self._places(len(args)), args, strict=True)
+        by_place = tuple(found(name, value) for (name, _), value in places)
+        return by_place, {name: found(name, value) for name, value in named.items()}
 
     def _doubt(self, taken: list[object], named: Named) -> None:
         """Warn of numbers that no machine has, as those in another unit are."""

@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rom.arguments.quantities import Quantity, Whole
-from rom.arguments.values import is_endless, shortened
+from rom.arguments.values import is_endless, plain, shortened
 from rom.errors import ConfigError, RomError
 
 MAX_NUMBER = 1e150  # the square of it is still a finite number
@@ -175,12 +175,23 @@ def _limited(kind: Quantity | Whole, taken: Taken | None) -> Taken:
     infinite = isinstance(kind, Quantity) and kind.infinite
 
     def take(value: object) -> object:
-        found: Any = value if infinite and is_endless(value) else one.take(value)
+        number = _in_si(value, kind.unit) if isinstance(kind, Quantity) else value
+        found: Any = number if infinite and is_endless(value) else one.take(number)
         if fault := kind.fault(found):
             raise Unfit(value, words, sentence=fault, error=kind.error)
         return float(found) if one is PLAIN_KINDS[float] else found
 
     return Taken(words, take)
+
+
+def _in_si(value: object, unit: str) -> object:
+    """A quantity such as "210 GPa", alone or in a row, as a number in SI."""
+    if isinstance(value, list | tuple) and any(isinstance(x, str | list | tuple) for x in value):
+        return [_in_si(x, unit) for x in value]
+    try:
+        return value if unit == "1" else plain("", value, unit)
+    except ConfigError as error:
+        raise Unfit(value, "", sentence=f": {error}") from None
 
 
 def _one_of(several: list[Taken | None]) -> Taken | None:

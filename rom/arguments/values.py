@@ -22,6 +22,7 @@ from rom.arguments.quantities import (
 )
 from rom.errors import ConfigError, QualityGateError, RomError
 from rom.names import named
+from rom.units import in_si
 
 Array = npt.NDArray[np.float64]  # not from rom.model, whose records are checked here
 SHOWN_LENGTH = 60  # letters of a wrong value in a message
@@ -36,6 +37,15 @@ def shortened(value: object) -> str:
     except ValueError:  # an integer of more digits than Python prints
         text = f"a huge {type(value).__name__}"
     return text if len(text) <= SHOWN_LENGTH else f"{text[: SHOWN_LENGTH - 3]}..."
+
+
+def plain(name: str, value: object, unit: str) -> Any:
+    """A quantity in SI, where it is a text such as "210 GPa"; anything else as it is."""
+    try:
+        return in_si(value, unit) if isinstance(value, str) else value
+    except ConfigError as error:
+        error.where = error.where or name
+        raise
 
 
 def whole(name: str, value: Any, low: int = 0, high: int | None = None, *, reason: str = "") -> int:

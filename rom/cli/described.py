@@ -133,6 +133,7 @@ SPECIAL_KEYS: dict[str, Callable[[Any], Changes]] = {
     "parameter": _parameters,
     "interface": _interfaces,
     "face": _faces,
+    "unite": lambda _: {("geometry", "parameters", "unite"): 1},
     "rayleigh": lambda text: {("damping",): rayleigh(text)},
     "no_certificate": lambda _: {("reduction", "certificate"): False},
     "full_certificate": lambda _: {("reduction", "certificate"): "full"},

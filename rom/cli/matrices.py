@@ -44,7 +44,7 @@ def read_model(args: argparse.Namespace) -> "FEModel":
     given = [f"--{name}" for name in ("nodes", "set", "units") if getattr(args, name)]
     if given:
         raise ConfigError(f"{given[0]} needs --mass FILE: it is for matrices.")
-    hint = "For matrices of another program give --mass and --nodes instead."
+    hint = "Or --material steel; for matrices of another program --mass and --nodes instead."
     require(solid_options(args), hint)
     numbers = {"material": material(args), "degree": args.degree, "solver": args.solver}
     how = numbers | reading(args)  # refused before dolfinx is loaded

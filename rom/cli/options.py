@@ -10,7 +10,9 @@ import numpy as np
 
 from rom.arguments import NotNegative, Number, Positive, Quantity
 from rom.errors import ConfigError
+from rom.material import SOLIDS
 from rom.names import check_once, is_whole
+from rom.units import in_si
 
 if TYPE_CHECKING:
     from rom.model import Material
@@ -19,7 +21,6 @@ T = TypeVar("T")
 Kind = Callable[[str], object]  # what reads the value of an option
 Keywords = dict[str, Any]
 BYTES_PER_GIGABYTE = 1e9
-OUTPUT_FLAG = "-o/--output"
 
 
 def numbers_of(kind: Quantity) -> Callable[[str], Any]:
@@ -29,9 +30,10 @@ def numbers_of(kind: Quantity) -> Callable[[str], Any]:
 
     def read(text: str) -> object:
         try:
-            x = np.array(text.split(",") if n else text, dtype=float)
+            x = np.array([_in_si(word, kind.unit) for word in (text.split(",") if n else [text])])
         except ValueError:
-            x = np.array(np.nan)
+            x = np.array([np.nan])
+        x = x if n else x[0]
         if not (np.isfinite(x).all() and kind.has_shape(x.shape)):
             hint = " (write a decimal point)" if "," in text and not n else ""
             raise argparse.ArgumentTypeError(f"{text!r} is not {wanted}{hint}")
@@ -42,6 +44,14 @@ def numbers_of(kind: Quantity) -> Callable[[str], Any]:
     return read
 
 
+def _in_si(word: str, unit: str) -> float:
+    """A number in SI, or with a unit of its own where one is meant."""
+    bare = unit == "1" or word[-1:].isdigit() or not word[:1].strip("+-.").isdigit()
+    return float(word) if bare else in_si(word, unit)
+
+
+PRESSURE, DENSITY = numbers_of(Number("Pa")), numbers_of(Number("kg/m^3"))
+DURATION, ACCELERATION = numbers_of(Positive("s")), numbers_of(Number("m/s^2", (3,)))
 number, positive, not_negative = map(numbers_of, (Number(), Positive(), NotNegative()))
 vector = numbers_of(Number("1", (3,)))
 
@@ -131,6 +141,7 @@ def add_geometry(parser: argparse.ArgumentParser) -> None:
         "3+4; may be repeated"
     )
     option(parser, "--face NAME=FACE", about, assignment)
+    option(parser, "--unite", "connect the solids of a .step file where they touch")
     about = "factor on coordinates; 1e-3 for mm (default 1)"
     option(parser, "--scale", about, positive, default=1.0)
     about = (
@@ -154,11 +165,22 @@ def add_meshing(parser: argparse.ArgumentParser) -> None:
     option(group, "--memory-limit GIGABYTES", about, limit)
 
 
-def add_solid(parser: argparse.ArgumentParser) -> None:
-    """Numbers of an elastic solid."""
-    option(parser, "--E", "Young's modulus [Pa]", number)
-    option(parser, "--nu", "Poisson's ratio", number)
-    option(parser, "--rho", "density [kg/m^3]", number)
+class Named(argparse.Action):
+    """The numbers of a solid by its name, in place of those given before."""
+
+    def __call__(self, _: object, space: argparse.Namespace, name: Any, __: object = None) -> None:
+        """Set them."""
+        vars(space).update(zip(("E", "nu", "rho"), SOLIDS[name], strict=True))
+
+
+def add_solid(parser: argparse.ArgumentParser, usual: str | None = None) -> None:
+    """Numbers of an elastic solid, one by one or by a name, if need be a usual one."""
+    E, nu, rho = SOLIDS.get(str(usual), (None,) * 3)
+    about = "E, nu and rho of it" + (f" (default {usual})" if usual else "")
+    option(parser, "--material", about, str, choices=sorted(SOLIDS), action=Named)
+    option(parser, "--E", "Young's modulus [Pa], or as 210GPa", PRESSURE, default=E)
+    option(parser, "--nu", "Poisson's ratio", number, default=nu)
+    option(parser, "--rho", "density [kg/m^3], or as 7.85g/cm^3", DENSITY, default=rho)
 
 
 def add_interfaces(parser: argparse.ArgumentParser) -> None:
@@ -174,7 +196,7 @@ def reading(args: argparse.Namespace) -> Keywords:
     """Keyword arguments of `rom.fe.mesh.read.read_mesh`."""
     pairs = [number_or_text(pair) for pair in args.parameter]
     return {
-        "parameters": unique(pairs, "-p"),
+        "parameters": unique([*pairs, *[("unite", 1.0)] * args.unite], "-p"),
         "faces": faces(args.face),
         "scale": args.scale,
         "order": args.order,

@@ -53,6 +53,11 @@ def check_encoder(paths: Iterable[Path]) -> None:
         encoder()
 
 
+def usual(args: argparse.Namespace, ending: str) -> Path:
+    """What ``-o`` says, else a name beside where the user is, made from that of the file."""
+    return args.output or Path(args.file.resolve().name.partition(".")[0] + ending)
+
+
 def claim(args: argparse.Namespace) -> Path:
     """The folder of ``-o``, kept from other runs until the files of this one are written."""
     from rom.io.ours import claimed

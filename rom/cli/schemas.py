@@ -64,6 +64,19 @@ def direction(about: str) -> Schema:
 
 FILE, OUTPUT = text("the file read"), text("the file written")
 FREQUENCIES = each(number("[Hz]"), "natural frequencies [Hz], ascending")
+FACES = rows(
+    "all faces of a .step file, with --faces; null is what one has not",
+    number=whole("by which it is picked"),
+    kind=text("plane, cylinder, cone, sphere, torus or other"),
+    area=number("[m^2]"),
+    middle=metres("centroid"),
+    radius=number("of a cylinder, a sphere or the tube of a torus [m]"),
+    axis=maybe(direction("axis of a cylinder, a cone or a torus")),
+    point=maybe(metres("on that axis; centre of a sphere")),
+    normal=maybe(direction("outward normal of a plane")),
+    name=text("interface it belongs to; may be empty"),
+)
+NEXT = each(text("command"), "what to type next")
 REPORT = record(
     "outcome of checks",
     title=text("what was checked"),
@@ -114,18 +127,7 @@ VERBS: dict[str, Schema] = {
             ),
             "interfaces",
         ),
-        faces=rows(
-            "all faces of a .step file, with --faces; null is what one has not",
-            number=whole("by which it is picked"),
-            kind=text("plane, cylinder, cone, sphere, torus or other"),
-            area=number("[m^2]"),
-            middle=metres("centroid"),
-            radius=number("of a cylinder, a sphere or the tube of a torus [m]"),
-            axis=maybe(direction("axis of a cylinder, a cone or a torus")),
-            point=maybe(metres("on that axis; centre of a sphere")),
-            normal=maybe(direction("outward normal of a plane")),
-            name=text("interface it belongs to; may be empty"),
-        ),
+        faces=FACES,
         quality=by_name(number("figure"), "figures of quality"),
         parameters=by_name(number("as used"), "those of the geometry that are numbers, e.g. lc"),
         saved=text("the file written by --save"),
@@ -154,9 +156,11 @@ VERBS: dict[str, Schema] = {
         **STIFFENED,
     ),
     "check": record(
-        "checks of a body file",
-        optional=("dialect",),
+        "checks of a body file; of another file, what it is",
+        optional=("dialect", "name", "report", "kind", "next"),
         file=FILE,
+        kind=text("what the file is, if no body"),
+        next=NEXT,
         name=text("name of the body"),
         dialect=text("of a .SID_FEM"),
         report=REPORT,
@@ -184,7 +188,20 @@ VERBS: dict[str, Schema] = {
         sections=each(text("heading"), "its parts"),
     ),
     "swing": record(
-        "a part on its hinge",
+        "a part on its hinge; without one, its faces",
+        optional=(
+            "mass",
+            "gravity",
+            "axis",
+            "t_end",
+            "magnify",
+            "frequencies",
+            "certificate",
+            "faces",
+            "next",
+        ),
+        faces=FACES,
+        next=NEXT,
         files=each(text("file"), "files written"),
         mass=number("[kg]"),
         gravity=each(number("[m/s^2]"), "gravity [m/s^2]"),

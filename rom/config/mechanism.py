@@ -128,9 +128,11 @@ class MechanismFile(Described):
         if body == GROUND:
             points = self.values["ground"]
             return made.ground.marker(points[where] if isinstance(where, str) else where)
-        if body in made.nonlinear:
-            return made.nonlinear[body].marker(int(where) if where.isdecimal() else where)
-        return made.parts[body].marker(where)
+        return (
+            made.marker(f"{body}.{where}")
+            if isinstance(where, str)
+            else made.part(body).marker(where)
+        )
 
     def _refuse_unknown_markers(self, made: "Mechanism") -> None:
         """All of them at once, in whatever joint or force they stand."""

@@ -1,7 +1,7 @@
 """Histories of a motion: a table (CSV, pandas), a tree of arrays (HDF5), a data set (xarray)."""
 
 import io
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -14,7 +14,7 @@ from rom.errors import ConfigError, ResourceError
 from rom.io.files import check_writable, write_whole
 from rom.io.hdf5 import h5py
 from rom.model import Array
-from rom.names import csv_cell
+from rom.names import csv_cell, offered
 
 AXIS_LETTERS = ("x", "y", "z")
 QUATERNION_PARTS = ("p0", "p1", "p2", "p3")
@@ -107,9 +107,7 @@ def _library(name: str) -> Any:
     try:
         return import_module(name)
     except ModuleNotFoundError as error:
-        raise ResourceError(
-            f"{name} is not installed.", hint="pip install 'fenicsx-rom[data]'."
-        ) from error
+        raise ResourceError(f"{name} is not installed.", hint=f"pip install {name}") from error
 
 
 def channels(solution: Any) -> Iterator[Channel]:
@@ -141,6 +139,30 @@ def channels(solution: Any) -> Iterator[Channel]:
         yield Channel((*place, "moment"), "N m", AXIS_LETTERS, found.moment[:, -1])
     for name in ENERGIES:
         yield Channel(("energy", name), "J", ("",), getattr(solution.energy, name))
+
+
+def asked(solution: Any, names: Sequence[str]) -> list[Channel]:
+    """The quantities of a motion that names ask for, as "slider", "crank pin" or "pivot angle".
+
+    A body alone has its position and velocity, anything else all that it has; without any name the
+    positions of all bodies.
+
+    Raises:
+        ConfigError: listing what there is, for a name of nothing.
+    """
+    known, chosen = list(channels(solution)), list[Channel]()
+    words = [" ".join(c.path[1:]).replace(" markers ", " ") for c in known]
+    for name in names or [f"{body} position" for body in solution.mechanism.parts]:
+        wanted = name.replace(".", " ")
+        found = [c for c, said in zip(known, words, strict=True)
+                 if f"{said} ".startswith(f"{wanted} ")]  # fmt: skip
+        if not found:
+            text = f"the motion has no {name!r}; near are"
+            raise ConfigError(f"{text} {offered(words, name)}.")
+        if wanted in solution.mechanism.parts:
+            found = [c for c in found if c.path[2:] in (("position",), ("velocity",))]
+        chosen += found
+    return chosen
 
 
 def _of_body(solution: Any, name: str, part: Any) -> Iterator[Channel]:

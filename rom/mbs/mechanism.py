@@ -108,7 +108,7 @@ class Mechanism(Methods, metaclass=Open, kind="methods", bound=bound):
         ['bob']
     """
 
-    gravity: npt.ArrayLike = (0.0, 0.0, -9.81)
+    gravity: Annotated[npt.ArrayLike, Number("m/s^2", (3,))] = (0.0, 0.0, -9.81)
     parts: dict[str, Part] = field(default_factory=dict, init=False)
     joints: dict[str, Joint] = field(default_factory=dict, init=False)
     drives: dict[str, joint_drives.Drive] = field(default_factory=dict, init=False)
@@ -320,6 +320,31 @@ class Mechanism(Methods, metaclass=Open, kind="methods", bound=bound):
         """
         part = self.part(marker.body)
         return part.at + rotation.matrix(part.p) @ part.point(marker)
+
+    def marker(self, place: str) -> Marker:
+        """The marker "body.place", as files name it; "body" or "ground" is the origin of its frame.
+
+        Every method that takes a marker takes such a text too.
+
+        Raises:
+            ConfigError: if there is no such body, or the body has no such marker.
+
+        Example:
+            >>> mech = rom.Mechanism()
+            >>> ball = mech.add_rigid("ball", mass=1, inertia=(1, 1, 1), at=(0, 0, 0),
+            ...                       markers={"hook": (0, 0, 0.1)})
+            >>> mech.spherical("hung", "ground", "ball.hook")
+            >>> mech.marker("ball.hook")
+            Marker(body='ball', place='hook')
+        """
+        bodies = {GROUND: self.ground} | self.parts
+        body = max((b for b in bodies if f"{place}.".startswith(f"{b}.")), key=len, default="")
+        if body:
+            return bodies[body].marker(place[len(body) + 1 :] or (0.0, 0.0, 0.0))
+        body, _, where = place.partition(".")
+        if body in self.nonlinear:
+            return self.nonlinear[body].marker(int(where) if where.isdecimal() else where)
+        return self.part(body).marker(where)
 
     def part(self, name: str) -> Part:
         """The body of a name.

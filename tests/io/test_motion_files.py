@@ -119,7 +119,7 @@ def test_a_data_set_has_units_and_names(mixed):
 @pytest.mark.parametrize("name", ["pandas", "xarray"])
 def test_what_is_missing_is_named_with_the_cure(name, mixed, monkeypatch):
     monkeypatch.setitem(sys.modules, name, None)
-    cure = f"{name} is not installed.*pip install 'fenicsx-rom\\[data\\]'"
+    cure = f"{name} is not installed.*pip install {name}"
     refuses(ResourceError, cure, getattr(mixed, f"to_{name}"))
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rom.cli.answer import Answer
 from rom.cli.described import described, mechanism
-from rom.cli.options import add_meshing, names, option, positive
+from rom.cli.options import DURATION, add_meshing, names, option
 from rom.cli.output import add_force, checked, files_in
 from rom.errors import ConfigError
 
@@ -34,7 +34,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     option(parser, "--inputs NAME,...", about, names)
     about = "body.marker, joints, drives of a mechanism; all if missing"
     option(parser, "--outputs NAME,...", about, names, default=None)
-    option(parser, "--dt", "longest time step of a mechanism [s]", positive)
+    option(parser, "--dt", "longest time step of a mechanism [s]", DURATION)
     add_force(parser)
     add_meshing(parser)
 

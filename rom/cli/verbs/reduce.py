@@ -13,7 +13,6 @@ from rom.cli.answer import Answer, Data, failures, report_data
 from rom.cli.described import component, described, keyed, rayleigh
 from rom.cli.matrices import add_matrices, read_model, solid_options
 from rom.cli.options import (
-    OUTPUT_FLAG,
     add_geometry,
     add_interfaces,
     add_solid,
@@ -67,7 +66,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     option(evidence, "--no-certificate", "skip the comparison")
     about = "full modes in every support, however long it takes"
     option(evidence, "--full-certificate", about)
-    option(parser, "-o --output", "e.g. rod.rom.npz; may be said by a .toml file", Path)
+    option(parser, "-o --output", "default: as the body is called, .rom.npz", Path)
     add_force(parser)
 
 
@@ -84,9 +83,8 @@ def _checked(
     args: argparse.Namespace, output: Any, name: str, inputs: "Iterable[Path]" = ()
 ) -> Path:
     """The file to write, before anything is computed for it."""
-    require({OUTPUT_FLAG: output})
     check_name(name, "a body")
-    return checked(args, output, "npz", inputs=inputs)
+    return checked(args, output or Path(f"{name}.rom.npz"), "npz", inputs=inputs)
 
 
 def _described(args: argparse.Namespace) -> "tuple[FlexibleBody, Path]":
@@ -98,7 +96,7 @@ def _described(args: argparse.Namespace) -> "tuple[FlexibleBody, Path]":
 def _by_options(args: argparse.Namespace) -> "tuple[FlexibleBody, Path]":
     from rom.workflow import reduce
 
-    needed = solid_options(args) | {"-i/--interface": args.interface, OUTPUT_FLAG: args.output}
+    needed = solid_options(args) | {"-i/--interface": args.interface}
     require(needed, "A body needs an interface, for example -i pin_a=rbe2.")
     name = args.name or args.file.stem
     output = _checked(args, args.output, name)

@@ -10,23 +10,23 @@ from shlex import quote
 
 from rom.cli.answer import Answer
 from rom.cli.options import add_meshing, meshing, option
-from rom.cli.output import add_force, checked
+from rom.cli.output import add_force, checked, usual
 from rom.names import check_ending
 
 SUMMARY = "write a report as one HTML file"
 EXAMPLES = """\
-  rom report rod.rom.npz -o rod.html
+  rom report rod.rom.npz              # writes rod.html
   rom report meshes/connecting_rod.toml -o rod.html   # meshes and reduces it first
   rom report demos/slider_crank.toml -o crank.html    # as it starts
   rom report demos/slider_crank.toml --move -o crank.html   # and as it moves
-  rom report out -o motion.html                       # what rom simulate left
+  rom report out                                      # what rom simulate left
 """
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of the verb."""
     parser.add_argument("file", type=Path, help="body file, .toml file, or folder of a run")
-    option(parser, "-o --output", "report, .html", Path, required=True)
+    option(parser, "-o --output", "report, .html (default: as the file)", Path)
     option(parser, "--move", "move the mechanism of a file, and show the motion")
     add_force(parser)
     add_meshing(parser)
@@ -38,6 +38,7 @@ def run(args: argparse.Namespace) -> Answer:
     from rom.report.html import write_report
     from rom.report.pages import describe
 
+    args.output = usual(args, ".html")
     check_ending(args.output, "a report", ".html")
     checked(args, args.output)
     command = f"rom {' '.join(map(quote, args.argv))}"

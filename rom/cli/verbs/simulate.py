@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 
 from rom.cli.answer import Answer, failures, report_data
 from rom.cli.described import described, mechanism
-from rom.cli.options import OUTPUT_FLAG, add_meshing, option, positive, require, vector
-from rom.cli.output import add_force, check_encoder, checked, claim, files_in
+from rom.cli.options import ACCELERATION, DURATION, add_meshing, option, require, vector
+from rom.cli.output import add_force, check_encoder, checked, claim, files_in, usual
 from rom.cli.verbs.swing import pendulum
 from rom.errors import ConfigError, ResourceError, RomError
 from rom.names import inside
@@ -31,7 +31,7 @@ PARTS_FOLDER = "motion.parts"  # where the motion is kept while the run lasts
 MOST_TIMES = 10  # of an event that are told; all of them are in the record
 SUMMARY = "move a mechanism, or let a body swing as a pendulum"
 EXAMPLES = """\
-  rom simulate demos/slider_crank.toml -o out/
+  rom simulate demos/slider_crank.toml          # into slider_crank_motion/
   rom simulate demos/slider_crank.toml --t-end 0.01 --film glb -o out/
   rom simulate rod.rom.npz --hinge pin_a --gravity 0,-9.81,0 --t-end 1 --dt 1e-3 -o out/
   rom simulate rod.rom.npz --hinge pin_a --axis=-1,0,0 --t-end 0.2 --dt 1e-4 -o out/
@@ -50,14 +50,14 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     option(parser, "--hinge", "interface the body hangs on", str)
     option(parser, "--axis", "default 0,0,1", vector, default=(0.0, 0.0, 1.0))
     about = "[m/s^2], default 0,-9.81,0"
-    option(parser, "--gravity", about, vector, default=(0.0, -9.81, 0.0))
-    option(parser, "--t-end", "duration [s]", positive)
-    option(parser, "--dt", "time step [s]", positive)
+    option(parser, "--gravity", about, ACCELERATION, default=(0.0, -9.81, 0.0))
+    option(parser, "--t-end", "duration [s]", DURATION)
+    option(parser, "--dt", "time step [s]", DURATION)
     about = "pictures, pictures by ffmpeg, to turn around in browsers, or for ParaView"
     option(parser, "--film", about, str, choices=("gif", "mp4", "glb", "vtkhdf"))
     about = "every marker, reaction and energy, too"
     option(parser, "--history", about, str, choices=("csv", "h5"))
-    option(parser, "-o --output", "folder, made if missing", Path)
+    option(parser, "-o --output", "folder, made if missing (default: FILE_motion)", Path)
     add_force(parser)
     add_meshing(parser)
     option(parser, "--resume", "go on with the run that ended early in this folder")
@@ -65,6 +65,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> Answer:
     """Load, simulate, audit; the table is written at the end."""
+    args.output = usual(args, "_motion")
     return _mechanism(args) if described(args) else _pendulum(args)
 
 
@@ -73,7 +74,6 @@ def _mechanism(args: argparse.Namespace) -> Answer:
     from rom.report.run import Run, made_from, paths_of
     from rom.report.run import run as move
 
-    require({OUTPUT_FLAG: args.output})
     file = mechanism(args)
     paths = paths_of(file, claim(args))
     for path in paths:
@@ -195,7 +195,7 @@ def _pendulum(args: argparse.Namespace) -> Answer:
     from rom.report.run import RECORD_FILE, SCENE_FILE, Record, file_digest
 
     needed = {"--hinge": args.hinge, "--t-end": args.t_end, "--dt": args.dt}
-    require(needed | {OUTPUT_FLAG: args.output})
+    require(needed)
     if args.dt > args.t_end:
         raise ConfigError(f"--dt {args.dt:g} must be at most --t-end {args.t_end:g}.")
     if not any(args.axis):

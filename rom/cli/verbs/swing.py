@@ -2,22 +2,36 @@
 
 The part is released at rest, as it is drawn, with gravity across it. On a bore, and whatever else
 the geometry knows as a cylinder, it turns about the axis of that; on another face about the
-horizontal axis across. Of its certificate the rows without support do not count here, for the hinge
-holds it. For everything else there are the single verbs: mesh, reduce, check, simulate, view.
+horizontal axis across. Without a face to hang on, those of the part are listed and drawn. Of its
+certificate the rows without support do not count here, for the hinge holds it. For everything else
+there are the single verbs: mesh, reduce, check, simulate, view, report.
 """
 
 import argparse
 import logging
 import os
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi, sqrt
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING
 
 from rom.cli.answer import Answer, Data, failures, report_data
-from rom.cli.options import add_geometry, count, face, option, positive, reading, unique, vector
-from rom.cli.output import add_force, check_encoder, checked, claim
+from rom.cli.options import (
+    ACCELERATION,
+    DURATION,
+    add_geometry,
+    add_solid,
+    count,
+    face,
+    material,
+    option,
+    positive,
+    reading,
+    unique,
+)
+from rom.cli.output import add_force, check_encoder, checked, claim, usual
 from rom.errors import ConfigError
 from rom.names import inside
 
@@ -33,16 +47,12 @@ if TYPE_CHECKING:
 log = logging.getLogger("rom")
 SUMMARY = "show a part of yours, reduced and swinging, in one go"
 EXAMPLES = """\
-  rom swing part.step --hinge 3 -o out   # the faces: rom mesh with --faces
-  rom swing part.step --hinge radius:0.006 -o out
+  rom swing part.step             # its faces, listed and drawn
+  rom swing part.step --hinge 3
+  rom swing part.step --hinge radius:0.006 --E 200GPa -o out
   rom swing part.step --hinge 0,0,0.01 --material aluminium --gravity 0,0,-9.81 --film -o out
 """
-MATERIALS = {  # E [Pa], nu, rho [kg/m^3]; handbook values
-    "aluminium": (70e9, 0.33, 2700.0),
-    "nylon": (2.8e9, 0.4, 1140.0),
-    "steel": (210e9, 0.3, 7850.0),
-    "titanium": (114e9, 0.34, 4430.0),
-}
+TABLE_FILE, SCENE_FILE, RECORD_FILE = "motion.csv", "scene.json", "run.json"
 N_STEPS, N_INSTANTS = 240, 4  # of the motion; shown in the picture
 FAR_SWING = 1.18034  # period of a swing from the horizontal over that of a small one
 LEAST_LEVER = 3e-3  # of gravity about the hinge, of the radius of gyration
@@ -55,21 +65,24 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     about = (
         "face it hangs on: a name, or in a .step file what --face takes, e.g. 12 or radius:0.006"
     )
-    option(parser, "--hinge FACE", about, str, required=True)
-    option(parser, "--material", "default steel", str, choices=sorted(MATERIALS), default="steel")
+    option(parser, "--hinge FACE", about, str)
+    add_solid(parser, usual="steel")
     option(parser, "-m --modes", "modes kept (default: as many as are needed)", count)
     about = "[m/s^2], default 9.81 along the axis most across the part and across its bore"
-    option(parser, "--gravity", about, vector)
-    option(parser, "--t-end", "duration [s], default one swing", positive)
+    option(parser, "--gravity", about, ACCELERATION)
+    option(parser, "--t-end", "duration [s], default one swing", DURATION)
     option(parser, "--magnify", "of deformations, default so that they are seen", positive)
     option(parser, "--film", "a film, too; half a second a picture")
     option(parser, "--mp4", "a film as .mp4, by ffmpeg")
-    option(parser, "-o --output", "folder, made if missing", Path, required=True)
+    option(parser, "-o --output", "folder, made if missing (default PART_swing)", Path)
     add_force(parser)
 
 
 def run(args: argparse.Namespace) -> Answer:
     """Mesh, reduce, simulate; files are written at the end."""
+    args.output = usual(args, "_swing")
+    if args.hinge is None:
+        return _faces(args)
     files = _files(args)
     hinge, faces = hinge_of(args.hinge)
     body, swing = _reduced(args, hinge, faces)
@@ -95,15 +108,36 @@ def run(args: argparse.Namespace) -> Answer:
     failed = tuple(text for text in failures(certificate) if not text.startswith("free:"))
     motion = mechanism, solution
     text = _text(body, hinge, data)
-    return Answer(data, text, lambda: _write(files, body, motion, magnify), failed)
+    command = f"rom {' '.join(map(quote, args.argv))}"
+    return Answer(data, text, lambda: _write(files, body, motion, magnify, command), failed)
+
+
+def _faces(args: argparse.Namespace) -> Answer:
+    """What the part may hang on, with the command that does it."""
+    from rom.cli.verbs import mesh
+
+    drawn, is_step = claim(args) / "faces.png", args.file.suffix.lower() in (".step", ".stp")
+    asked = {"faces": is_step, "save": drawn, "E": None, "nu": None, "rho": None}
+    found = mesh.run(argparse.Namespace(**vars(args) | asked))
+    bores = [face["number"] for face in found.data.get("faces", ()) if face["kind"] == "cylinder"]
+    hinge = str((*bores, 1)[0]) if is_step else next(iter(found.data["interfaces"]), "FACE")
+    command = " ".join(
+        map(quote, ("rom", "swing", str(args.file), "--hinge", hinge, "-o", str(args.output)))
+    )
+    text = f"{found.text}\n\n{drawn} shows them. Choose one for --hinge, for example\n  {command}"
+    data = {"files": [str(drawn)], "faces": found.data.get("faces", []), "next": [command]}
+    return replace(found, data=data, text=text)
 
 
 def _files(args: argparse.Namespace) -> dict[str, Path]:
     """What will be written, by its ending; refused before the computation."""
     folder = claim(args)
     films = [kind for kind, asked in ((".gif", args.film), (".mp4", args.mp4)) if asked]
-    kinds = (".rom.npz", ".png", *films)
-    paths = {kind: checked(args, inside(folder, args.file.stem, kind)) for kind in kinds}
+    kinds = (".rom.npz", ".png", *films, ".html")
+    paths = {kind: inside(folder, args.file.stem, kind) for kind in kinds}
+    paths |= {name: folder / name for name in (TABLE_FILE, SCENE_FILE, RECORD_FILE)}
+    for path in paths.values():
+        checked(args, path)
     check_encoder(paths.values())
     return paths
 
@@ -123,16 +157,14 @@ def _reduced(
     how["faces"] = unique([*how["faces"].items(), *faces.items()], "--face")
     from rom.body.damping import ModalDamping
     from rom.fe.elasticity import model
-    from rom.model import Material
     from rom.reduction.bases.method import CraigBampton
     from rom.reduction.full_model import mass_properties
     from rom.reduction.interfaces.connection import found
     from rom.workflow import reduce
 
-    E, nu, rho = MATERIALS[args.material]
-    full = model(args.file, material=Material(E=E, nu=nu, rho=rho), **how)
+    full = model(args.file, material=material(args), **how)
     (at,), rigid = found(full, [hinge]), mass_properties(full)
-    log.info("%s: %d dofs, %.4g kg of %s", args.file, full.n_dofs, rigid.mass, args.material)
+    log.info("%s: %d dofs, %.4g kg", args.file, full.n_dofs, rigid.mass)
     swing = planned(rigid, at.origin, args.gravity, args.t_end, axis=at.axis)
     how = {"method": CraigBampton(args.modes), "damping": ModalDamping(0.01, fixed=(hinge,))}
     kinds = {hinge: "rbe2"}
@@ -248,18 +280,37 @@ def _write(
     body: "FlexibleBody",
     motion: "tuple[Mechanism, Solution]",
     magnify: float,
+    command: str,
 ) -> None:
     import numpy as np
 
+    from rom import __version__
+    from rom.io.history import write_history
     from rom.io.native import save
+    from rom.mbs.results.audit import audit
+    from rom.report.html import write_report
+    from rom.report.pages import of_body, of_run
+    from rom.report.run import Record
+    from rom.report.scene import motion_scene
+    from rom.report.scene_file import write_scene
     from rom.view import animate, instants
 
     save(body, files[".rom.npz"])
+    write_history(motion[1], files[TABLE_FILE])
     times = np.linspace(0, 0.5 * motion[1].t[-1], N_INSTANTS)
     up = -np.asarray(motion[0].gravity, dtype=float)
     instants(*motion, files[".png"], times=times, magnify=magnify, up=up)
     for path in (files[kind] for kind in (".gif", ".mp4") if kind in files):
         animate(*motion, path, magnify=magnify, up=up, frames=40)
+    scene = motion_scene(motion[1], title=f"{body.name} swings", magnify=magnify, up=up)
+    write_scene(scene, files[SCENE_FILE])
+    record = Record(body.name, command, __version__)
+    record.write(
+        [path for path in files.values() if path.suffix != ".html"], motion[1], audit(motion[1])
+    )
+    title, sections = of_run(files[RECORD_FILE].parent)
+    sections |= {f"The body: {name.lower()}": told for name, told in of_body(body, [])[1].items()}
+    write_report(sections, files[".html"], title=title)
 
 
 def _text(body: "FlexibleBody", hinge: str, data: Data) -> str:

@@ -16,11 +16,10 @@ from typing import Annotated
 
 import numpy as np
 
-from rom.arguments import NotNegative, typed
+from rom.arguments import NotNegative, plain, typed
 from rom.components.masonry.block_contact import Bonds, Contacts
 from rom.errors import ConfigError, FileFormatError, RomError
 from rom.model import Array, Index
-from rom.units import in_si
 
 # of the distance at which corners are watched: stones nearer than that are glued
 BOND_GAP_RATIO = 0.02
@@ -95,7 +94,7 @@ def _law(where: str, law: object) -> Joint:
 def _number(value: object, unit: str) -> float:
     if isinstance(value, bool) or not isinstance(value, str | int | float):
         raise TypeError(f"{value!r} is no number.")
-    return float(in_si(value, unit)) if isinstance(value, str) else float(value)
+    return float(plain("", value, unit))
 
 
 def _count(value: object) -> int:

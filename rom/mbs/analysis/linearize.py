@@ -30,12 +30,14 @@ from rom.mbs.parts.bodies import Marker
 from rom.mbs.results.audit import pressed
 from rom.mbs.results.state import State
 from rom.model import Array
+from rom.names import check_known
 
 PROBE_ANGLE = 1e-3  # by which the joints are moved to see how their free motions change [rad]
 STEADY_RTOL = 1e-11  # change of free motions that do not change
 ZERO_FREQUENCY_RTOL = 2e-7  # round-off of a frequency, of the highest one
 DIFFERENCED_ZERO_RTOL = 1e-5  # the same where tangents are differences
 RESTING_TOL = 1e-6  # distance to balance that counts as rest, in rad or lengths of the mechanism
+AXES = ("x", "y", "z", "rx", "ry", "rz")
 DRIFT_RTOL = 1e-3  # change of the matrices in a radian from which they count as periodic
 
 
@@ -136,6 +138,47 @@ class Linearization:
             ConfigError: if the marker is not one of the mechanism.
         """
         return jacobian(self.packed, self.H, marker)
+
+    def to_statespace(
+        self, inputs: tuple[str, ...], outputs: tuple[str, ...]
+    ) -> tuple[Array, Array, Array, Array]:
+        """A, B, C, D of x' = A x + B u, y = C x + D u, as python-control and SciPy take them.
+
+        The states are the free motions and their rates: (2 f,).
+
+        Args:
+            inputs: forces [N] and moments [N m], each a marker and an axis of the world, as
+                "arm.tip z" or "arm.tip rz".
+            outputs: translations [m] and rotations [rad] in the same words, with " rate" behind
+                for their rates.
+
+        Raises:
+            ConfigError: for a marker that is not one of the mechanism, or another axis.
+
+        Example:
+            >>> mech = rom.Mechanism(gravity=(0, 0, 0))
+            >>> mass = mech.add_rigid("mass", mass=2, inertia=(1, 1, 1), at=(0, 0, 0))
+            >>> mech.prismatic("rail", "ground", "mass", axis=(1, 0, 0))
+            >>> A, B, C, D = rom.linearize(mech).to_statespace(["mass x"], ["mass x rate"])
+            >>> float((C @ B)[0, 0])  # acceleration by one newton
+            0.5
+        """
+        f = len(self.K)
+        B = np.zeros((2 * f, len(inputs)))
+        for k, name in enumerate(inputs):
+            B[f:, k] = self._row(name) @ self.test
+        C = np.zeros((len(outputs), 2 * f))
+        for k, name in enumerate(outputs):
+            rate = name.endswith(" rate")
+            C[k, f * rate : f * rate + f] = self._row(name.removesuffix(" rate")) @ self.basis
+        A = np.block([[np.zeros((f, f)), np.eye(f)], [-self.K, -self.C]])
+        return A, B, C, np.zeros((len(outputs), len(inputs)))
+
+    def _row(self, name: str) -> Array:
+        """(n,) motion of a marker along or about an axis of the world, per coordinate."""
+        place, _, axis = name.rpartition(" ")
+        check_known(axis, AXES, f"{name!r} ends in no axis of the world; there are")
+        return np.asarray(self.jacobian(self.packed.marker(place))[AXES.index(axis)])
 
     def __str__(self) -> str:
         lines = ["mode  frequency [Hz]  damping ratio"]

@@ -22,6 +22,7 @@ from rom.mbs.parts.bodies import GROUND, Marker, Part, moving_start
 from rom.mbs.parts.joints import Joint, Row
 from rom.mbs.parts.signals import Signal, drive_signal
 from rom.model import OWN_FRAME, Array, Index
+from rom.names import check_known
 
 FAR_JOINTS = 1e4  # sizes from the origin; reactions of a pendulum there miss 2e-5 of its weight
 # coordinates up to which whole matrices are quicker where constraints repeat
@@ -180,6 +181,13 @@ class Packed:
         rolls = self.system.rows.kind == ROLL
         if rolls.any():
             raise ModelError(message, where=self.row_owner[int(np.argmax(rolls))], hint=hint)
+
+    def marker(self, place: str) -> Marker:
+        """The marker "body.place"."""
+        known = {f"{marker.body}.{marker.place}": marker for marker in self.markers}
+        known |= {m.body: m for m in self.markers if m.place == (0.0, 0.0, 0.0)}
+        check_known(place, known, "no such marker; there are")
+        return known[place]
 
     def row(self, marker: Marker) -> int:
         """Row of a marker in the arrays."""

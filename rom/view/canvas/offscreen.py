@@ -22,7 +22,7 @@ from rom.view.canvas.scene import TEXT_COLOUR, Actor, Camera
 
 COLOUR_MAP = "viridis"
 OVERSAMPLING = 2  # smooth edges on every driver
-INSTALL_COMMAND = "pip install 'fenicsx-rom[view]'"
+INSTALL_COMMAND = "pip install pyvista matplotlib"
 PAGE_STYLE = {"font.family": "DejaVu Sans", "axes.edgecolor": "#5c636e", "axes.linewidth": 0.8} | {
     key: TEXT_COLOUR for key in ("text.color", "axes.labelcolor", "xtick.color", "ytick.color")
 }

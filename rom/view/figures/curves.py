@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import one_each, typed
+from rom.arguments import AnySolution, one_each, typed
 from rom.errors import ConfigError
+from rom.io.history import asked
 from rom.model import Array
 from rom.view.canvas import page
 from rom.view.canvas.scales import readable, without_round_off
@@ -34,14 +35,15 @@ RAYS_LABEL = "multiples of the speed"
 MAX_TICKS = 10  # sizes that have room for a tick each
 TICK_DISTANCE = 0.03  # least distance of words of ticks, of a logarithmic axis
 COVER_DISTANCE, COVER_WIDTH = 1.5, 2.4  # apart [pixel]; by which a curve below is wider [point]
+OF_MOTIONS = "Positions, velocities, forces: x, y, z of the world; angular velocities: of the body."
 MIN_ERROR = 1e-12  # errors below are drawn there: round-off has no meaning
 
 
 @typed
 @page.picture
 def history(  # noqa: PLR0913  keywords of one picture
-    t: npt.ArrayLike,
-    panels: Sequence[tuple[str, Mapping[str, object]]],
+    t: npt.ArrayLike | AnySolution,
+    panels: Sequence[tuple[str, Mapping[str, object]] | str] | str = (),
     path: str | Path | None = None,
     *,
     title: str = "",
@@ -53,8 +55,9 @@ def history(  # noqa: PLR0913  keywords of one picture
     """Draw quantities over time, or over something else, one panel below the other.
 
     Args:
-        t: (n,) time [s], or values of what is named by ``over``.
-        panels: (label of the axis with its unit, {name: (n,) values}) from top to bottom; a pair
+        t: (n,) time [s], or values of what is named by ``over``; or a motion.
+        panels: (label of the axis with its unit, {name: (n,) values}) from top to bottom; of a
+            motion names of what is asked, as "slider", "crank.pin" or "pivot angle"; a pair
             (times, values) is drawn as points, a single number as a thin level line; values that
             are words become rows, the first word lowest.
         path: picture to write, .png; None to write nothing.
@@ -70,16 +73,34 @@ def history(  # noqa: PLR0913  keywords of one picture
     Raises:
         ConfigError: if lengths differ, or pictures cannot be made here.
     """
-    t = np.asarray(t, dtype=float)
-    names = [list(filter(None, curves)) for _, curves in panels]
+    motion: Any = t
+    shown: Any = panels
+    if hasattr(t, "mechanism"):
+        title, caption = title or "Motion over time", caption or OF_MOTIONS
+        motion, shown = motion.t, _panels_of(motion, panels)
+    times = np.asarray(motion, dtype=float)
+    names = [list(filter(None, curves)) for _, curves in shown]
     figure, areas = _panels(ax, names, "history", title, caption, beside)
-    numbers = numbered([list(curves) for _, curves in panels])
-    for axes, (label, curves), looks in zip(areas, panels, numbers, strict=True):
-        _histories(axes, t, curves, looks)
+    numbers = numbered([list(curves) for _, curves in shown])
+    for axes, (label, curves), looks in zip(areas, shown, numbers, strict=True):
+        _histories(axes, times, curves, looks)
         axes.set_ylabel(label)
-        axes.set_xlim(t[0], t[-1])
+        axes.set_xlim(times[0], times[-1])
     _complete(areas, over or "time [s]", ax)
     return figure
+
+
+def _panels_of(motion: Any, names: Any) -> list[tuple[str, dict[str, object]]]:
+    """What is asked of a motion, quantities of one name and unit in one panel."""
+    found: dict[str, dict[str, object]] = {}
+    for channel in asked(motion, (names,) if isinstance(names, str) else names):
+        curves = found.setdefault(f"{channel.path[-1]} [{channel.unit}]", {})
+        owner = " ".join(channel.path[1:-1]).replace(" markers ", " ")
+        values = channel.values.reshape(len(motion.t), -1)
+        curves |= {
+            f"{owner} {x}".strip(): y for x, y in zip(channel.columns, values.T, strict=True)
+        }
+    return list(found.items())
 
 
 def numbered(panels: Sequence[Sequence[str]]) -> list[list[int]]:

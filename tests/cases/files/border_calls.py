@@ -278,6 +278,7 @@ GIVEN = {  # callable -> legal values of its own
     },
     "Pieces.add_to": lambda: {"mech": rom.Mechanism(), "name": "beam"},
     "ModalDamping.matrix": dict,
+    "Mechanism.marker": lambda: {"place": "arm.a"},
     "Solution.*": lambda: {"body": "arm", "t": 1e-3, "marker": "a", "instant": 0, "name": "hinge"},
     "Solution.drive_load": lambda: {"name": "shaker"},
 }  # fmt: skip

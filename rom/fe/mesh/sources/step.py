@@ -30,13 +30,16 @@ MOST_CELLS = 3e7  # beyond what a machine with 100 GB can mesh
 
 def make(gmsh: ModuleType, path: Path, request: Request) -> Made:
     """Import the file and name its faces; the element size used, and its default."""
-    check_parameters(path, request["parameters"], ["lc"])
+    check_parameters(path, request["parameters"], ["lc", "unite"])
     text = path.read_bytes().decode("latin-1")
     if not text.lstrip().startswith("ISO-10303-21"):
         raise FileFormatError("is not a STEP file: it does not start with ISO-10303-21.")
     gmsh.option.setString("Geometry.OCCTargetUnit", "M")
     gmsh.model.add(path.stem)
     gmsh.model.occ.importShapes(str(path))
+    solids = gmsh.model.occ.getEntities(3)
+    if request["parameters"].get("unite") and len(solids) > 1:  # they share faces from here on
+        gmsh.model.occ.fragment(solids, [])
     gmsh.model.occ.synchronize()
     _check_solid(gmsh)
     _name_faces(gmsh, text)
@@ -67,9 +70,9 @@ def _check_solid(gmsh: ModuleType) -> None:
         raise MeshError(
             f"the STEP file holds {len(solids)} solids, of {listed} m^3, that share no face; "
             "one model is one body.",
-            hint="Unite them in the CAD program if they are one part, for solids that only touch "
-            "are not connected; else export each into a file of its own and join them in a "
-            "mechanism.",
+            hint="Solids that touch become one part by --unite (in Python the parameter unite=1), "
+            "which leaves those apart that do not; export these into files of their own, and join "
+            "them in a mechanism.",
         )
 
 
@@ -93,7 +96,7 @@ def _name_faces(gmsh: ModuleType, text: str) -> None:
     surfaces = sorted(tag for _, tag in gmsh.model.getEntities(2))
     if not named or set(named.values()) == {"NONE"}:
         return
-    if len(listed) != len(surfaces):
+    if len(listed) != len(surfaces):  # some are split where solids touch
         raise TagError(
             f"the file names {len(named)} faces, but its {len(listed)} faces became "
             f"{len(surfaces)} surfaces, so the names cannot be placed.",
