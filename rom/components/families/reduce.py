@@ -129,7 +129,7 @@ def reduce_parametric(  # noqa: PLR0913  one keyword per choice
     parameters = checked_parameters(parameters)
     thick = any(isinstance(p, Thickness) for p in parameters.values())
     if thick and stress:
-        raise ParameterError("no stress is known with a parameter of thickness; leave it out.")
+        raise ParameterError("stress is not recovered with a parameter of thickness; leave it out.")
     affine = (StretchedModel if thick else AffineModel)(model, parameters)
     middle = centre(affine.parameters)
     draft = FamilyDraft(
