@@ -14,7 +14,9 @@ from rom.cli.main import main
 from rom.cli.parser import build_parser, verb_modules
 from rom.errors import ConfigError
 from rom.io.export import FORMATS
+from rom.io.files import check_writable
 from rom.io.ours import FILE_SIGNS, SAME_KIND, check_replaceable, is_ours
+from rom.names import MAX_FILE_NAME_BYTES, TEMPORARY_BYTES
 from rom.report import pages
 
 BEAM = str(ROOT / "meshes" / "beam.geo")
@@ -241,3 +243,10 @@ def test_python_functions_replace_as_they_are_told(body, tmp_path):
     path.write_bytes(NOTES)
     rom.save(body, path)
     assert rom.save(rom.load(path), path) == path and rom.load(path).name == "good"
+
+
+def test_the_longest_name_of_a_file_leaves_room_for_the_temporary_one(tmp_path):
+    n = MAX_FILE_NAME_BYTES - TEMPORARY_BYTES
+    assert check_writable(tmp_path / ("a" * n))
+    with pytest.raises(ConfigError, match="no file can have the name"):
+        check_writable(tmp_path / ("a" * (n + 1)))

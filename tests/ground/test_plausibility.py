@@ -17,6 +17,7 @@ from rom.body.stiffening import known_loads
 from rom.components.cosserat import HelicalSpring
 from rom.components.gear_mesh import GearPair, RackPair
 from rom.components.hand.cable import Hole, Tendon
+from rom.eigen.attachments import carried_displacements
 from rom.errors import ConfigError, ModelError, RomWarning
 from rom.fe.mesh.validate import checked
 from rom.io.matrices.op4 import write_op4
@@ -497,3 +498,13 @@ def test_digits_lost_are_two_for_each_factor_of_ten():
     assert not far_doubt(99.0, 1.0, "it")
     assert "about 6 of 16" in far_doubt(1e3, 1.0, "it")
     assert "about 12 of 16" in far_doubt(1e6, 1.0, "it")
+
+
+@pytest.mark.parametrize(("ratio", "told"), [(99.0, 0), (101.0, 1)])
+def test_mass_is_carried_within_a_hundred_sizes_of_the_model(ratio, told):
+    model = block(size=(1.0, 0.1, 0.1))
+    place = model.interfaces["tip"].origin + np.array([0.0, 0.0, ratio])
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        carried_displacements(rom.Attachment("tip", 1.0, at=place), model)
+    assert len(said) == told

@@ -321,3 +321,12 @@ def test_mean_axis_bodies_have_round_off_where_nothing_stands(tmp_path):
         record = read_sid(path)
         assert check_sid(record).ok and record.dialect == dialect
     assert_array_equal(list(record.nodes), list(body.markers))
+
+
+def test_stiffness_of_modes_is_written_as_the_diagonal_it_is(tmp_path):
+    rom.export(solid.reduced(3, solid.block(), reference="root"), tmp_path / "body.SID_FEM")
+    text = (tmp_path / "body.SID_FEM").read_text()
+    kinds = dict(
+        re.findall(r"\n +(\w+)\n +order [^\n]*\n(?:[^\n]*\n){4} +structure += +(\d)", text)
+    )
+    assert (kinds["Ke"], kinds["Me"]) == ("1", "2")  # diagonal, symmetric

@@ -180,3 +180,12 @@ def test_a_mechanism_as_a_whole_takes_its_equilibrium_at_each_speed():
     found = 2 * np.pi * rom.campbell(mech, speeds).frequencies
     square = k / m - speeds**2 + 4 * speeds**2 * m * r**2 / (J + m * r**2)
     assert_allclose(found[:, 0], np.sqrt(square), rtol=1e-5)
+
+
+def test_damping_over_speed_is_that_of_the_formula():
+    """c / (2 sqrt(k m)), whatever the speed."""
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    on_guide(mech, "mass", mass=2.0)
+    mech.bushing("coil", "ground", "mass", stiffness=(50.0,) * 6, damping=(4.0,) * 6)
+    found = rom.campbell(lambda speed: mech, [1.0, 2.0]).damping_ratios
+    assert_allclose(found, 4.0 / (2 * np.sqrt(50.0 * 2.0)), rtol=1e-9)

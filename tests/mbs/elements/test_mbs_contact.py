@@ -475,6 +475,18 @@ def test_a_brick_pushed_along_the_floor_rests_by_springs_per_area(brick):
     assert_allclose(dropped.velocity("brick")[-1], 0.0, atol=1e-6)
 
 
+def test_what_sticks_stores_the_energy_of_its_spring():
+    """Without damping nothing is lost: work of the push, motion and spring balance."""
+    law = Impact(stiffness=1e6, exponent=1.0, mu=0.5, tangential_stiffness=2e4)
+    mech, r = rom.Mechanism(gravity=(0, 0, -g)), 0.1
+    mech.add_rigid("ball", mass=1.0, inertia=(1, 1, 1), at=(0, 0, r - g / 1e6))
+    mech.sphere_on_plane("floor", "ground", "ball", law, radius=r, normal=Z)
+    mech.force("push", "ball", (2.0, 0, 0))
+    energy = rom.simulate(mech, t_end=0.05, dt=1e-4).energy
+    assert energy.kinetic.max() > 1e-4
+    assert_allclose(energy.balance, 0, atol=1e-7)
+
+
 @pytest.mark.parametrize("kind", ["sphere", "cylinder", "bore"])
 def test_a_round_thing_presses_as_the_sum_over_the_points(brick, kind):
     """Against the sum of k a_i depth_i^1.5 along the normals, from the positions alone."""
