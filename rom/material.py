@@ -28,9 +28,9 @@ class Material:
     """Isotropic linear elastic solid; ``Material.steel`` and others of `SOLIDS` are ready made.
 
     Attributes:
-        E: Young's modulus [Pa], or a text such as "210 GPa".
+        E: Young's modulus [Pa]. Here and below a text such as "210 GPa" will do.
         nu: Poisson's ratio [1].
-        rho: density [kg/m^3], or a text such as "7.85 g/cm^3".
+        rho: density [kg/m^3].
 
     Raises:
         MaterialError: for E <= 0, rho <= 0, nu outside (-1, 0.5), or a number that is not finite.

@@ -4,6 +4,7 @@ Python finds out that an argument is of the wrong type where it is first used, d
 about attributes and subscripts. The border is the public function, and there the user is told.
 """
 
+import re
 import types
 from collections.abc import Callable
 from dataclasses import fields
@@ -135,7 +136,9 @@ class _Border:
         self.rest = rest or [("", None)]  # more than Python will let through
         self.places = [(p.name, takes[p.name]) for p in parameters if p.kind in BY_PLACE]
         self.takes = takes
-        self.markers = {p.name for p in parameters if "Marker" in str(p.annotation)}
+        # where a text is nothing else
+        texts = {p.name: str(p.annotation) for p in parameters if "Marker" in str(p.annotation)}
+        self.markers = {name for name, text in texts.items() if not re.search(r"\bstr\b", text)}
         owner = function.__qualname__.removesuffix(".__init__").split(".")[-1]
         ranges = ((p, USUAL.get(f"{owner}.{p}", USUAL.get(p))) for p in takes)
         self.usual = {p: limits for p, limits in ranges if limits}
@@ -171,9 +174,8 @@ class _Border:
 
     def _with_markers(self, args: Given, named: Named) -> tuple[Given, Named]:
         """Markers in place of their names, as what the first argument is of has them."""
-        owners = (getattr(args[0], name, None) for name in ("mechanism", "packed"))
-        owner = next((one for one in owners if one is not None), args[0])
-        find = getattr(owner, "marker", None)
+        owners = (_held(args[0], name) for name in ("mechanism", "packed"))
+        find = _held(next((one for one in owners if one is not None), args[0]), "marker")
 
         def found(name: str, value: object) -> object:
             if name in self.markers and isinstance(value, list | tuple):
@@ -212,6 +214,14 @@ class _Border:
             return self.name + about
         owner = args[0].__name__ if isinstance(args[0], type) else type(args[0]).__name__
         return (owner if self.name == "__init__" else f"{owner}.{self.name}") + about
+
+
+def _held(thing: object, name: str) -> Any:
+    """An attribute, or None; no field is asked for it."""
+    try:
+        return object.__getattribute__(thing, name)
+    except AttributeError:
+        return None
 
 
 def _taken(name: str, take: Taken | None, value: object) -> object:

@@ -308,7 +308,7 @@ def test_functions_of_unequal_surfaces_need_a_projection():
     model = replace(model, interfaces=model.interfaces | {"root": wider})
     bodies = {"left": half("left", "polynomial:2", n_modes=10)}
     bodies["right"] = right_half(model, "polynomial:2")
-    said = r"has 9 nodes, .* has 16, .* polynomial:2 coord"
+    said = r"has 9 nodes, .* has 16, .* do not coincide"
     refuses(InterfaceError, said, rom.Assembly, bodies, COUPLED)
     expected = joined("polynomial:2", (COARSE, FINE), n_modes=10).frequencies(8, fixed=(ROOT,))
     pair = rom.Assembly(bodies, COUPLED, projection=rom.Polynomial(2))

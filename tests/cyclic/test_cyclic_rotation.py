@@ -58,7 +58,8 @@ def test_a_wheel_whose_support_softens_diverges():
     assert rom.travelling_modes(at_rest, 0, 1, speed=slow).omega[0] > 0
     assert rom.cyclic_modes(at_rest, 0, 1, speed=slow).omega[0] > 0
     for call in (rom.travelling_modes, rom.cyclic_modes):
-        refuses(ModelError, r"319\.\d+ rad/s .*instability", call, at_rest, 0, 1, speed=fast)
+        said = r"319\.\d+ rad/s .*(instability|softening)"
+        refuses(ModelError, said, call, at_rest, 0, 1, speed=fast)
 
 
 @pytest.fixture(scope="module")

@@ -143,7 +143,7 @@ WRONG = {
     "negative": ({"stiffness": (1, 1, 1, 1, 1, -1)}, "negative in a direction"),
     "driving damper": ({"stiffness": np.ones(6), "damping": -np.ones(6)}, "damping of s"),
     "curve of nothing": ({"stiffness": np.ones(6), "curves": {"w": ([0, 1], [0, 1])}}, "'w'"),
-    "curve back": ({"stiffness": np.ones(6), "curves": {"x": ([0, 0], [0, 1])}}, "ascending"),
+    "curve back": ({"stiffness": np.ones(6), "curves": {"x": ([0, 0], [0, 1])}}, "ascend"),
     "uneven curve": ({"stiffness": np.ones(6), "curves": {"x": ([0, 1], [0, 1, 2])}}, "shape"),
 }
 
