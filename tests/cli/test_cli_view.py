@@ -98,7 +98,6 @@ def test_keys_and_time_change_what_the_window_shows_which_may_not_open(bar, tmp_
     window.leave(window.mode_scenes(bar, 2), tmp_path)
     done = python("-c", CODE, tmp_path, timeout=600)
     assert done.stdout.split() == ["True", "True", "True", "0"], done.stderr
-    pytest.importorskip("pyvista", reason="VTK comes with the pictures")
     monkeypatch.setattr(sys, "executable", "/bin/false")
     with pytest.raises(rom.errors.ConfigError, match="the process that draws ended with code 1"):
         window.show(window.mode_scenes(bar, 1))

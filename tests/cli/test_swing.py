@@ -13,7 +13,7 @@ from cases.command import rom as run_rom
 from cases.files.browser import PROGRAM, REASON, WITH_WEBGL, browser
 from cases.files.machine_parts import PARTS
 from cases.files.schema import errors
-from cases.files.step_parts import in_inches, step_box, step_plate
+from cases.files.step_parts import step_box, step_plate
 from cases.refusals import refuses
 from cases.solid import block, reduced
 from rom.cli.schemas import schema
@@ -130,7 +130,7 @@ def test_a_step_file_swings_about_its_bore(tmp_path):
     assert found["t_end"] == pytest.approx(period(inertia / area, arm), rel=1e-2)
 
 
-RHO, INCH = 7850.0, 0.0254
+RHO = 7850.0
 STEEL = ("--E", "210e9", "--nu", "0.3", "--rho", str(RHO))
 FACES = {  # number of faces; faces by number, point, radius and normal, and the kind of interface
     "bracket": (14, {"foot": ("10+11+12+13", "rbe2"), "bore": ("radius:0.0125", "rbe2")}),
@@ -180,16 +180,3 @@ def test_a_part_becomes_a_report_by_three_commands(folder, part):
         shown.open(folder / f"{part}.html", (640, 560))
         assert not shown.complaints
         assert (shown.pixels()[..., 3] > 200).sum() > 5000
-
-
-@pytest.mark.fenicsx
-@pytest.mark.long
-def test_a_part_in_inches_is_as_large_as_it_says(folder):
-    volume = PARTS["bracket"](folder / "metric.step")
-    in_inches(folder / "metric.step", folder / "inch.step")
-    listed = done(folder, "mesh", "inch.step", "--faces")
-    assert listed["volume"] == pytest.approx(volume * (INCH / 1e-3) ** 3, rel=2e-4)
-    bore = next(face for face in listed["faces"] if face["number"] == 14)
-    assert bore["radius"] == pytest.approx(12.5 * INCH, rel=1e-9)
-    wrong = run_rom("mesh", "inch.step", "--face=bore=radius:0.0125", cwd=folder)
-    assert wrong.returncode == 3 and "0.3175 (1 face)" in wrong.stderr

@@ -178,18 +178,6 @@ def test_what_contradicts_itself_is_told_before_anything_is_meshed(text, words, 
     assert words in str(refused.value)
 
 
-def test_the_sample_describes_the_rod_of_the_demo():
-    part = read_component(ROOT / "meshes" / "connecting_rod.toml")
-    how = {"parameters": {"lc": 5.5e-3}, "faces": {}, "scale": 1.0, "order": None}
-    how |= {"trust": False, "time_limit": None, "memory_limit": None}
-    assert part.mesh == (ROOT / "meshes" / "connecting_rod.geo", how)
-    assert part.material() == rom.Material(E=210e9, nu=0.3, rho=7850.0)
-    assert part.kinds == {"pin_a": "rbe2", "pin_b": "rbe2"}
-    assert part.values["reduction"]["reference"] == ("pin_a", "pin_b")
-    between_pins = ("pin_a:xyz rx", "pin_b:yz")
-    assert part.damping() == rom.ModalDamping(0.01, between_pins) and part.name == "rod"
-
-
 @pytest.mark.long
 @pytest.mark.fenicsx
 def test_the_sample_is_meshed_as_the_shell_changes_it(capsys, monkeypatch):

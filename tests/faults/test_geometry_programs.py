@@ -255,22 +255,6 @@ def test_no_limit_is_no_limit_and_others_are_positive(here):
             refuses(rom.ConfigError, name, read_mesh, "box.geo", **{name: wrong})
 
 
-@pytest.mark.parametrize(
-    ("content", "parameters"),
-    [(BOX + "Mesh.MeshSizeMax = 0; Mesh.MeshSizeMin = 0;\n", {}),
-     ('DefineConstant[ lc = {1, Name "lc"} ];\n' + BOX + "Mesh.MeshSizeMin = 0;\n"
-      "Mesh.MeshSizeMax = lc;\n", {"lc": 0.0}),
-     (BOX + "Exit;\n", {})],
-)  # fmt: skip
-def test_what_a_geometry_ends_is_not_called_damage(content, parameters, here):
-    lay({"box.geo": content}, here)
-    with pytest.raises(rom.RomError, match=r"box\.geo") as caught:
-        read_mesh("box.geo", parameters=parameters, time_limit=20)
-    assert "damaged" not in str(caught.value) and caught.value.exit_code in (2, 3)
-    assert isinstance(caught.value, rom.MeshError)
-    assert ("with these parameters" in str(caught.value)) == bool(parameters)
-
-
 def test_python_is_run_only_when_trusted(here):
     lay({"box.py": 'open("ran", "w")\ndef build(gmsh):\n    gmsh.model.occ.addBox(0, 0, 0, 1, 1, 1)'
          "\n    gmsh.model.occ.synchronize()\n",

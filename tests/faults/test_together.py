@@ -1,6 +1,5 @@
 """Several processes at once: kernels, forms, files, folders of runs, and threads under mpirun."""
 
-import json
 import multiprocessing
 import os
 import signal
@@ -10,7 +9,6 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import rom
@@ -155,28 +153,6 @@ def test_one_at_a_time_has_the_folder_however_many_want_it(tmp_path):
     for _ in together(work, 1, 2, 3):
         time.sleep(0.01)
     assert counter.read_text() == str(3 * WRITES)
-
-
-def test_two_runs_into_one_folder_leave_the_files_of_one(body, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    rom.save(body, "b.npz")
-    assert main([*PENDULUM, "-o", "warm"]) in (0, 5)
-
-    def work(t_end):
-        os._exit(main([*PENDULUM[:-3], t_end, *PENDULUM[-2:], "-o", "out"]))
-
-    processes = [FORK.Process(target=work, args=(t_end,)) for t_end in ("3e-5", "4e-5")]
-    for process in processes:
-        process.start()
-    for process in processes:
-        process.join()
-    codes = {process.exitcode for process in processes}
-    assert codes <= {0, 5, 6} and codes & {0, 5}
-    steps = json.loads(Path("out/run.json").read_text())["steps"]
-    table = np.loadtxt("out/b.csv", delimiter=",", skiprows=1)
-    assert len(table) == steps + 1 and steps in (30, 40)
-    assert sorted(os.listdir("out")) == ["b.csv", "run.json", "scene.json"]
-    capsys.readouterr()
 
 
 TOY = """

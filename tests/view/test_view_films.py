@@ -117,7 +117,8 @@ def test_progress_and_stages_are_shown_on_a_terminal_and_cleared(monkeypatch):
     shown = [part.strip() for part in text.split("\r")[1:]]
     assert shown == ["factor    0 %", "solve   50 %", "", ""]
     assert staged(monkeypatch, Terminal(), long=False) == ""
-    assert staged(monkeypatch, io.StringIO()) == ""
+    for silent in (staged, followed):
+        assert silent(monkeypatch, io.StringIO()) == ""
     monkeypatch.setattr(progress, "ranks", lambda: (1, 2))
     assert staged(monkeypatch, Terminal()) == ""
 
@@ -156,17 +157,3 @@ def test_reductions_and_modes_of_large_models_say_how_far_they_are(monkeypatch):
         "compare with the full model, root held   50 %",
     ]  # fmt: skip
     assert seen(logging.ERROR) == []
-
-
-@pytest.mark.parametrize("why", ["no terminal", "another rank", "quiet"])
-def test_progress_is_silent_where_nobody_wants_it(why, monkeypatch, caplog):
-    stream = io.StringIO() if why == "no terminal" else Terminal()
-    if why == "another rank":
-        monkeypatch.setattr(progress, "ranks", lambda: (1, 2))
-    if why == "quiet":
-        caplog.set_level(logging.ERROR, logger="rom")
-    monkeypatch.setattr(sys, "stderr", stream)
-    assert not progress.looked_for()
-    with progress.followed(10, "drawing", lambda: 5):
-        pass
-    assert stream.getvalue() == ""

@@ -9,7 +9,7 @@ from typing import Any
 CLASSES = {  # number of the class: its module
     "6": "files",  # and lines, also of several mistakes at once
     "7": "bounds",
-    "8": "together",  # alone, beside others, and where something is full
+    "8": "together",  # alone and beside others
     "R": "models",
 }
 

@@ -6,7 +6,7 @@ import numpy as np
 
 import rom
 from generated.case import case, write
-from generated.stock import MATRICES, body, pendulum
+from generated.stock import MATRICES, pendulum
 from rom.errors import ConfigError, FileFormatError, InterfaceError, MeshError, ResourceError
 
 HUGE = 10**12
@@ -23,8 +23,6 @@ LINES = {
     "an end beyond numbers": ("simulate pendulum.toml --t-end 1e308 -o out", "t_end"),
 }  # fmt: skip
 CALLS = {
-    "orders of a polynomial": (
-        lambda: body(interfaces={"root": rom.Polynomial(10**6), "tip": "rbe2"}), "1000000"),
     "mass": (lambda: moved(mass=1e308), ("bob", "mass", "t = ")),
     "distances": (lambda: moved(at=(1e200, 0, 0)), ("bob", "hinge")),
     "speeds": (lambda: moved(omega=(0, 0, 1e200)), ("t = ", "omega")),

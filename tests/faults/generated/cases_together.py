@@ -2,8 +2,6 @@
 
 import os
 import re
-import resource
-import signal
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -110,21 +108,6 @@ def locked(folder):
     require(len(rows) >= 15, "most of the motion is lost")
 
 
-def full(write):
-    """A disk that takes no more than a kilobyte: the old limit holds again afterwards."""
-
-    def act(folder):
-        before = resource.getrlimit(resource.RLIMIT_FSIZE)
-        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (1000, before[1]))
-        try:
-            write()
-        finally:
-            resource.setrlimit(resource.RLIMIT_FSIZE, before)
-
-    return act
-
-
 def peak():
     """Most memory that was resident [kB]."""
     return int(re.search(r"VmHWM:\s*(\d+)", Path("/proc/self/status").read_text())[1])
@@ -159,10 +142,5 @@ CASES = [
     case("two processes, the same bits", same_bits, Works),
     case("a mechanism that locks", locked, Works),
     case("a mechanism that locks, by name", "simulate lock.toml -o out", rom.SolverError, "rod", leaves=True),
-    case("a full disk for a table",
-         full(lambda: rom.write_history(rom.simulate(pendulum(), t_end=0.5, dt=0.001), "a.csv")),
-         rom.ResourceError, "a.csv"),
-    case("a full disk for a body", full(lambda: rom.save(rom.load("good.npz"), "a.npz")),
-         rom.ResourceError, "a.npz"),
     case("many steps", growth, Works),
 ]  # fmt: skip

@@ -15,7 +15,7 @@ from numpy.testing import assert_array_equal
 
 from cases.files.damage import changed
 from cases.refusals import refuses
-from rom.errors import ConfigError, FileFormatError
+from rom.errors import ConfigError, FileFormatError, UnsafeFileError
 from rom.io import read_matrix, read_op4
 from rom.io.matrices.op4 import write_op4
 
@@ -207,6 +207,9 @@ test_what_is_no_matrix_is_named_with_its_line = changed(
     read_op4,
     (f"{2:8d}{2:8d}A", f"{2:8d}{5:8d}A", r"line \d+: .*unknown type 5"),
     ("3D23.16", "3Z23.16", r"line \d+: .*format '3Z23.16' is unknown"),
+    # before memory is taken
+    (SIZE, f"{99999999:8d}{7:8d}", UnsafeFileError, "7 rows and 99999999 columns"),
+    (f"{1:8d}{1:8d}{7:8d}", f"{1:8d}{1:8d}{9999997:8d}", "line 2: .*9999997 values"),
     (SIZE, f"{0:8d}{7:8d}", r"line \d+: .*7 rows and 0 columns"),
     (SIZE, f"{5:8d}{4:8d}", r"line \d+: .*reaches beyond 4 rows"),
 )
