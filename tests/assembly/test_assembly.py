@@ -134,7 +134,15 @@ def test_enhanced_bodies_are_wrong_in_assemblies_and_that_is_said(seed):
     full = rom.modes(whole, 9).frequencies[6:]
 
     def error(method):
-        return np.abs(in_a_row(parts, method).frequencies()[6:9] / full - 1).max()
+        bodies, couplings = {}, []
+        for i, part in enumerate(parts):
+            touched = (["root"] if i else []) + (["tip"] if i < len(parts) - 1 else [])
+            kinds = dict.fromkeys(touched, "full")
+            bodies[f"part {i}"] = rom.reduce(part, method=method, interfaces=kinds, certify=False)
+            if i:
+                couplings.append(((f"part {i - 1}", "tip"), (f"part {i}", "root")))
+        row = rom.Assembly(bodies, tuple(couplings))
+        return np.abs(row.frequencies()[6:9] / full - 1).max()
 
     with warnings.catch_warnings():
         warnings.simplefilter("error", RomWarning)
@@ -143,17 +151,6 @@ def test_enhanced_bodies_are_wrong_in_assemblies_and_that_is_said(seed):
         enhanced = error(rom.EnhancedCraigBampton(8))
     plain = error(rom.CraigBampton(8))
     assert moments < 1e-4 and moments < plain < 5e-3 and 5 * plain < enhanced
-
-
-def in_a_row(parts, method):
-    bodies, couplings = {}, []
-    for i, part in enumerate(parts):
-        touched = (["root"] if i else []) + (["tip"] if i < len(parts) - 1 else [])
-        kinds = dict.fromkeys(touched, "full")
-        bodies[f"part {i}"] = rom.reduce(part, method=method, interfaces=kinds, certify=False)
-        if i:
-            couplings.append(((f"part {i - 1}", "tip"), (f"part {i}", "root")))
-    return rom.Assembly(bodies, tuple(couplings))
 
 
 COARSE, FINE = (4, 2, 2), (4, 3, 3)
@@ -278,7 +275,7 @@ def test_meshes_that_do_not_match_lie_between_the_matching_ones():
     assert (found > low * 0.999).all() and (found < high * 1.001).all()
 
 
-def test_a_free_assembly_of_meshes_that_do_not_match_moves_rigidly():
+def test_meshes_that_do_not_match_move_rigidly_and_are_reduced_like_any_interface():
     bodies = halves("full", (COARSE, FINE), n_modes=20)
     pair = rom.Assembly(bodies, COUPLED, projection=rom.Polynomial(2))
     omega, shapes = pair.modes(7)
@@ -288,16 +285,11 @@ def test_a_free_assembly_of_meshes_that_do_not_match_moves_rigidly():
         _, K = bodies[name].full_matrices()
         assert np.abs(motion.T @ K @ motion).max() < 1e-9 * omega[6] ** 2
     assert_allclose(motions[0][:6], motions[1][:6], atol=1e-6 * np.abs(motions[0]).max())
-
-
-@pytest.mark.parametrize("level", ["system", "local"])
-def test_moments_are_reduced_like_any_interface(level):
-    bodies = halves("full", (COARSE, FINE), n_modes=20)
-    pair = rom.Assembly(bodies, COUPLED, projection=rom.Polynomial(2))
     exact = pair.frequencies(10, fixed=(ROOT,))
-    found = [pair.reduced(n, level=level, fixed=(ROOT,)).frequencies(10) for n in (9, 18)]
-    assert (found[0] >= exact * (1 - 1e-9)).all()
-    assert_allclose(found[1], exact, rtol=1e-9)
+    for level in ("system", "local"):
+        found = [pair.reduced(n, level=level, fixed=(ROOT,)).frequencies(10) for n in (9, 18)]
+        assert (found[0] >= exact * (1 - 1e-9)).all()
+        assert_allclose(found[1], exact, rtol=1e-9)
 
 
 def test_functions_of_unequal_surfaces_need_a_projection():

@@ -3,6 +3,7 @@
 import tracemalloc
 from dataclasses import replace
 from itertools import cycle
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -305,7 +306,8 @@ def test_a_range_holds_to_the_last_step_that_does(certified, monkeypatch, steps,
     W = nodal_forces(geometric.components(), model, model.operators, np.zeros(3))
     E = np.linalg.pinv(W.T) @ np.outer(loads[1:3], [1.0] * 3 + [0.0] * (body.n_modes - 3)) * 1e-3
     after = cycle(steps[: n_found + 1] if n_found < 3 else steps)
-    monkeypatch.setattr("rom.body.nonlinear.full.HeldSolid.of", lambda *given, **law: Known(after))
+    known = SimpleNamespace(whole=np.asarray, state=lambda *given: next(after))  # the full model
+    monkeypatch.setattr("rom.body.nonlinear.full.HeldSolid.of", lambda *given, **law: known)
     monkeypatch.setattr("rom.checks.deflection._compared", lambda *given: given[-1][-1])
     draft = Draft(model=model, nonlinear=geometric)
     draft.connection, draft.body, draft.E = None, replace(body, provenance={}), E
@@ -320,13 +322,6 @@ def test_a_range_holds_to_the_last_step_that_does(certified, monkeypatch, steps,
     energies = [0.0, *map(body.quartic.energy, path)]
     assert_allclose(one["energy"], energies[holds], rtol=1e-6)
     assert all(r.ok for r in draft.rows) == (holds == 3)
-
-
-class Known:
-    """Stands for the full model where the outcomes of its states are given."""
-
-    def __init__(self, after):
-        self.whole, self.state = np.asarray, lambda *given: next(after)
 
 
 def test_the_range_says_how_far_an_interface_turns_and_who_leaves_it_is_told(certified):

@@ -206,7 +206,7 @@ def test_rotation_has_no_stress_and_turns_the_one_there_is(homogeneous):
     assert_allclose(*S, atol=1e-12 * E_STEEL)
 
 
-def layered(materials):
+def test_where_materials_meet_small_deflection_has_the_stress_of_hookes_law():
     from dolfinx import mesh as dm
 
     from rom.fe.elasticity import assemble
@@ -215,13 +215,10 @@ def layered(materials):
     middles = dm.compute_midpoints(mesh, 3, np.arange(4, dtype=np.int32))
     outer = (middles[:, 0] > 0.5).astype(np.int32)
     tags = dm.meshtags(mesh, 3, np.arange(4, dtype=np.int32), outer)
-    return assemble(mesh, cell_tags=tags, regions={"inner": 0, "outer": 1}, material=materials)
-
-
-def test_where_materials_meet_small_deflection_has_the_stress_of_hookes_law():
+    two = {"cell_tags": tags, "regions": {"inner": 0, "outer": 1}}
     soft = rom.Material(E=70e9, nu=0.34, rho=2700.0)
     for other in (soft, TIMBER):
-        model = layered({"inner": STEEL, "outer": other})
+        model = assemble(mesh, **two, material={"inner": STEEL, "outer": other})
         U = np.random.default_rng(4).standard_normal((model.n_dofs, 2))
         nodes = np.arange(len(model.points))
         recovery = CauchyRecovery(model.points, **model.stresses.gradients_at_nodes(U, nodes))

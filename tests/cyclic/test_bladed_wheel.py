@@ -43,11 +43,6 @@ def disk(small):
     return rom.bladed_wheel(small, 12)
 
 
-@pytest.fixture(scope="module")
-def short():
-    return bladed_model(N, tip=0.15, **SIZES)
-
-
 def whole_wheel(full, changes, n_modes):
     """Lowest modes of all finite elements, {sector: (dK, dM)} added to those that differ."""
     nothing = (0 * full.K, 0 * full.M)
@@ -91,7 +86,8 @@ def test_equal_blades_are_the_tuned_wheel_and_certificates_notice_weak_ones(smal
 
 
 @pytest.mark.long
-def test_every_blade_may_be_another_one(model, full, small, disk, short):
+def test_every_blade_may_be_another_one(model, full, small, disk):
+    short = bladed_model(N, tip=0.15, **SIZES)
     (K, M), (K_short, M_short) = region(model, "blade"), region(short, "blade")
     changes = {1: (-0.2 * K, 0 * M), 3: (0.05 * K, 0.1 * M), 4: (K_short - K, M_short - M)}
     omega, Phi = whole_wheel(full, changes, 48)

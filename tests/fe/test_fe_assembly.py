@@ -261,5 +261,5 @@ def test_a_geometry_file_becomes_a_model(tmp_path):
     assert_allclose(model.mass(), 7850.0 * 0.0056 * 8 + 3.0, rtol=1e-10)
     made = model.provenance
     assert (made["parameters"]["L"], len(made["sha256"]), made["degree"]) == (0.7, 64, 2)
-    with pytest.raises(MaterialError, match=r"no region 'rod'; the mesh has \['bar'\]"):
-        rom.fe.model(path, material={"rod": STEEL})
+    said = r"no region 'rod'; the mesh has \['bar'\]"
+    refuses(MaterialError, said, rom.fe.model, path, material={"rod": STEEL})

@@ -17,6 +17,7 @@ from cases.long import few
 from cases.measures import memory_taken
 from cases.paths import RANKS, ROOT
 from cases.ranks.environment import ENVIRONMENT
+from cases.refusals import refuses
 from cases.solid import STEEL, reduced
 from rom.errors import ResourceError
 from rom.process.mpirun import mpirun
@@ -48,15 +49,6 @@ def bar(size, solver="auto"):
     return rom.fe.model("meshes/beam.geo", material=STEEL, parameters=sizes, solver=solver)
 
 
-def growth(work):
-    gc.collect()
-    memory.collect(MPI.COMM_WORLD)
-    Path("/proc/self/clear_refs").write_text("5")  # the largest so far is forgotten
-    (before,) = memory_taken("VmRSS")
-    work()
-    return (memory_taken("VmHWM") - before)[0]
-
-
 def taken_and_foreseen(shape, solver):
     """Memory of a reduction and what its analysis, or the matrix alone, said [bytes]."""
     model = bar(SHAPES[shape], solver)
@@ -65,7 +57,12 @@ def taken_and_foreseen(shape, solver):
     direct = solver == "direct"
     solved = foreseen.analysed(K).in_core if direct else foreseen.multigrid_bytes(K)
     reduced(20, bar((1.0, 0.1, 0.1, 0.1), solver))  # compiles what is not foreseen
-    return growth(lambda: reduced(20, model)), beside + solved
+    gc.collect()
+    memory.collect(MPI.COMM_WORLD)
+    Path("/proc/self/clear_refs").write_text("5")  # the largest so far is forgotten
+    (before,) = memory_taken("VmRSS")
+    reduced(20, model)
+    return (memory_taken("VmHWM") - before)[0], beside + solved
 
 
 REDUCED = few(1, [(shape, "direct") for shape in SHAPES])
@@ -144,9 +141,9 @@ def test_the_way_taken_is_kept_with_the_body(block, needs, monkeypatch):
 def test_columns_of_interfaces_count_beside_the_factor(block, needs, monkeypatch):
     K = operators(block).K
     limited(monkeypatch, needs["direct"])
-    foreseen.check_factor_memory(K, 12, DIRECT_SOLVER)
-    with pytest.raises(ResourceError, match="is predicted to take"):
-        foreseen.check_factor_memory(K, 10_000, DIRECT_SOLVER)
+    check = foreseen.check_factor_memory
+    check(K, 12, DIRECT_SOLVER)
+    refuses(ResourceError, "is predicted to take", check, K, 10_000, DIRECT_SOLVER)
 
 
 FULL_DISK = """

@@ -44,21 +44,6 @@ def run_up(bent, blade):
     return rom.spin_up(blade, bent, speed=6 * UNIT, n_states=9)
 
 
-def rod():
-    radius, A, G = ARC / np.radians(BEND), B * H, E / 2
-
-    def place(s):
-        c, t = np.cos(s / radius), np.sin(s / radius)
-        return (R + radius * t, 0, radius * (1 - c)), np.array([[t, 0, -c], [0, 1, 0], [c, 0, t]]).T
-
-    thin, wide = B * H**3 / 12, H * B**3 / 12
-    return cosserat.along(
-        place, np.linspace(0, ARC, 41), stretch=(5 / 6 * G * A, 5 / 6 * G * A, E * A),
-        bend=(E * wide, E * thin, G * 4 * thin * (1 - 0.63 * H / B)), mass=RHO * A,
-        inertia=(RHO * wide, RHO * thin, RHO * (thin + wide)),
-    )  # fmt: skip
-
-
 def test_the_tangent_is_the_derivative_of_the_forces():
     """Of a hot solid of Poisson's ratio 0.3, far from its reference."""
     model = straight(nu=0.3, nx=3)
@@ -121,8 +106,20 @@ def test_a_straight_blade_hardly_needs_it():
 @pytest.mark.parametrize("eta", [2.0, 4.5, 6.0])
 def test_a_bent_blade_vibrates_like_a_geometrically_exact_rod(bent, run_up, eta):
     """Rotation straightens it; shapes 1, 3 and 4 bend across its thin side and in its plane."""
+    radius, A, G = ARC / np.radians(BEND), B * H, E / 2
+
+    def place(s):
+        c, t = np.cos(s / radius), np.sin(s / radius)
+        return (R + radius * t, 0, radius * (1 - c)), np.array([[t, 0, -c], [0, 1, 0], [c, 0, t]]).T
+
+    thin, wide = B * H**3 / 12, H * B**3 / 12
+    line = cosserat.along(
+        place, np.linspace(0, ARC, 41), stretch=(5 / 6 * G * A, 5 / 6 * G * A, E * A),
+        bend=(E * wide, E * thin, G * 4 * thin * (1 - 0.63 * H / B)), mass=RHO * A,
+        inertia=(RHO * wide, RHO * thin, RHO * (thin + wide)),
+    )  # fmt: skip
     speed = eta * UNIT
-    line, spin = rod(), (0, 0, speed)
+    spin = (0, 0, speed)
     shape = cosserat.equilibrium(line, cosserat.loads(line), spin=spin)
     exact = 2 * np.pi * cosserat.modes(line, shape, 4, spin=spin).frequencies
     tip = run_up.displacement(speed).reshape(-1, 3)[bent.interfaces["tip"].nodes].mean(axis=0)

@@ -13,16 +13,12 @@ from rom.errors import ConfigError, InterfaceError, ModelError, ResourceError, S
 from rom.reduction.interfaces.connection import connect
 
 INTERFACES = {"root": "rbe2", "tip": "rbe2"}
-
-
-@pytest.fixture(scope="module")
-def model():
-    return block(cells=(10, 2, 2))
+MODEL = block(cells=(10, 2, 2))
 
 
 @pytest.fixture(params=KINDS)
-def connection(request, model):
-    return connect(request.param(model), model, INTERFACES)
+def connection(request):
+    return connect(request.param(MODEL), MODEL, INTERFACES)
 
 
 def dynamic_stiffness(K, M, s, b):
@@ -76,12 +72,12 @@ def test_at_rest_the_static_set_counts_as_one_more_and_a_resonance_is_refused(co
     refuses(SolverError, "interfaces held|is singular", basis, ops, b, connection.labels)
 
 
-def test_frequencies_are_upper_bounds_and_converge(connection, model):
-    full = rom.modes(model, 14, interfaces=INTERFACES).frequencies[6:]
+def test_frequencies_are_upper_bounds_and_converge(connection):
+    full = rom.modes(MODEL, 14, interfaces=INTERFACES).frequencies[6:]
     worst = []
     for order in (1, 2, 3):
         method = rom.MomentMatching((0.0, 1500.0), order)
-        body = rom.reduce(model, method=method, interfaces=INTERFACES, certify=False)
+        body = rom.reduce(MODEL, method=method, interfaces=INTERFACES, certify=False)
         reduced = body.frequencies()[6:14]
         assert (reduced >= full * (1 - 1e-9)).all()
         worst.append((reduced / full - 1).max())
@@ -89,10 +85,10 @@ def test_frequencies_are_upper_bounds_and_converge(connection, model):
     assert worst[2] < 1e-4
 
 
-def test_the_body_has_a_certificate(model):
-    loaded = rom.WithLoads(rom.CraigBampton(25), pinch(model))
+def test_the_body_has_a_certificate():
+    loaded = rom.WithLoads(rom.CraigBampton(25), PINCH)
     for method, kinds in ((rom.MomentMatching((0.0, 1500.0), 3), INTERFACES), (loaded, MIXED)):
-        body = rom.reduce(model, method=method, interfaces=kinds)
+        body = rom.reduce(MODEL, method=method, interfaces=kinds)
         assert body.certificate.ok, body.certificate
 
 
@@ -112,19 +108,14 @@ def test_messages_for_wrong_boundaries(connection):
 
 
 MIXED = {"root": "rbe2", "tip": "polynomial:1"}
+PINCH = np.zeros((MODEL.n_dofs, 2))  # two loads on nodes off the interfaces, one along a whole row
+PINCH[3 * 40 + 1, 0], PINCH[3 * 50 + 2, 0] = 1.0, -1.0
+PINCH[3 * np.arange(30, 60), 1] = 0.3
 
 
 @pytest.fixture(params=KINDS)
-def mixed(request, model):
-    return connect(request.param(model), model, MIXED)
-
-
-def pinch(model):
-    """Two loads on nodes off the interfaces, and one along a whole row."""
-    F = np.zeros((model.n_dofs, 2))
-    F[3 * 40 + 1, 0], F[3 * 50 + 2, 0] = 1.0, -1.0
-    F[3 * np.arange(30, 60), 1] = 0.3
-    return F
+def mixed(request):
+    return connect(request.param(MODEL), MODEL, MIXED)
 
 
 def static_error(mixed, method, F):
@@ -139,23 +130,23 @@ def static_error(mixed, method, F):
 
 
 @pytest.mark.parametrize("method", [rom.Guyan(), rom.CraigBampton(3), rom.MomentMatching((0.0,))])
-def test_statics_under_the_loads_is_exact(mixed, model, method):
-    F = mixed.ops.restrict(pinch(model))
+def test_statics_under_the_loads_is_exact(mixed, method):
+    F = mixed.ops.restrict(PINCH)
     assert static_error(mixed, method, F) > 1e-4
-    assert static_error(mixed, rom.WithLoads(method, pinch(model)), F) < 1e-9
+    assert static_error(mixed, rom.WithLoads(method, PINCH), F) < 1e-9
 
 
-def test_gravity_is_a_load_and_restrict_the_adjoint_of_expand(mixed, model):
+def test_gravity_is_a_load_and_restrict_the_adjoint_of_expand(mixed):
     F = mixed.ops.apply_M(mixed.ops.rigid[:, :3])
     assert static_error(mixed, rom.Guyan(), F) > 1e-3
     assert static_error(mixed, rom.WithLoads(rom.Guyan()), F) < 1e-9
     rng, ops = np.random.default_rng(2), mixed.ops
-    a, F = rng.normal(size=(ops.n, 3)), rng.normal(size=(model.n_dofs, 2))
+    a, F = rng.normal(size=(ops.n, 3)), rng.normal(size=(MODEL.n_dofs, 2))
     assert_allclose(ops.expand(a).T @ F, a.T @ ops.restrict(F), rtol=1e-10)
 
 
-def test_what_the_basis_knows_is_not_added_again(mixed, model):
-    method = rom.WithLoads(rom.WithLoads(rom.CraigBampton(4), pinch(model)), pinch(model))
+def test_what_the_basis_knows_is_not_added_again(mixed):
+    method = rom.WithLoads(rom.WithLoads(rom.CraigBampton(4), PINCH), PINCH)
     basis = method.basis(mixed.ops, mixed.boundary, mixed.labels)
     assert sum(label.startswith("load") for label in basis.labels) == 2
     assert basis.omega.size == 4
@@ -213,10 +204,7 @@ def test_the_response_converges_and_is_exact_with_all_coordinates():
     assert worst[3] < 1e-5 and worst[4] < 1e-11
 
 
-@pytest.mark.parametrize("make", KINDS)
-def test_frequencies_of_a_body_are_upper_bounds_and_statics_is_exact(make):
-    model = block(cells=(10, 2, 2))
-    connection = connect(make(model), model, INTERFACES)
+def test_frequencies_of_a_body_are_upper_bounds_and_statics_is_exact(connection):
     ops = connection.ops
     basis = rom.BalancedTruncation(6, pool=40).basis(ops, connection.boundary, connection.labels)
     K, M = (ops.gram(basis.Psi, A(basis.Psi)) for A in (ops.apply_K, ops.apply_M))
@@ -230,10 +218,9 @@ def test_frequencies_of_a_body_are_upper_bounds_and_statics_is_exact(make):
 
 def test_modes_that_interfaces_neither_move_nor_feel_leave_first():
     """The pool in its own order, judged by what interfaces see: the sum of participations grows."""
-    model = block(cells=(10, 2, 2))
     seen = []
     for method in (rom.BalancedTruncation(6, pool=40), rom.CraigBampton(6)):
-        body = rom.reduce(model, method=method, interfaces=INTERFACES, certify=False)
+        body = rom.reduce(MODEL, method=method, interfaces=INTERFACES, certify=False)
         seen.append(body.effective_mass(fixed=tuple(INTERFACES)).sum())
     assert seen[0] > seen[1]
 

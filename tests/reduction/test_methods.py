@@ -16,21 +16,12 @@ from rom.errors import ConfigError, InterfaceError, QualityGateError, SolverErro
 from rom.reduction.bases.fixed_interface import craig_bampton, projected
 
 METHODS = [rom.CraigBampton, rom.EnhancedCraigBampton, rom.Rubin, rom.Herting]
-
-
-@pytest.fixture(scope="module")
-def model():
-    return block(cells=(9, 3, 2), origin=(0.4, 0.1, 0.0))
-
-
-@pytest.fixture(scope="module")
-def exact(model):
-    return eigh(model.K.toarray(), model.M.toarray(), eigvals_only=True)
+MODEL = block(cells=(9, 3, 2), origin=(0.4, 0.1, 0.0))
 
 
 @pytest.fixture(params=KINDS)
-def ops(request, model):
-    return request.param(model)
+def ops(request):
+    return request.param(MODEL)
 
 
 def boundary(model):
@@ -46,8 +37,9 @@ def reduced(ops, method, b):
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_frequencies_fall_towards_the_full_ones_with_every_mode(ops, model, exact, method):
-    b = boundary(model)
+def test_frequencies_fall_towards_the_full_ones_with_every_mode(ops, method):
+    exact = eigh(MODEL.K.toarray(), MODEL.M.toarray(), eigvals_only=True)
+    b = boundary(MODEL)
     steps = []
     for n in (2, 8, 20):
         lam, basis = reduced(ops, method(n), b)
@@ -63,8 +55,8 @@ def test_frequencies_fall_towards_the_full_ones_with_every_mode(ops, model, exac
 
 
 @pytest.mark.parametrize("method", [rom.Guyan, rom.CraigBampton, rom.Rubin, rom.Herting])
-def test_rigid_motions_and_statics_of_the_boundary_are_exact(ops, model, method):
-    b = boundary(model)
+def test_rigid_motions_and_statics_of_the_boundary_are_exact(ops, method):
+    b = boundary(MODEL)
     method = method() if method is rom.Guyan else method(6)
     basis = method.basis(ops, b, tuple(map(str, b)))
     K, M = projected(ops, basis.Psi)
@@ -155,8 +147,8 @@ def test_wrong_boundaries_and_modes_that_spend_their_flexibility_are_refused():
         refuses(error, words, method.basis, ops, np.array(b, dtype=int), ("",) * len(b))
 
 
-def test_modes_by_substructures_are_those_by_lanczos(ops, model):
-    b = boundary(model)
+def test_modes_by_substructures_are_those_by_lanczos(ops):
+    b = boundary(MODEL)
     known = rom.CraigBampton(n_modes=40).basis(ops, b, ("",) * b.size)
     f_max = float(known.omega[30] + known.omega[31]) / (4 * np.pi)
     found = rom.CraigBampton(f_max=f_max, search="substructures").basis(ops, b, ("",) * b.size)

@@ -24,6 +24,7 @@ from rom.reduction.interfaces.snapshots import snapshot_functions
 
 FLAT, QUADRIC, OTHER = [3, 6, 10, 15], [4, 9, 16, 25], [4, 10, 20, 35]
 RANKS = {"plane": FLAT, "strip": FLAT, "cylinder": QUADRIC, "sphere": QUADRIC, "wave": OTHER}
+MODEL = block(cells=(6, 3, 3))
 
 
 @pytest.mark.parametrize(("name", "ranks"), RANKS.items())
@@ -89,9 +90,8 @@ def test_two_bodies_around_one_bore_choose_the_same_functions():
 
 
 def test_frequencies_fall_with_the_order_towards_the_full_interface():
-    model = block(cells=(6, 3, 3))
     kinds = ("full", *(rom.Polynomial(p) for p in (1, 2, 3, 6)))
-    bodies = (reduced(15, model, interfaces={"root": kind, "tip": kind}) for kind in kinds)
+    bodies = (reduced(15, MODEL, interfaces={"root": kind, "tip": kind}) for kind in kinds)
     full, *steps = np.array([body.frequencies(12)[6:] for body in bodies])
     assert (np.diff(steps, axis=0) < 1e-9 * full).all()
     assert (steps[0] > full * (1 + 1e-4)).any()
@@ -119,11 +119,10 @@ def test_only_as_many_solutions_as_functions_are_computed(monkeypatch):
 
 @pytest.mark.parametrize("kind", ["polynomial:2", rom.FourierLegendre(2, 1)], ids=str)
 def test_the_certificate_holds_and_interfaces_can_be_held(kind):
-    model = block(cells=(6, 3, 3))
     kinds = {"root": kind, "tip": "rbe2"}
-    body = rom.reduce(model, method=rom.CraigBampton(25), interfaces=kinds, reference="root")
+    body = rom.reduce(MODEL, method=rom.CraigBampton(25), interfaces=kinds, reference="root")
     assert body.certificate.ok, body.certificate
-    full = rom.modes(model, 4, fixed=("root",), interfaces=kinds).frequencies
+    full = rom.modes(MODEL, 4, fixed=("root",), interfaces=kinds).frequencies
     assert_allclose(body.frequencies(4, fixed=("root",)), full, rtol=1e-3)
     assert body.markers["root"].kind in ("polynomial:2", "fourier:2,1")
     assert_allclose(body.markers["root"].translation, 0, atol=1e-9)
@@ -183,7 +182,6 @@ test_kinds_that_a_surface_cannot_have_are_refused = refused(
     (tied(surface("line"), "polynomial:2"), InterfaceError, "'line' lie on a line"),
     (tied(icosahedron(), "fourier:2,2"), InterfaceError, "'sphere' has no axis"),
 )
-MODEL = block(cells=(6, 3, 3))
 ROOT = MODEL.interfaces["root"]
 N = ROOT.dofs.size
 RANDOM = np.random.default_rng(1).normal(size=(N, 60))

@@ -23,23 +23,19 @@ from rom.reduction.interfaces.connection import connect
 from rom.rows import N_COMPARED
 
 SUPPORTS = [(), ("root",), ("tip",)]
+# away from the origin of coordinates, so that no first moment vanishes
+MODEL = block(cells=(8, 2, 3), origin=(0.3, -0.2, 0.1))
 
 
 @pytest.fixture(scope="module")
-def model():
-    """A block away from the origin of coordinates, so that no first moment vanishes."""
-    return block(cells=(8, 2, 3), origin=(0.3, -0.2, 0.1))
-
-
-@pytest.fixture(scope="module")
-def body(model):
-    return rom.reduce(model, method=rom.CraigBampton(30), interfaces=KINDS, reference="root")
+def body():
+    return rom.reduce(MODEL, method=rom.CraigBampton(30), interfaces=KINDS, reference="root")
 
 
 @pytest.mark.parametrize("fixed", SUPPORTS)
-def test_one_body_serves_every_support(model, body, fixed):
+def test_one_body_serves_every_support(body, fixed):
     n = 6 if fixed else 12
-    full = rom.modes(model, n, fixed=fixed, interfaces=KINDS).frequencies
+    full = rom.modes(MODEL, n, fixed=fixed, interfaces=KINDS).frequencies
     found = body.frequencies(n, fixed=fixed)
     assert_allclose(found, full, rtol=1e-3, atol=1e-3)
     assert np.all(found >= full - 1e-7)
@@ -88,11 +84,11 @@ def test_pins_keep_both_points_on_the_axis(body):
     assert np.abs(second.translation[0]).max() > 1e-3 * scale  # it may still stretch
 
 
-def test_three_points_span_the_frame(model):
+def test_three_points_span_the_frame():
     """3-2-1: the first stays, the second on its line, the third in the plane; nothing else."""
-    x = model.points
+    x = MODEL.points
     middle = np.flatnonzero((x[:, 1] > -0.11) & (abs(x[:, 0] - 0.8) < 0.15))
-    spots = replace(model, interfaces=model.interfaces | {"c": _patch(model, "c", middle)})
+    spots = replace(MODEL, interfaces=MODEL.interfaces | {"c": _patch(MODEL, "c", middle)})
     body = reduced(8, spots, interfaces=KINDS | {"c": "full"})
     body = replace(body, markers=body.markers | {"a": body.markers["root"]})
     seen = body.with_reference(("a", "tip", "c"))
@@ -115,10 +111,10 @@ def _patch(model, name, nodes):
     return rom.Interface(name, nodes, at, diags(np.ones(len(nodes))).tocsr(), at.mean(axis=0))
 
 
-def test_an_interface_on_a_line_is_refused(model):
-    edge = np.flatnonzero((model.points[:, 1] > -0.11) & (model.points[:, 2] > 0.17))
+def test_an_interface_on_a_line_is_refused():
+    edge = np.flatnonzero((MODEL.points[:, 1] > -0.11) & (MODEL.points[:, 2] > 0.17))
     for nodes in (edge, edge[:1]):
-        lined = replace(model, interfaces=model.interfaces | {"edge": _patch(model, "edge", nodes)})
+        lined = replace(MODEL, interfaces=MODEL.interfaces | {"edge": _patch(MODEL, "edge", nodes)})
         for kind in ("full", "rbe2", "rbe3", "polynomial:1"):
             refuses(InterfaceError, "line", reduced, 2, lined, interfaces={"edge": kind})
 
@@ -130,7 +126,7 @@ def test_the_own_frequencies_depend_on_the_frame(body):
     assert_allclose(free.omega[:4] / (2 * np.pi), body.frequencies(10)[6:], rtol=1e-8)
 
 
-def test_integrals_equal_those_of_the_nodal_fields(model):
+def test_integrals_equal_those_of_the_nodal_fields():
     small = block(cells=(1, 1, 1), origin=(0.3, -0.2, 0.1))  # every node is on the surface
     body = reduced(0, small, interfaces={"root": "full", "tip": "rbe3"}).with_reference("tip")
     surface = body.surface
@@ -145,20 +141,20 @@ def test_integrals_equal_those_of_the_nodal_fields(model):
     assert_allclose(surface.shape.T @ K @ surface.shape, body.K, atol=1e-9 * body.K.max())
 
 
-def test_rbe2_surface_stays_rigid_and_rbe3_surface_follows_its_mean(model):
-    tip = model.interfaces["tip"]
+def test_rbe2_surface_stays_rigid_and_rbe3_surface_follows_its_mean():
+    tip = MODEL.interfaces["tip"]
     R = rigid_motions(tip.points - tip.origin)
     assert_allclose(mean_motion(tip) @ R, np.eye(6), atol=1e-12)
-    stiff = rom.modes(model, 6, fixed="root", interfaces={"tip": "rbe2"}).frequencies
-    free = rom.modes(model, 6, fixed="root", interfaces={"tip": "rbe3"}).frequencies
-    plain = rom.modes(model, 6, fixed="root").frequencies
+    stiff = rom.modes(MODEL, 6, fixed="root", interfaces={"tip": "rbe2"}).frequencies
+    free = rom.modes(MODEL, 6, fixed="root", interfaces={"tip": "rbe3"}).frequencies
+    plain = rom.modes(MODEL, 6, fixed="root").frequencies
     assert np.all(stiff > plain * (1 + 1e-7))  # rigid plate at the tip stiffens
     assert_allclose(free, plain, rtol=1e-9)  # averaging adds no stiffness
 
 
-def test_the_mean_motion_is_weighted_by_area(model):
+def test_the_mean_motion_is_weighted_by_area():
     """u_x = z^2 on three rows of cells: the mean over the area, not over the nodes."""
-    tip = model.interfaces["tip"]
+    tip = MODEL.interfaces["tip"]
     z = tip.points[:, 2] - tip.origin[2]
     u = np.zeros((z.size, 3))
     u[:, 0] = z**2
@@ -169,31 +165,31 @@ def test_the_mean_motion_is_weighted_by_area(model):
     assert abs(trapezoid - rows.mean()) > 0.1 * trapezoid
 
 
-def test_holding_the_mean_motion_equals_the_constrained_full_model(model):
+def test_holding_the_mean_motion_equals_the_constrained_full_model():
     """rbe3 held: the full model with C u = 0, solved in the null space of C."""
-    tip = model.interfaces["tip"]
-    C = np.zeros((6, model.n_dofs))
+    tip = MODEL.interfaces["tip"]
+    C = np.zeros((6, MODEL.n_dofs))
     C[:, tip.dofs] = mean_motion(tip)
     N = null_space(C)
-    K, M = (N.T @ (A @ N) for A in (model.K, model.M))
+    K, M = (N.T @ (A @ N) for A in (MODEL.K, MODEL.M))
     exact = np.sqrt(eigh(K, M, eigvals_only=True, subset_by_index=(0, 4))) / (2 * np.pi)
-    found = rom.modes(model, 5, fixed="tip", interfaces={"tip": "rbe3"}).frequencies
+    found = rom.modes(MODEL, 5, fixed="tip", interfaces={"tip": "rbe3"}).frequencies
     assert_allclose(found, exact, rtol=1e-9)
 
 
-def test_statics_of_the_reduced_body_are_exact_and_the_certificate_fails_a_small_one(body, model):
+def test_statics_of_the_reduced_body_are_exact_and_the_certificate_fails_a_small_one(body):
     certificate = {row.quantity: row for row in body.certificate.rows}
     assert certificate["root held: static flexibility of the interfaces"].value < 1e-9
     assert body.certificate.ok, body.certificate
-    assert rom.check(model).ok and rom.check(body).ok
-    guyan = reduced(0, model, certify=True)
+    assert rom.check(MODEL).ok and rom.check(body).ok
+    guyan = reduced(0, MODEL, certify=True)
     assert not guyan.certificate.ok and "FAILED" in str(rom.check(guyan))
     sizes = [guyan.frequencies(fixed=fixed).size for fixed in (("root", "tip"), ("root",))]
     assert sizes == [0, 6]
 
 
-def test_the_certificate_estimates_errors_as_they_are(model):
-    body = rom.reduce(model, method=rom.CraigBampton(6), interfaces=KINDS)
+def test_the_certificate_estimates_errors_as_they_are():
+    body = rom.reduce(MODEL, method=rom.CraigBampton(6), interfaces=KINDS)
     for support, table in body.provenance["comparison"].items():
         error = np.array(table["reduced"]) / table["full"] - 1
         # asymptotically exact (Kim and Lee): right to 10 % while errors are below 1 %
@@ -202,10 +198,10 @@ def test_the_certificate_estimates_errors_as_they_are(model):
         assert np.array(table["estimated"])[small] == pytest.approx(error[small], rel=0.1)
 
 
-def test_a_frequency_limit_keeps_the_modes_below_it(model):
-    body = rom.reduce(model, method=rom.CraigBampton(f_max=4000.0), interfaces=KINDS, certify=False)
+def test_a_frequency_limit_keeps_the_modes_below_it():
+    body = rom.reduce(MODEL, method=rom.CraigBampton(f_max=4000.0), interfaces=KINDS, certify=False)
     kept = np.array(body.provenance["reduction"]["frequencies of the modes kept [Hz]"])
-    all_of_them = rom.modes(model, 40, fixed=("root", "tip"), interfaces=KINDS).frequencies
+    all_of_them = rom.modes(MODEL, 40, fixed=("root", "tip"), interfaces=KINDS).frequencies
     assert 0 < kept.size == np.count_nonzero(all_of_them <= 4000.0) < 40
 
 
@@ -236,43 +232,43 @@ def test_an_attached_rigid_body_equals_the_same_mass_in_the_matrix(mass):
     assert body.certificate.ok, body.certificate
 
 
-def test_messages_for_wrong_interfaces(model, body):
-    one = model.interfaces["root"]
+def test_messages_for_wrong_interfaces(body):
+    one = MODEL.interfaces["root"]
     surface = one.surface_mass[:3, :3]
     twin = rom.Interface("twin", one.nodes[:3], one.points[:3], surface, one.origin)
-    shared = replace(model, interfaces={"root": one, "twin": twin})
-    other = replace(model, interfaces=model.interfaces | {"hub": model.interfaces["tip"]})
+    shared = replace(MODEL, interfaces={"root": one, "twin": twin})
+    other = replace(MODEL, interfaces=MODEL.interfaces | {"hub": MODEL.interfaces["tip"]})
     for interfaces, of, error, words in (
-        ("rbe2", model, ConfigError, "interfaces = 'rbe2' must be a dictionary"),
-        ({"root": "rbe4"}, model, ConfigError, "kind 'rbe4'; known kinds"),
-        ({}, model, ConfigError, "needs interfaces, and none"),
+        ("rbe2", MODEL, ConfigError, "interfaces = 'rbe2' must be a dictionary"),
+        ({"root": "rbe4"}, MODEL, ConfigError, "kind 'rbe4'; known kinds"),
+        ({}, MODEL, ConfigError, "needs interfaces, and none"),
         ({"root": "rbe2", "twin": "rbe2"}, shared, InterfaceError, "'root' and 'twin' share 3"),
     ):
         refuses(error, words, reduced, 3, of, interfaces=interfaces)
     hub, missing = {"hub": "rbe2"}, r"model has no interface 'tipp'; there are \['root', 'tip'\]"
-    refuses(InterfaceError, missing, rom.modes, model, 3, fixed="tipp")
+    refuses(InterfaceError, missing, rom.modes, MODEL, 3, fixed="tipp")
     refuses(InterfaceError, "'hub' of the model calls", connect, operators(other), other, hub)
     refuses(InterfaceError, "'body' has no interface 'toe'", body.frequencies, fixed="toe")
     refuses(ConfigError, "not a reference condition", body.with_reference, 3)
     refuses(ModelError, "lie in the same point", body.with_reference, ("root", "root"))
 
 
-def test_messages_for_wrong_methods_attachments_and_operators_without_geometry(model):
-    refuses(ConfigError, "the dofs off the interfaces", reduced, 10**6, model)
+def test_messages_for_wrong_methods_attachments_and_operators_without_geometry():
+    refuses(ConfigError, "the dofs off the interfaces", reduced, 10**6, MODEL)
     for lump, message in (
         (rom.Attachment("tip", -1.0), "= -1 must be positive"),
         (rom.Attachment("tip", 1.0, np.diag([5.0, 1.0, 1.0])), "no body has this inertia"),
     ):
-        refuses(MaterialError, message, rom.modes, replace(model, attachments=(lump,)), 3)
-    blind = replace(model, operators=SciPyOperators(model.K, model.M))
+        refuses(MaterialError, message, rom.modes, replace(MODEL, attachments=(lump,)), 3)
+    blind = replace(MODEL, operators=SciPyOperators(MODEL.K, MODEL.M))
     refuses(ModelError, "do not know its rigid motions", rom.check, blind)
     refuses(ModelError, "do not know its rigid motions", reduced, 2, blind)
 
 
-def test_mass_properties_are_those_of_the_block_and_what_it_carries(model, body):
-    R = rigid_motions(model.points)
-    assert_allclose(rigid_mass(body), R.T @ (model.M @ R), atol=1e-9)
-    p = rom.mass_properties(model)
+def test_mass_properties_are_those_of_the_block_and_what_it_carries(body):
+    R = rigid_motions(MODEL.points)
+    assert_allclose(rigid_mass(body), R.T @ (MODEL.M @ R), atol=1e-9)
+    p = rom.mass_properties(MODEL)
     m, (a, b, c) = 7850.0 * 1.0 * 0.1 * 0.08, (1.0, 0.1, 0.08)
     centre = np.array([0.8, -0.15, 0.14])
     central = np.diag([b * b + c * c, a * a + c * c, a * a + b * b]) * m / 12
@@ -283,15 +279,15 @@ def test_mass_properties_are_those_of_the_block_and_what_it_carries(model, body)
     assert_allclose([p.mass, *p.centre], [m, 0.8, -0.15, 0.14], rtol=1e-11)
     assert_allclose(p.inertia, central, rtol=1e-9, atol=1e-9 * central.max())
     carried = rom.Attachment("tip", mass=m, at=(1.8, -0.15, 0.14))
-    loaded = rom.mass_properties(replace(model, attachments=(carried,)))
+    loaded = rom.mass_properties(replace(MODEL, attachments=(carried,)))
     assert_allclose([loaded.mass, *loaded.centre], [2 * m, 1.3, -0.15, 0.14], rtol=1e-11)
     assert_allclose(loaded.inertia[1, 1], central[1, 1] + 2 * m * 0.5**2, rtol=1e-9)
 
 
 @pytest.mark.parametrize("change", ["mirror", "renumber"])
-def test_frequencies_survive_a_mirror_and_another_numbering(model, body, change):
+def test_frequencies_survive_a_mirror_and_another_numbering(body, change):
     """Metamorphic: the same solid seen in a mirror, or with its nodes shuffled."""
-    n = model.points.shape[0]
+    n = MODEL.points.shape[0]
     nodes, flip = np.arange(n), np.ones(3)
     if change == "mirror":
         flip[1] = -1.0
@@ -302,10 +298,10 @@ def test_frequencies_survive_a_mirror_and_another_numbering(model, body, change)
     place = np.argsort(nodes)
     interfaces = {
         name: replace(i, nodes=place[i.nodes], points=i.points * flip, origin=i.origin * flip)
-        for name, i in model.interfaces.items()
+        for name, i in MODEL.interfaces.items()
     }
-    K, M = ((signs @ A @ signs).tocsr()[rows][:, rows] for A in (model.K, model.M))
-    other = rom.FEModel(K, M, (model.points * flip)[nodes], interfaces)
+    K, M = ((signs @ A @ signs).tocsr()[rows][:, rows] for A in (MODEL.K, MODEL.M))
+    other = rom.FEModel(K, M, (MODEL.points * flip)[nodes], interfaces)
     seen = reduced(30, other, reference="root")
     for fixed in SUPPORTS:
         n_rigid = 0 if fixed else 6
@@ -313,9 +309,9 @@ def test_frequencies_survive_a_mirror_and_another_numbering(model, body, change)
         assert_allclose(seen.frequencies(fixed=fixed)[n_rigid:], expected, rtol=1e-8)
 
 
-def test_a_single_interface_has_a_certificate(model):
+def test_a_single_interface_has_a_certificate():
     """Its constraint modes are rigid: their stiffness is round-off, of either sign."""
-    body = rom.reduce(model, method=rom.CraigBampton(40), interfaces={"root": "rbe2"})
+    body = rom.reduce(MODEL, method=rom.CraigBampton(40), interfaces={"root": "rbe2"})
     assert body.certificate.ok, body.certificate
     (row,) = [r for r in body.certificate.rows if r.quantity.startswith("constraint against")]
     assert row.value == 0.0

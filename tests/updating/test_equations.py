@@ -47,18 +47,6 @@ def channels(model, sign=1.0):
     return sensors, force
 
 
-def dense_matrices(model):
-    """The finite elements, clamped, with the nodes' dofs as sensors; changes of p are linear."""
-    free = np.setdiff1d(np.arange(3 * len(model.points)), model.interfaces["root"].dofs)
-    K, M = (getattr(model, name).toarray()[np.ix_(free, free)] for name in "KM")
-    parts = [model.regions[name] for name in ("inner", "outer", "outer")]
-    dK = np.array([part.K.toarray()[np.ix_(free, free)] for part in parts])
-    dM = np.array([part.M.toarray()[np.ix_(free, free)] for part in parts])
-    dK[2], dM[:2] = 0.0, 0.0
-    dofs = [3 * n + axis for n in NODES for axis in (1, 2)]
-    return ParametricModel(K, M, dK, dM, np.eye(3 * len(model.points))[dofs][:, free])
-
-
 def small(family, model, sign=1.0):
     return model_of(family, channels(model, sign), ("root",))
 
@@ -80,9 +68,17 @@ def test_equations_find_what_they_find_on_dense_matrices(family, model, sign):
     m = found.covariance.shape[0] - 3
     weights = 1 / test.noise.errors().own
     there = Measurement(OMEGA, sign * test.H, (DRIVEN,), weights)
-    same = update_by_input(
-        AtSensors(dense_matrices(model)), there, np.zeros(3), np.full(m, 0.02), rank=m
-    )
+    # the finite elements, clamped, with the nodes' dofs as sensors; changes of p are linear
+    free = np.setdiff1d(np.arange(3 * len(model.points)), model.interfaces["root"].dofs)
+    K, M = (getattr(model, name).toarray()[np.ix_(free, free)] for name in "KM")
+    parts = [model.regions[name] for name in ("inner", "outer", "outer")]
+    dK = np.array([part.K.toarray()[np.ix_(free, free)] for part in parts])
+    dM = np.array([part.M.toarray()[np.ix_(free, free)] for part in parts])
+    dK[2], dM[:2] = 0.0, 0.0
+    dofs = [3 * n + axis for n in NODES for axis in (1, 2)]
+    seen = np.eye(3 * len(model.points))[dofs][:, free]
+    dense = AtSensors(ParametricModel(K, M, dK, dM, seen))
+    same = update_by_input(dense, there, np.zeros(3), np.full(m, 0.02), rank=m)
     factors = np.array(list(found.factors.values()))
     assert_allclose(factors, 1 + same.p, rtol=1e-8)
     assert_allclose(found.zeta[:m], same.zeta, rtol=1e-7)

@@ -182,18 +182,14 @@ def test_without_a_fault_nothing_is_refused(family, seed):
     assert rom.update(family, measured(family, np.random.default_rng(seed)), fixed=HELD).verdict.ok
 
 
-def leaky(test, poles, depth=0.4, reach=4.0):
-    """A record too short: resonances too low within some half bandwidths of 2 %."""
-    far = (LINES[:, None] - poles) / (0.02 * poles)
-    lost = 1 - depth * np.exp(-0.5 * (far / (reach / 2)) ** 2).sum(axis=1)
-    return replace(test, H=test.H * np.clip(lost, 0.2, 1.0)[:, None, None])
-
-
 def test_lines_beside_poles_that_are_wrong_can_count_less(family):
     rng = np.random.default_rng(5)
     test = measured(family, rng, factor=1.15)
     poles = rom.update(family, test, fixed=HELD).body.frequencies(6, fixed=HELD)
-    lost = leaky(test, poles)
+    # a record too short: resonances too low within some half bandwidths of 2 %
+    far = (LINES[:, None] - poles) / (0.02 * poles)
+    left = 1 - 0.4 * np.exp(-0.5 * (far / 2) ** 2).sum(axis=1)
+    lost = replace(test, H=test.H * np.clip(left, 0.2, 1.0)[:, None, None])
     assert not rom.update(family, lost, fixed=HELD, damping=0.02).verdict.ok
     for c in (COHERENCE, np.full(lost.H.shape, COHERENCE)):  # known, or of the same records
         near = replace(lost, coherence=c)

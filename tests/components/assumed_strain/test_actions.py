@@ -450,11 +450,7 @@ def test_actions_that_do_not_fit_are_named(actions, error, words):
 
 
 def test_wrong_runs_are_named():
-    refuses(
-        ConfigError,
-        "times = .* 2 or more",
-        lambda: sheets.quasi_static(SMALL, SOFT, Actions(), [0.0]),
-    )
+    refuses(ConfigError, "times = .* 2 or more", sheets.quasi_static, SMALL, SOFT, Actions(), [0.0])
     pad = Actions(tools=[Tool("pad", ABOVE)])
     refuses(ConfigError, "impacts", sheets.implicit_motion, SMALL, SOFT, pad, [0, 1], rho_inf=0.8)
     tear = Actions(range(6), drives=[Drive(range(6, 18), ((0, 1), (0, 30.0)))])

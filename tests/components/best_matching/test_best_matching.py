@@ -139,43 +139,38 @@ def test_a_loop_of_shapes_turns_the_whole_by_half_its_solid_angle(colatitude):
     assert_allclose(A, turned([0, 0, -solid_angle / 2]), atol=2e-5)
 
 
-@pytest.fixture(scope="module")
-def model():
-    """All nodes lie on the surface, so that a reduced body knows where each of them is."""
-    return block(cells=(8, 1, 1))
+MODEL = block(cells=(8, 1, 1))  # all nodes lie on the surface, and a reduced body knows each
 
 
 @pytest.fixture(scope="module")
-def bodies(model):
-    at_root = reduced(10, model, reference="root")
+def bodies():
+    at_root = reduced(10, MODEL, reference="root")
     return at_root, at_root.with_reference("mean-axis")
 
 
-def test_matched_energy_is_that_of_elastic_modes_and_of_what_the_integrals_of_a_body_leave(
-    model, bodies
-):
-    modes = rom.modes(model, 3 * len(model.points))
-    v = np.random.default_rng(2).normal(size=3 * len(model.points))
-    amplitudes = modes.shapes.T @ (model.M @ v)
-    found = match(model.M, model.points, v.reshape(-1, 3))
+def test_matched_energy_is_that_of_elastic_modes_and_of_what_the_integrals_of_a_body_leave(bodies):
+    modes = rom.modes(MODEL, 3 * len(MODEL.points))
+    v = np.random.default_rng(2).normal(size=3 * len(MODEL.points))
+    amplitudes = modes.shapes.T @ (MODEL.M @ v)
+    found = match(MODEL.M, MODEL.points, v.reshape(-1, 3))
     assert found.energy == pytest.approx(0.5 * (amplitudes[6:] ** 2).sum(), rel=1e-9)
     # M_ff - M_fr M_rr^-1 M_rf of the small record against T_bm of all nodes
     at_root, _ = bodies
     qd = np.random.default_rng(4).normal(size=at_root.n_modes)
     C = rigid_elastic(at_root)
     left = at_root.M - C.T @ np.linalg.solve(rigid_mass(at_root), C)
-    found = match(model.M, model.points, (at_root.surface.shape @ qd).reshape(-1, 3))
+    found = match(MODEL.M, MODEL.points, (at_root.surface.shape @ qd).reshape(-1, 3))
     assert found.energy == pytest.approx(0.5 * qd @ left @ qd, rel=1e-9)
 
 
-def test_matched_shapes_are_those_of_the_mean_axis_body(model, bodies):
+def test_matched_shapes_are_those_of_the_mean_axis_body(bodies):
     at_root, mean_axis = bodies
-    R, Phi = best_matching.generators(model.points), at_root.surface.shape
-    X = best_matching.rigid_part(model.M, R, Phi)
+    R, Phi = best_matching.generators(MODEL.points), at_root.surface.shape
+    X = best_matching.rigid_part(MODEL.M, R, Phi)
     assert_allclose(X, reference_motion(at_root, "mean-axis"), atol=1e-9 * np.abs(X).max())
     assert np.abs(X).max() > 0.1
     rest = Phi - R @ X
-    lam, V = eigh(at_root.K, rest.T @ (model.M @ rest))
+    lam, V = eigh(at_root.K, rest.T @ (MODEL.M @ rest))
     assert_allclose(np.sqrt(lam), mean_axis.omega, rtol=1e-9)
     shapes = rest @ V
     signs = np.sign((shapes * mean_axis.surface.shape).sum(axis=0))
@@ -183,27 +178,27 @@ def test_matched_shapes_are_those_of_the_mean_axis_body(model, bodies):
     assert_allclose(shapes * signs, mean_axis.surface.shape, atol=atol)
 
 
-def floating(body, model, amplitude):
+def floating(body, amplitude):
     """Nodes (k, n, 3) of a body that floats, turns and shakes; and its frame."""
     mech = rom.Mechanism(gravity=(0, 0, 0))
-    shake = (model.points[:, 0] - 0.2) ** 2
+    shake = (MODEL.points[:, 0] - 0.2) ** 2
     v = np.column_stack([0 * shake, shake, 0.5 * shake]).ravel()
     Phi = body.surface.shape
-    system = np.hstack([best_matching.generators(model.points), Phi])
+    system = np.hstack([best_matching.generators(MODEL.points), Phi])
     start = np.linalg.lstsq(system, amplitude * v, rcond=None)[0]  # the same motion in any frame
     mech.add_flexible("beam", body, velocity=start[:3], omega=start[3:6], qd=start[6:])
     sol = rom.simulate(mech, t_end=4e-3, dt=2e-5, save_every=10)
     A = np.array([rotation.matrix(p) for p in sol.orientation("beam")])
-    local = model.points + (sol.elastic("beam") @ Phi.T).reshape(len(sol.t), -1, 3)
+    local = MODEL.points + (sol.elastic("beam") @ Phi.T).reshape(len(sol.t), -1, 3)
     return sol.position("beam")[:, None] + np.einsum("tab,tnb->tna", A, local), A
 
 
-def test_a_floating_beam_has_the_same_best_frame_in_all_floating_frames(model, bodies):
-    M_s = model.M[::3][:, ::3]
+def test_a_floating_beam_has_the_same_best_frame_in_all_floating_frames(bodies):
+    M_s = MODEL.M[::3][:, ::3]
     gaps, wobble = [], []
     for amplitude in (20.0, 10.0):
-        films = [floating(body, model, amplitude) for body in bodies]
-        best = [np.array([frame(M_s, model.points, x)[1] for x in film]) for film, _ in films]
+        films = [floating(body, amplitude) for body in bodies]
+        best = [np.array([frame(M_s, MODEL.points, x)[1] for x in film]) for film, _ in films]
         assert_allclose(best[1], films[1][1], atol=1e-9)
         gaps.append(np.abs(best[0] - best[1]).max())
         wobble.append(np.abs(best[0] - films[0][1]).max())
@@ -213,14 +208,14 @@ def test_a_floating_beam_has_the_same_best_frame_in_all_floating_frames(model, b
     assert wobble[0] / wobble[1] == pytest.approx(2.0, rel=0.1)
 
 
-def test_a_beam_that_whirls_turns_back_like_a_falling_cat(model, bodies):
+def test_a_beam_that_whirls_turns_back_like_a_falling_cat(bodies):
     """A loop of two bending shapes: -2 pi a^2 / (J_x + a^2), with masses of finite elements.
 
     Slender beams have one shape both ways, so that int rho phi_y phi_z is one; J_x = m (b^2 + h^2)
     / 12. The same turn each time at any speed, and the other way for the loop backwards.
     """
-    M_s, Phi = model.M[::3][:, ::3], bodies[1].surface.shape
-    X, shapes = model.points, Phi.reshape(len(model.points), 3, -1)
+    M_s, Phi = MODEL.M[::3][:, ::3], bodies[1].surface.shape
+    X, shapes = MODEL.points, Phi.reshape(len(MODEL.points), 3, -1)
     share = (shapes**2).sum(axis=0) / (shapes**2).sum(axis=(0, 1))
     y, z = (shapes[:, :, np.flatnonzero(share[axis] > 0.9)[0]] for axis in (1, 2))
     size = np.ptp(X, axis=0)

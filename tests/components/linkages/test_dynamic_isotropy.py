@@ -100,9 +100,14 @@ def test_other_lengths_have_other_numbers_of_configurations():
 ORDINARY = FiveBar(0.7, (rod(2.0, 0.3),) * 2, (rod(1.0, 0.4),) * 2, payload=0.5)
 
 
-def still_tips(five):
-    """Angles at which cranks and couplers are in line, so that no motor moves the tip."""
-    l1, l2, d, found = 0.3, 0.4, five.base, []
+@pytest.mark.parametrize("side", [1, -1])
+def test_cranks_of_limited_range_have_maps_points_and_closed_loci(side):
+    five = replace(ORDINARY, side=side)
+    refuses(ModelError, "elbows are", lambda: five.inertia(*angle_grid(40)))
+    found = isotropic_configurations(five.inertia, n=300, assembles=five.assembles)
+    A = five.inertia(*found.q.T)
+    assert_allclose(A, found.inertia[:, None, None] * np.eye(2), atol=1e-10)
+    l1, l2, d, still = 0.3, 0.4, five.base, []  # no motor moves the tip: cranks, couplers in line
     for one, other, up in np.array(np.meshgrid([1, -1], [1, -1], [1, -1])).reshape(3, -1).T:
         a, b = l2 + one * l1, l2 + other * l1  # of the tip from both pivots
         x = (d * d + a * a - b * b) / (2 * d)
@@ -111,18 +116,7 @@ def still_tips(five):
             arms = one * tip, other * (tip - [d, 0])
             q = np.array([np.arctan2(arm[1], arm[0]) for arm in arms]) % (2 * np.pi)
             if np.allclose(five.posture(*q)[2], tip):  # else it is the other side's
-                found.append(q)
-    return np.array(found)
-
-
-@pytest.mark.parametrize("side", [1, -1])
-def test_cranks_of_limited_range_have_maps_points_and_closed_loci(side):
-    five = replace(ORDINARY, side=side)
-    refuses(ModelError, "elbows are", lambda: five.inertia(*angle_grid(40)))
-    found = isotropic_configurations(five.inertia, n=300, assembles=five.assembles)
-    A = five.inertia(*found.q.T)
-    assert_allclose(A, found.inertia[:, None, None] * np.eye(2), atol=1e-10)
-    still = still_tips(five)
+                still.append(q)
     assert len(still) >= 2
     for q in still:
         k = np.abs(found.q - q).max(axis=1).argmin()

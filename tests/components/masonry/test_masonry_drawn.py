@@ -38,15 +38,15 @@ def test_stones_of_a_vault_are_the_surfaces_with_their_corners():
     assert_allclose(course.outline.max(axis=0), [-4.6, 0.8], atol=1e-9)
 
 
-def needed_width(model):
-    """Width at which a half tips about the outer foot of its buttress, hinges open in the vault.
+def test_a_buttress_tips_at_the_width_that_statics_says():
+    """Virtual work of Heyman's mechanism, linear programming, and motion: one width.
 
-    The thrust at the outer face of the crown is the largest that hinges on the inner face ask for.
+    A half tips about the outer foot of its buttress, hinges open in the vault: the thrust at the
+    outer face of the crown is the largest that hinges on the inner face ask for.
     """
     Ri, Ro = R - T / 2, R + T / 2
-    half = model.stones[9:17]
-    W, x = (np.array(v) for v in ([s.M[0, 0] for s in half], [s.centre[0] for s in half]))
-    thrust = 0.0
+    half, thrust = vault().stones[9:17], 0.0
+    W, x = np.array([s.M[0, 0] for s in half]), np.array([s.centre[0] for s in half])
     for k in range(1, 9):
         angle = k * np.pi / 16
         moment = (W[:k] * (Ri * np.sin(angle) - x[:k])).sum()
@@ -55,12 +55,7 @@ def needed_width(model):
     def spare(b):
         return (W * (Ri + b - x)).sum() + 2000 * b * H * b / 2 - thrust * (H + Ro)
 
-    return brentq(spare, 0.1, 5.0)
-
-
-def test_a_buttress_tips_at_the_width_that_statics_says():
-    """Virtual work of Heyman's mechanism, linear programming, and motion: one width."""
-    b = needed_width(vault())
+    b = brentq(spare, 0.1, 5.0)
     assert T < b < 2.4
     assert stands(vault(b=1.0005 * b)) and not stands(vault(b=0.9995 * b))
     for factor, stays in ((1.05, True), (0.95, False)):

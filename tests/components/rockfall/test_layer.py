@@ -259,12 +259,15 @@ def sampled(shape, end=0.3, n=30001):
     return t, shape(t)
 
 
-def below_a_chain(t, force, reflection, n=300):
+@pytest.mark.parametrize("reflection", [0.0, 0.5, 1.0])
+def test_what_arrives_is_what_a_chain_of_masses_and_springs_passes_on(reflection):
     """The floor's force by central differences on n masses and springs; a dashpot is the floor.
 
     A column of length and speed one has the impedance one; a floor of the impedance Z gives back
     the share (Z - 1) / (Z + 1).
     """
+    t, force = sampled(lambda t: np.where(t < 0.05, np.sin(np.pi * t / 0.05) ** 2, 0.0), n=3001)
+    found, n = arriving(t, force, DELAY, reflection=reflection), 300
     m, k, dt = 1 / n, float(n), 0.5 / n
     x, v = np.zeros(n + 1), np.zeros(n + 1)
     mass = np.full(n + 1, m)
@@ -279,14 +282,7 @@ def below_a_chain(t, force, reflection, n=300):
         v[-1] /= 1 + dt * Z / mass[-1]  # at the end of the step, which is stable for any floor
         out.append(Z * v[-1] if reflection < 1.0 else -pull[-1])
         x += dt * v
-    return np.interp(t, times * DELAY, out)
-
-
-@pytest.mark.parametrize("reflection", [0.0, 0.5, 1.0])
-def test_what_arrives_is_what_a_chain_of_masses_and_springs_passes_on(reflection):
-    t, force = sampled(lambda t: np.where(t < 0.05, np.sin(np.pi * t / 0.05) ** 2, 0.0), n=3001)
-    found = arriving(t, force, DELAY, reflection=reflection)
-    assert_allclose(found, below_a_chain(t, force, reflection), atol=0.02)
+    assert_allclose(found, np.interp(t, times * DELAY, out), atol=0.02)
 
 
 def test_a_force_that_stays_is_doubled_and_gone_in_turns_and_one_that_grows_slowly_is_not():
@@ -323,19 +319,12 @@ def test_the_delay_of_a_layer_is_that_of_its_bar_wave():
     assert rockfall.wave_delay(sand, 0.3) == pytest.approx(0.6 / 117.851, rel=1e-5)
 
 
+HIGH = baseline(cushion=GOOD, height=300.0)
 test_messages_name_what_is_wrong = refused(
-    (lambda: Layer(-1.0, 0.6, 0.9), "modulus = -1 must be positive"),
-    (lambda: Layer(3e6, 0.6, float("nan")), "thickness = nan must be a finite"),
-    (lambda: Layer(3e6, 0.6, 0.9, angle=30.0), "angle = 30 must be above 0 and below"),
-    (lambda: Layer(3e6, 0.6, 0.9, recovery=0.0), "recovery = 0 must be above 0"),
     (lambda: GOOD.contact(0.9), r"d \[m\] = 0.9 must be"),
     (lambda: GOOD.spread(-0.1), r"d \[m\] = -0.1"),
-    (lambda: strike(baseline(cushion=GOOD, height=300.0)), "pressed through"),
-    (
-        lambda: strike(baseline(cushion=GOOD, height=300.0), dt=1e-5),
-        SolverError,
-        "through the cushion of 0.9 m",
-    ),
+    (lambda: strike(HIGH), "pressed through"),
+    (lambda: strike(HIGH, dt=1e-5), SolverError, "through the cushion of 0.9 m"),
     (lambda: arriving([0, 1], [1.0], 0.1), "a row of 2 numbers"),
     (lambda: arriving([0, 0], [1.0, 1.0], 0.1), "2 or more numbers that ascend"),
     (lambda: arriving([0, 1], [1.0, 1.0], 1e-9), "passages of a wave of 1e-09 s in 1 s"),

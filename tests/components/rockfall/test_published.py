@@ -79,6 +79,8 @@ def test_the_handbook_is_consistent_with_the_force_on_sand_but_not_its_duration(
     assert got.peaks[0] == pytest.approx(SAND, rel=0.02)
     assert got.peaks[0] / GRAVEL == pytest.approx(0.59, abs=0.01)
     assert 1.5 < contact_time(got) / DURATION < 2.0
+    # no more arrives than strikes; published 1.1 to 1.2 times on 70 cm, twice on 90 cm, by waves
+    assert got.peaks[1] / got.peaks[0] == pytest.approx(1.0, abs=1e-3)
 
 
 def test_geometry_and_strength_predict_force_and_duration_on_gravel():
@@ -119,12 +121,6 @@ def test_a_fit_passes_by_parameters_that_stop_no_boulder():
     assert 0.84 < found.factors["strength of the cushion"] < 0.9
 
 
-def test_no_more_force_arrives_than_strikes_a_rigid_shed():
-    """Published: 1.1 to 1.2 times as much on 70 cm, twice on 90 cm, by waves in the sand."""
-    got = strike(full_size(Cushion.of_sand(WEIGHT, 1e6)))
-    assert got.peaks[1] / got.peaks[0] == pytest.approx(1.0, abs=1e-3)
-
-
 @pytest.mark.parametrize(("degrees", "factor"), [(30, 22.4), (40, 109.4), (42, 155.6), (44, 224.6)])
 def test_sand_bears_as_vesic_says(degrees, factor):
     pressure = rockfall.bearing_pressure(np.radians(degrees), 0.5, 1700.0)
@@ -132,7 +128,6 @@ def test_sand_bears_as_vesic_says(degrees, factor):
 
 
 test_bad_numbers_are_named = refused(
-    (lambda: rockfall.Layer(1e6, 1.0, 1.0, strength=0.0), "strength = 0 must be positive"),
     (lambda: calibrate(full_size(granular(40)), FLAT, STRENGTH), "pressed through"),
     (lambda: calibrate(full_size(Cushion(1e6)), {}, STRENGTH), "nothing is measured"),
     (lambda: calibrate(full_size(Cushion(1e6)), FLAT, STRENGTH), "needs a cushion of type Layer"),

@@ -18,7 +18,6 @@ from rom.components.rockfall import Cushion, CushionForce, Gallery, Shear, Slab,
 from rom.eigen.verbs import mean_motion
 from rom.errors import ConfigError, ModelError, SolverError
 
-MESHES = ROOT / "meshes"
 CONCRETE = rom.Material(E=30e9, nu=0.2, rho=2500.0)
 DOWN = (0, 0, -1)
 RIGID = {"shear": Shear(1e11, damping=0.0), "slab": Slab.of_mass(1e3, 1e11, damping=0.0)}
@@ -296,16 +295,12 @@ def on_strip(slab):
     return Gallery(800.0, 8.0, 300.0, cushion, Shear(5e8, damping=0.0), slab, weight=False)
 
 
-def full_slab(model, supports, **more):
-    held = sum(model.interfaces[name].dofs.size for name in supports)
-    modes = rom.modes(model, model.n_dofs - held, fixed=supports)
-    patch = model.interfaces["impact"]
-    return Slab(-mean_motion(patch)[2] @ modes.shapes[patch.dofs], modes.omega, **more)
-
-
 def test_ten_modes_of_a_reduced_slab_bend_as_all_of_the_finite_elements(slab_model, slab_body):
     own = Slab.of_body(slab_body, "impact", ENDS, damping=0.02)
-    full = full_slab(slab_model, ENDS, damping=0.02)
+    held = sum(slab_model.interfaces[name].dofs.size for name in ENDS)
+    modes = rom.modes(slab_model, slab_model.n_dofs - held, fixed=ENDS)
+    at = slab_model.interfaces["impact"]
+    full = Slab(-mean_motion(at)[2] @ modes.shapes[at.dofs], modes.omega, damping=0.02)
     assert own.stiffness == pytest.approx(full.stiffness, rel=1e-9)  # statics are exact
     ours, exact = (strike(on_strip(slab), t_end=0.06) for slab in (own, full))
     assert ours.deflection == pytest.approx(exact.deflection, rel=1e-3)
@@ -376,7 +371,7 @@ def test_a_mechanism_of_bodies_says_the_same(slab_body, recovery):
 @pytest.mark.fenicsx
 def test_the_slab_of_dolfinx_bends_as_its_unreduced_elements():
     sizes = {"lc": 0.5, "patch": 1.0}
-    model = rom.fe.model(MESHES / "gallery_slab.geo", material=CONCRETE, parameters=sizes)
+    model = rom.fe.model(ROOT / "meshes/gallery_slab.geo", material=CONCRETE, parameters=sizes)
     supports = ("support_left", "support_right")
     kinds = {"impact": "rbe3"} | dict.fromkeys(supports, "rbe2")
     body = rom.reduce(model, method=rom.CraigBampton(10), interfaces=kinds, certify=False)
@@ -418,25 +413,11 @@ def test_parameters_are_varied_one_at_a_time_and_the_cushion_decides_over_the_pe
 
 
 test_messages_name_what_is_wrong = refused(
-    (lambda: Cushion(np.inf), ConfigError, "stiffness = inf must be a finite"),
-    (lambda: Cushion(np.nan), ConfigError, "stiffness = nan must be a finite"),
-    (lambda: Shear(np.inf), ConfigError, "stiffness = inf must be a finite"),
-    (lambda: Cushion(-1.0), ConfigError, "stiffness = -1 must be positive"),
-    (lambda: Cushion(1.0, recovery=0.0), ConfigError, "recovery = 0 must be above 0 and at most 1"),
-    (lambda: Cushion(1.0, exponent=0.5), ConfigError, "exponent = 0.5 must be at least 1"),
-    (
-        lambda: Slab(np.ones(2), np.ones(2), capacity=-1.0),
-        ModelError,
-        "capacity = -1 must be positive",
-    ),
     (lambda: Slab(np.zeros(2), np.ones(2)), ModelError, "moves under the plug"),
     (lambda: Slab(np.array([np.nan]), np.ones(1)), ModelError, "not finite"),
     (lambda: Slab(np.ones(2), np.array([0.0, 1.0])), ModelError, "supports that hold it"),
     (lambda: strike(baseline(), dt=0.01, t_end=20.0), SolverError, "grows without bound"),
-    (lambda: Shear(1.0, ultimate=0.0), ConfigError, "ultimate = 0 must be positive or"),
     (lambda: Cushion(1.0).penetration(-3.0), ConfigError, "energy = -3 must not be negative"),
-    (lambda: CushionForce(Cushion(1.0), DOWN, gap=-1.0), ConfigError, "gap = -1"),
-    (lambda: CushionForce(Cushion(1.0), DOWN, gap=0.1, reach=0.0), ConfigError, "reach = 0"),
     (lambda: CushionForce(Cushion(1.0), (0, 0, 0), gap=1.0), ConfigError, "down"),
 )
 
@@ -455,11 +436,3 @@ def test_a_boulder_beside_the_slab_is_named():
     assert inside == struck_aside(1.9)
     with pytest.raises(ConfigError, match=r"down 2\.1 m aside at t = 0\.01\d* s, beyond the slab"):
         struck_aside(2.1, reach=2.0)
-
-
-@pytest.mark.fenicsx
-def test_a_patch_beyond_the_supports_is_refused():
-    from rom.fe.mesh.read import read_mesh
-
-    with pytest.raises(ConfigError, match=r"patch = 4 < B = 3\.5"):
-        read_mesh(MESHES / "gallery_slab.geo", parameters={"patch": 4.0})

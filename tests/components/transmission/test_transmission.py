@@ -20,7 +20,7 @@ from rom.components.transmission.mechanism import mechanism_of
 from rom.components.transmission.shaft import vibrations
 from rom.errors import ModelError, SolverError
 
-E, NU, RHO = 206e9, 0.3, 7850.0
+E, RHO = 206e9, 7850.0
 HELIX = float(np.radians(12.5))
 HELICAL = GearPair((26, 157), 4e-3, 0.04, HELIX)
 OVERLAPPING = HELICAL.base_pitch / np.tan(HELICAL.base_helix)  # width for an overlap of one
@@ -31,22 +31,14 @@ def loaded():
     return rest(unit())
 
 
-def test_a_free_shaft_has_the_frequencies_of_timoshenko():
-    """Bending of a hinged beam from its quartic; torsion and stretching from wave speeds."""
-    l, d = 1.0, 0.08
-    s = transmission.Shaft(np.linspace(0, l, 21), d)
+def test_a_free_shaft_twists_and_stretches_by_wave_speeds():
+    """It bends as Timoshenko says: tests/cyclic/test_rotor.py."""
+    l = 1.0
+    s = transmission.Shaft(np.linspace(0, l, 21), 0.08)
     M, K, _ = s.matrices()
     free = np.setdiff1d(np.arange(s.n), [0, 1, 2, 5, 120, 121])
     omega = np.sqrt(eigh(K[np.ix_(free, free)], M[np.ix_(free, free)], eigvals_only=True))
-    A, I, G = np.pi * d**2 / 4, np.pi * d**4 / 64, E / 2.6
-    kappa = 6 * (1 + NU) / (7 + 6 * NU)
-    for k in (1, 2, 3):
-        a = k * np.pi / l
-        b = 1 + a**2 * I / A * (1 + E / (kappa * G))
-        c = RHO * I / (kappa * G * A)
-        squared = (b - np.sqrt(b**2 - 4 * c * E * I * a**4 / (RHO * A))) / (2 * c)
-        assert np.abs(omega / np.sqrt(squared) - 1).min() < 1e-3
-    for modulus in (E, G):
+    for modulus in (E, E / 2.6):
         assert np.abs(omega / (np.pi / 2 / l * np.sqrt(modulus / RHO)) - 1).min() < 4e-4
 
 

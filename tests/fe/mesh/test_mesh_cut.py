@@ -15,6 +15,8 @@ from rom.fe.mesh.validate import checked
 
 pytestmark = pytest.mark.once
 SIZE = (3.0, 1.0, 1.0)
+LONG = solid("hex8", (4, 1, 1), SIZE)
+CROSSED = replace(LONG, facets={"side": LONG.corners[:, np.array(LONG.kind.faces[1])]})
 
 
 @pytest.mark.parametrize("kind", sorted(CELL_TYPES))
@@ -48,12 +50,6 @@ def test_regions_are_pieces_with_their_own_materials():
     assert hub.region_names == {4: "hub"} and set(blade.regions) == {9}
 
 
-def crossed():
-    mesh = solid("hex8", (4, 1, 1), SIZE)
-    side = mesh.corners[:, np.array(mesh.kind.faces[1])]
-    return replace(mesh, facets=mesh.facets | {"side": side})
-
-
 def cutting(n, axis, mesh=None):
     return lambda: cut(mesh or solid("hex8", (2, 1, 1), SIZE), n, axis)
 
@@ -66,7 +62,7 @@ test_cuts_that_cannot_be_made_are_refused_by_name = refused(
     (cutting(None, (1, 0, 0)), ConfigError, "n = None and axis"),
     (cutting(1, (1, 0, 0)), ConfigError, "one piece is the whole"),
     (cutting(2, (0, 0, 0)), ConfigError, "say no cuts"),
-    (cutting(2, (1, 0, 0), crossed()), TagError, "'side' lies partly on piece '1'"),
+    (cutting(2, (1, 0, 0), CROSSED), TagError, "'side' lies partly on piece '1'"),
 )
 
 

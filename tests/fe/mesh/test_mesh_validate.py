@@ -171,13 +171,6 @@ def folded(mesh):
     return moved(mesh, inner, [1.0, 0.5, 1.4])
 
 
-def pulled_midside(mesh):
-    """The middle of an edge pushed beyond the opposite face."""
-    cell = mesh.cells[0]
-    a, b, c, d = mesh.points[cell[:4]]
-    return moved(mesh, cell[4], (a + b) / 2 + 1.5 * ((c + d) / 2 - (a + b) / 2))
-
-
 def third_cell_at_a_face(mesh):
     points = np.vstack([mesh.points, [[0.1, 0.4, 7.0]]])
     new = [[*mesh.cells[0, list(face)], len(mesh.points)] for face in mesh.kind.faces]
@@ -250,7 +243,11 @@ def test_inverted_cells_are_refused():
     for kind in ("tet4", "hex8"):
         mesh = second_order(solid(kind))
         assert validate(mesh) == []
-        refuses(MeshError, "are inverted.*cells 0", validate, pulled_midside(mesh))
+        a, b, c, d = mesh.points[
+            mesh.cells[0, :4]
+        ]  # an edge and the face beyond which it is pushed
+        pushed = moved(mesh, mesh.cells[0, 4], (a + b) / 2 + 1.5 * ((c + d) / 2 - (a + b) / 2))
+        refuses(MeshError, "are inverted.*cells 0", validate, pushed)
     crossed = renumbered(solid("hex8"), 2, slice(8), solid("hex8").cells[2, [1, 0, *range(2, 8)]])
     refuses(MeshError, "cells 2", validate, crossed)
 
@@ -267,10 +264,8 @@ def pulled(kind, share):
     mesh = second_order(solid(kind))
     row = mesh.cells[0]
     node = next(i for i, s in enumerate(mesh.kind.supports) if sorted(s) == [0, 1])
-    a, b = mesh.points[row[0]], mesh.points[row[1]]
-    points = mesh.points.copy()
-    points[row[node]] += share * (b - a)
-    return replace(mesh, points=points)
+    a, b, middle = mesh.points[row[[0, 1, node]]]
+    return moved(mesh, row[node], middle + share * (b - a))
 
 
 @pytest.mark.parametrize("kind", ["tet4", "hex8"])
