@@ -137,8 +137,7 @@ class Orthotropic:
 
     def __post_init__(self) -> None:
         for name in ("E", "G"):
-            given = tuple(plain(name, x, "Pa") for x in getattr(self, name))
-            object.__setattr__(self, name, given)
+            object.__setattr__(self, name, plain(name, getattr(self, name), "Pa"))
         for name in ("E", "nu", "G"):
             lowest = finite(name, getattr(self, name), (3,), error=MaterialError).min()
             if name != "nu":

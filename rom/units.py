@@ -52,7 +52,8 @@ def unit_system(name: str) -> UnitSystem:
     Raises:
         ConfigError: listing the names that exist.
     """
-    check_known(name, SYSTEMS, f"unit system {name!r} does not exist; known are")
+    known = name if isinstance(name, str) else ""
+    check_known(known, SYSTEMS, f"unit system = {name!r} does not exist; known are")
     return SYSTEMS[name]
 
 

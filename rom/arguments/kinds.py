@@ -186,8 +186,6 @@ def _limited(kind: Quantity | Whole, taken: Taken | None) -> Taken:
 
 def _in_si(value: object, unit: str) -> object:
     """A quantity such as "210 GPa", alone or in a row, as a number in SI."""
-    if isinstance(value, list | tuple) and any(isinstance(x, str | list | tuple) for x in value):
-        return [_in_si(x, unit) for x in value]
     try:
         return value if unit == "1" else plain("", value, unit)
     except ConfigError as error:

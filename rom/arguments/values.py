@@ -40,7 +40,10 @@ def shortened(value: object) -> str:
 
 
 def plain(name: str, value: object, unit: str) -> Any:
-    """A quantity in SI, where it is a text such as "210 GPa"; anything else as it is."""
+    """Quantities in SI where they are texts such as "210 GPa"; anything else as it is."""
+    if isinstance(value, list | tuple) and any(isinstance(x, str | list | tuple) for x in value):
+        row = [plain(name, x, unit) for x in value]
+        return tuple(row) if isinstance(value, tuple) else row
     try:
         return in_si(value, unit) if isinstance(value, str) else value
     except ConfigError as error:

@@ -58,7 +58,7 @@ def test_units_and_their_systems_are_consistent():
     assert_allclose(7.85e-9 * tonne.density, 7850.0)
     crash = unit_system("mm-kg-ms")
     assert_allclose([crash.force, crash.pressure], [1e3, 1e9])  # kN, GPa
-    with pytest.raises(ConfigError, match=r"unit system 'inch' does not exist; known are .*'SI'"):
+    with pytest.raises(ConfigError, match=r"unit system = 'inch' does not exist; known are .*'SI'"):
         unit_system("inch")
     for name, expected in UNITS.items():
         found = unit(name)

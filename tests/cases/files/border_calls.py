@@ -278,7 +278,6 @@ GIVEN = {  # callable -> legal values of its own
     },
     "Pieces.add_to": lambda: {"mech": rom.Mechanism(), "name": "beam"},
     "ModalDamping.matrix": dict,
-    "Mechanism.marker": lambda: {"place": "arm.a"},
     "Solution.*": lambda: {"body": "arm", "t": 1e-3, "marker": "a", "instant": 0, "name": "hinge"},
     "Solution.drive_load": lambda: {"name": "shaker"},
 }  # fmt: skip
@@ -344,6 +343,7 @@ JOIN = {  # of the methods of a mechanism
     "body": lambda mech: body(),
 }
 JOIN_OWN = {
+    ("marker", "place"): lambda mech: "arm.a",
     ("add", "element"): lambda mech: springs.Spring(
         *2 * (mech.ground.marker((0, 0, 0)),), 1.0, 0, 0
     ),
