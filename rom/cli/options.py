@@ -33,6 +33,8 @@ def numbers_of(kind: Quantity) -> Callable[[str], Any]:
             x = np.array([_in_si(word, kind.unit) for word in (text.split(",") if n else [text])])
         except ValueError:
             x = np.array([np.nan])
+        except ConfigError as error:  # argparse names the option
+            raise argparse.ArgumentTypeError(str(error)) from None
         x = x if n else x[0]
         if not (np.isfinite(x).all() and kind.has_shape(x.shape)):
             hint = " (write a decimal point)" if "," in text and not n else ""
