@@ -22,7 +22,7 @@ SHORTER = {
     re.escape(stringify_annotation(npt.ArrayLike, "smart")): "~numpy.typing.ArrayLike",
     r"~numpy\.ndarray\[.*?\]\]": "~numpy.ndarray",
     r"~typing\.Annotated\[((?:[^][]|\[[^][]*\])*?), ~rom\.arguments\.\w+\.\w+"
-    r"(?:\(.*?error=~rom\.errors\.\w+\))?\]": r"\1",
+    r"(?:\(.*?error=~rom\.errors\.\w+[^)]*\))?\]": r"\1",
 }
 
 

@@ -87,7 +87,7 @@ RECORDS = {
     "drive 0: dofs": lambda v: Actions(LOW, drives=[Drive(v, 0.0)]),
     "drive 0:": lambda v: Actions(LOW, drives=[Drive([17], v)]),
     "tool 'pad': the outline": lambda v: Actions(LOW, tools=[Tool("pad", v)]),
-    "tool 'pad': the friction": lambda v: Actions(LOW, tools=[Tool("pad", PAD, v)]),
+    "tool 'pad': friction": lambda v: Actions(LOW, tools=[Tool("pad", PAD, v)]),
     "tool 'pad':": lambda v: Actions(LOW, tools=[Tool("pad", PAD, 0.0, v)]),
 }
 
