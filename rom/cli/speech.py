@@ -79,6 +79,7 @@ def speaking(options: OutputOptions, *, verbose: bool) -> Iterator[list[str]]:
     log, handler = logging.getLogger("rom"), logging.StreamHandler()
     level = logging.DEBUG if options.verbose else logging.INFO
     level = logging.ERROR if options.quiet else level
+    before = log.level
     log.setLevel(level if verbose else logging.CRITICAL)
     log.addHandler(handler)
     log.propagate = False  # ffcx gives the root logger a handler of its own
@@ -89,6 +90,7 @@ def speaking(options: OutputOptions, *, verbose: bool) -> Iterator[list[str]]:
             yield remarks
     finally:
         log.removeHandler(handler)
+        log.setLevel(before)
         log.propagate = True
 
 

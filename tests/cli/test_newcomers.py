@@ -115,6 +115,7 @@ def test_records_show_arrays_by_their_size(pendulum):
 # --- curves by name ---
 
 
+@pytest.mark.once
 @pytest.mark.parametrize(
     ("asked", "panels"),
     [
