@@ -4,6 +4,7 @@ import argparse
 import os
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
+from shlex import quote
 from typing import TypeVar
 
 from rom.cli.options import option
@@ -56,6 +57,11 @@ def check_encoder(paths: Iterable[Path]) -> None:
 def usual(args: argparse.Namespace, ending: str) -> Path:
     """What ``-o`` says, else a name beside where the user is, made from that of the file."""
     return args.output or Path(args.file.resolve().name.partition(".")[0] + ending)
+
+
+def typed_command(args: argparse.Namespace) -> str:
+    """What was typed, as a shell takes it."""
+    return f"rom {' '.join(map(quote, args.argv))}"
 
 
 def claim(args: argparse.Namespace) -> Path:

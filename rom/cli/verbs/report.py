@@ -6,11 +6,10 @@ for print and for browsers without WebGL. Where no picture can be drawn it says 
 
 import argparse
 from pathlib import Path
-from shlex import quote
 
 from rom.cli.answer import Answer
 from rom.cli.options import add_meshing, meshing, option
-from rom.cli.output import add_force, checked, usual
+from rom.cli.output import add_force, checked, typed_command, usual
 from rom.names import check_ending
 
 SUMMARY = "write a report as one HTML file"
@@ -41,10 +40,9 @@ def run(args: argparse.Namespace) -> Answer:
     args.output = usual(args, ".html")
     check_ending(args.output, "a report", ".html")
     checked(args, args.output)
-    command = f"rom {' '.join(map(quote, args.argv))}"
     title, sections = describe(
         args.file,
-        command=command,
+        command=typed_command(args),
         version=__version__,
         move=args.move,
         progress=not args.quiet,

@@ -8,13 +8,12 @@ import logging
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from shlex import quote
 from typing import TYPE_CHECKING
 
 from rom.cli.answer import Answer, failures, report_data
 from rom.cli.described import described, mechanism
 from rom.cli.options import ACCELERATION, DURATION, add_meshing, option, require, vector
-from rom.cli.output import add_force, check_encoder, checked, claim, files_in, usual
+from rom.cli.output import add_force, check_encoder, checked, claim, files_in, typed_command, usual
 from rom.cli.verbs.swing import pendulum
 from rom.errors import ConfigError, ResourceError, RomError
 from rom.names import inside
@@ -80,7 +79,7 @@ def _mechanism(args: argparse.Namespace) -> Answer:
         checked(args, path, inputs=files_in(file.values))
     check_encoder(paths)
     keep = _keeping(args, made_from(file))
-    origin = {"command": _command(args), "version": __version__}
+    origin = {"command": typed_command(args), "version": __version__}
 
     def rescue(solution: "Solution", audit: "Report") -> Path:
         motion, *_, record = Run(file, solution, audit, **origin).paths(args.output)
@@ -145,7 +144,7 @@ def _to_go_on(args: argparse.Namespace, keep: "Keeping | None") -> str:
     """What to type after an end that was none of the motion's, if something of it is kept."""
     if keep is None or not keep.state.exists():
         return ""
-    return f"To go on: {_command(args)}{'' if args.resume else ' --resume'}."
+    return f"To go on: {typed_command(args)}{'' if args.resume else ' --resume'}."
 
 
 @contextmanager
@@ -212,7 +211,7 @@ def _pendulum(args: argparse.Namespace) -> Answer:
     hung = {"axis": args.axis, "gravity": args.gravity, "hinge": args.hinge}
     made_from = {f"--{name}": repr(value) for name, value in hung.items()}
     keep = _keeping(args, made_from | {str(args.file): file_digest(args.file)})
-    record = Record(body.name, _command(args), __version__)
+    record = Record(body.name, typed_command(args), __version__)
 
     def rescue(solution: "Solution", audit: "Report") -> Path:
         _write_motion(path, tables, body, solution)
@@ -239,10 +238,6 @@ def _pendulum(args: argparse.Namespace) -> Answer:
             write_scene(motion_scene(solution, title=f"Motion of {body.name}"), paths[-2])
 
     return _answer(solution, audit, paths, write)
-
-
-def _command(args: argparse.Namespace) -> str:
-    return f"rom {' '.join(map(quote, args.argv))}"
 
 
 def _write_motion(

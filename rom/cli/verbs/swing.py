@@ -31,7 +31,7 @@ from rom.cli.options import (
     reading,
     unique,
 )
-from rom.cli.output import add_force, check_encoder, checked, claim, usual
+from rom.cli.output import add_force, check_encoder, checked, claim, typed_command, usual
 from rom.errors import ConfigError
 from rom.names import inside
 
@@ -52,7 +52,7 @@ EXAMPLES = """\
   rom swing part.step --hinge radius:0.006 --E 200GPa -o out
   rom swing part.step --hinge 0,0,0.01 --material aluminium --gravity 0,0,-9.81 --film -o out
 """
-TABLE_FILE, SCENE_FILE, RECORD_FILE = "motion.csv", "scene.json", "run.json"
+TABLE_FILE = "motion.csv"
 N_STEPS, N_INSTANTS = 240, 4  # of the motion; shown in the picture
 FAR_SWING = 1.18034  # period of a swing from the horizontal over that of a small one
 LEAST_LEVER = 3e-3  # of gravity about the hinge, of the radius of gyration
@@ -108,7 +108,7 @@ def run(args: argparse.Namespace) -> Answer:
     failed = tuple(text for text in failures(certificate) if not text.startswith("free:"))
     motion = mechanism, solution
     text = _text(body, hinge, data)
-    command = f"rom {' '.join(map(quote, args.argv))}"
+    command = typed_command(args)
     return Answer(data, text, lambda: _write(files, body, motion, magnify, command), failed)
 
 
@@ -131,6 +131,8 @@ def _faces(args: argparse.Namespace) -> Answer:
 
 def _files(args: argparse.Namespace) -> dict[str, Path]:
     """What will be written, by its ending; refused before the computation."""
+    from rom.report.run import RECORD_FILE, SCENE_FILE
+
     folder = claim(args)
     films = [kind for kind, asked in ((".gif", args.film), (".mp4", args.mp4)) if asked]
     kinds = (".rom.npz", ".png", *films, ".html")
@@ -290,7 +292,7 @@ def _write(
     from rom.mbs.results.audit import audit
     from rom.report.html import write_report
     from rom.report.pages import of_body, of_run
-    from rom.report.run import Record
+    from rom.report.run import RECORD_FILE, SCENE_FILE, Record
     from rom.report.scene import motion_scene
     from rom.report.scene_file import write_scene
     from rom.view import animate, instants
