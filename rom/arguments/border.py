@@ -114,7 +114,7 @@ def _typed_function(function: Callable[..., object]) -> Callable[..., object]:
             border.append(_Border(function))
         try:
             taken, named = border[0].passed(args, named)
-        except (RomError, TypeError) as error:  # the traceback ends where the user made the call
+        except RomError as error:  # the traceback ends where the user made the call
             raise error.with_traceback(None) from None
         return function(*taken, **named)
 
