@@ -31,6 +31,10 @@ def rod(mech, name="rod", at=(0.5, 0, 0), **more):
     return mech.add_rigid(name, mass=1.0, inertia=(1e-3, 0.1, 0.1), at=at, markers=markers, **more)
 
 
+def turned_by(vector):
+    return rom.rotation.matrix(rom.rotation.exp(np.array(vector)))
+
+
 def drawn(mech, surfaces=None):
     shapes = {name: bars(part, ends_of(mech, name))[0] for name, part in mech.parts.items()}
     return connections(at_start(mech), shapes | (surfaces or {}), set(surfaces or ()), UP)
@@ -62,7 +66,7 @@ KINDS = {
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("turned", [False, True])
 def test_a_joint_is_drawn_at_its_point_and_along_its_axis(kind, turned):
-    A = rom.rotation.matrix(rom.rotation.exp(np.array([0.4, -0.3, 0.8]))) if turned else np.eye(3)
+    A = turned_by((0.4, -0.3, 0.8)) if turned else np.eye(3)
     mech = rom.Mechanism()
     one, two = (rod(mech, name, at=at, orientation=A)
                 for name, at in (("one", A @ (0.5, 0, 0)), ("two", A @ (1.5, 0, 0))))  # fmt: skip
@@ -232,7 +236,9 @@ def test_a_plotter_is_had_where_dolfinx_is_not_loaded_only(monkeypatch):
 
 def test_cables_pinions_and_bearings_are_lines_and_circles_at_all_instants():
     mech = rom.Mechanism(gravity=ORIGIN)
-    wheel = rom.mbs.Pulley(mech.ground.marker(ORIGIN), 0.2, (0, 1, 0))
+    held = rod(mech, "held", at=ORIGIN, orientation=turned_by((0.4, -0.3, 0.8)))
+    mech.fixed("stand", mech.ground.marker(ORIGIN), held.marker(ORIGIN))
+    wheel = rom.mbs.Pulley(held.marker(ORIGIN), 0.2, (0, 1, 0))
     place = {"at": (0.2, 0, -1.0), "velocity": (0, 0, 1.0)}
     load = on_guide(mech, "rod", axis=UP, base=(0.2, 0, -1.0), **place)
     mech.tendon("rope", [mech.ground.marker((-0.2, 0, -1.0)), wheel, load], EA=1)

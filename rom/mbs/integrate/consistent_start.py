@@ -395,9 +395,9 @@ def _rank(packed: Packed, W: Work, q: Array) -> int:
 def _refuse_shared_friction(packed: Packed, names: Container[str]) -> None:
     for first in packed.loaded_rows:
         if packed.row_owner[first] in names:
-            text = "friction depends on the load of a joint that shares it with others"
+            text = "friction depends on a load that its joint shares with others in no known way."
             hint = "Let the joints repeat nothing, or give friction a constant level (coulomb)."
-            raise ModelError(f"{text} unknown.", where=packed.row_owner[first], hint=hint)
+            raise ModelError(text, where=packed.row_owner[first], hint=hint)
 
 
 def _check_start(packed: Packed, W: Work, q: Array, rank: int) -> None:

@@ -284,7 +284,7 @@ def test_stribeck_friction_and_the_friction_of_a_loaded_pin():
 def test_friction_by_load_among_joints_that_repeat_others_is_refused_and_of_a_given_level_is_not():
     mech = slider_crank()
     mech.friction("shoes", "guide", mu=0.1, transition_speed=0.1)
-    refuses(ModelError, "shares it with others", simulate_quietly, mech, t_end=0.1, dt=1e-3)
+    refuses(ModelError, "shares with others", simulate_quietly, mech, t_end=0.1, dt=1e-3)
     mech = slider_crank()
     mech.friction("shoes", "guide", coulomb=1.0, transition_speed=0.1)
     sol = simulate_quietly(mech, t_end=0.05, dt=1e-4)

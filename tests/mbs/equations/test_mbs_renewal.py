@@ -8,6 +8,7 @@ import rom
 from rom.mbs.analysis.local_equations import instant
 from rom.mbs.equations import equations, linear_solve, packing, renewal
 from rom.mbs.equations.renewal import add_renewed, keep_pair_tangents, renew_pair_tangents
+from rom.mbs.kernels.constraints import constraint_gradient
 
 Z = (0, 0, 1)
 STEP = 1e-4
@@ -38,7 +39,8 @@ def _small(monkeypatch):
 
 def matrix(now, v, factors):
     """Iteration matrix at the start with those velocities, dense."""
-    s, W, q, still, none = now.packed.system, now.W, now.packed.q, np.zeros(v.size), np.zeros(0)
+    s, W, q, still = now.packed.system, now.W, now.packed.q, np.zeros(v.size)
+    none = np.zeros(W.G.shape[0])
     equations.evaluate(s, W, q, v)
     equations.residual(s, W, q, v, still, none)
     equations.tangents(s, W, v, still, none, factors)
@@ -47,23 +49,39 @@ def matrix(now, v, factors):
 
 
 def solutions(mech, factors):
-    """Of the matrix at the start, renewed at other velocities, and of the one there by NumPy."""
+    """Of the matrix at the start, renewed at other velocities, and of the one there by NumPy.
+
+    Reactions follow the velocities.
+    """
     now = instant(mech, 0.0)
     s, W, q, start = now.packed.system, now.W, now.packed.q, now.packed.v
-    fast, none = start.copy(), np.zeros(0)
+    n, rank = start.size, W.G.shape[0]
+    fast, none = start.copy(), np.zeros(rank)
     fast[[0, 1, 6, 13]] += 0.02, -0.05, 0.03, 0.01  # nothing turns otherwise
     matrix(now, start, factors)
-    assert linear_solve.factorise_bordered(s, W, 0)
+    constraint_gradient(s, W)
+    W.UG[:], W.UGT[:] = W.G, W.G
+    assert linear_solve.factorise_bordered(s, W, rank)
     keep_pair_tangents(s, W, factors[2], factors[1])
-    load, x = np.random.default_rng(1).standard_normal(start.size), np.zeros(start.size)
+    load, x = np.random.default_rng(1).standard_normal(n + rank), np.zeros(n + rank)
     equations.evaluate(s, W, q, fast)
-    equations.residual(s, W, q, fast, np.zeros(fast.size), none)
-    assert renew_pair_tangents(s, W, factors[2], factors[1], 0)
-    W.rhs[:] = load
-    linear_solve.solve_bordered(s, W, 0, x, none)
+    equations.residual(s, W, q, fast, np.zeros(n), none)
+    assert renew_pair_tangents(s, W, factors[2], factors[1], rank)
+    W.rhs[:n], W.part[:] = load[:n], load[n:]
+    linear_solve.solve_bordered(s, W, rank, x[:n], x[n:])
     old = x.copy()
-    add_renewed(s, W, x, none)
-    return old, x, np.linalg.solve(matrix(now, fast, factors), load)
+    add_renewed(s, W, x[:n], x[n:])
+    S, G = matrix(now, fast, factors), W.G
+    return old, x, np.linalg.solve(np.block([[S, G.T], [G, np.zeros((rank, rank))]]), load)
+
+
+def test_reactions_are_renewed_with_the_velocities():
+    mech = shaft()
+    mech.spherical("pivot", mech.ground.marker((0, 0, -0.2)), mech.marker("bush 0"))
+    old, renewed, new = solutions(mech, (1.0, 0.5 * STEP, 0.0))
+    assert np.abs(old - new)[-3:].max() > 0.05 * np.abs(new[-3:]).max()
+    assert_allclose(renewed[:-3], new[:-3], atol=1e-12 * np.abs(new[:-3]).max())
+    assert_allclose(renewed[-3:], new[-3:], atol=1e-12 * np.abs(new[-3:]).max())
 
 
 def test_renewed_damping_is_that_of_the_new_matrix():

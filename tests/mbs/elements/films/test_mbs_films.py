@@ -1,5 +1,6 @@
 """Oil films between bodies: in the frame of the bush, with momentum, power and tangents."""
 
+import numba
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -13,10 +14,13 @@ from cases.refusals import refused, refuses
 from rom.components.journal_bearing import film
 from rom.components.journal_bearing.films.cells import SPIN_COLUMN, cells_of
 from rom.components.journal_bearing.films.journals import FIRST_CONTENT, KNOWN, TIME
+from rom.components.journal_bearing.films.kinematics import journal_motion
 from rom.components.journal_bearing.films.slopes import solve_film
 from rom.mbs import Groove, JournalBearing, iso_vg
 from rom.rotation import exp, matrix
 
+INCLINED = (0.3, -0.5, 0.8), (0.7, 0.1, -0.4)  # rotation vectors of a journal and its bush
+SLIDE = np.array([0.7, -1.1, 0.4])
 GROOVES = [Groove(1.2, 0.3, 1e5, share=0.7)]
 LAWS = ["none", "reynolds", "jfo"]
 
@@ -27,6 +31,27 @@ def bearing(law="reynolds", cells=(60, 8), grooves=GROOVES, slender=1.0, **more)
 
 def turned_by(vector):
     return matrix(exp(np.asarray(vector)))
+
+
+@numba.njit
+def motion_of(axes, relative):
+    return journal_motion(axes, relative)
+
+
+def test_the_rate_of_a_journal_is_that_of_its_motion():
+    """Far from the middle plane and much inclined, where terms of second order count."""
+    spins = np.array([3.0, -2.0, 40.0]), np.array([-1.0, 2.5, 4.0])  # of the journal, of the bush
+
+    def motion(t):
+        B, A = (turned_by(t * O) @ turned_by(at) for O, at in zip(spins, INCLINED, strict=True))
+        axes = (*A.T, B[:, 2])
+        parts = np.array([0.3, -0.2, 0.5]) + t * SLIDE, SLIDE, *spins
+        return motion_of(*(tuple(tuple(v) for v in some) for some in (axes, parts)))
+
+    _, rate, spin = motion(0.0)
+    (ahead, *_), (behind, *_) = motion(1e-6), motion(-1e-6)
+    assert_allclose(rate, np.subtract(ahead, behind) / 2e-6, rtol=1e-7)
+    assert spin == pytest.approx((spins[0] - spins[1]) @ turned_by(INCLINED[1])[:, 2])
 
 
 @pytest.mark.parametrize("law", LAWS)
