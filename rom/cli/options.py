@@ -134,16 +134,13 @@ NOT_GIVEN: dict[Kind | None, Keywords] = {
 
 def add_geometry(parser: argparse.ArgumentParser) -> None:
     """The file and how to read it."""
-    parser.add_argument("file", type=Path, help=".geo, .py, .step, .msh, .inp or .bdf")
-    about = "parameter of the geometry, e.g. lc=4e-3; may be repeated"
-    option(parser, "-p --parameter NAME=VALUE", about, assignment)
+    add_file(parser)
     about = (
         "name a face of a .step file: its number, as 12; a point X,Y,Z on it [m]; radius:R [m] for "
         "all cylinders of that radius; normal:X,Y,Z for the plane that looks there; several as "
         "3+4; may be repeated"
     )
     option(parser, "--face NAME=FACE", about, assignment)
-    option(parser, "--unite", "connect the solids of a .step file where they touch")
     about = "factor on coordinates; 1e-3 for mm (default 1)"
     option(parser, "--scale", about, positive, default=1.0)
     about = (
@@ -152,6 +149,14 @@ def add_geometry(parser: argparse.ArgumentParser) -> None:
     )
     option(parser, "--order", about, count, choices=(1, 2))
     add_meshing(parser)
+
+
+def add_file(parser: argparse.ArgumentParser) -> None:
+    """The file and its parameters."""
+    parser.add_argument("file", type=Path, help=".geo, .py, .step, .msh, .inp or .bdf")
+    about = "parameter of the geometry, e.g. lc=4e-3; may be repeated"
+    option(parser, "-p --parameter NAME=VALUE", about, assignment)
+    option(parser, "--unite", "connect the solids of a .step file where they touch")
 
 
 def add_meshing(parser: argparse.ArgumentParser) -> None:

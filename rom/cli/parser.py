@@ -11,7 +11,7 @@ from rom.cli.options import options_of, verb_parsers
 from rom.config.keys import nearest
 from rom.errors import ConfigError, UnknownNameError
 
-VERBS = "doctor mesh modes reduce check export simulate view report swing".split()
+VERBS = "doctor open mesh modes reduce check export simulate view report swing".split()
 LAST_VERBS = ["bench", "completion"]  # behind those of fields
 EXIT_CODES = """\
 exit codes:

@@ -187,6 +187,10 @@ VERBS: dict[str, Schema] = {
         title=text("its heading"),
         sections=each(text("heading"), "its parts"),
     ),
+    "open": record(
+        "what was made while a part was open",
+        files=each(text("file"), "files written"),
+    ),
     "swing": record(
         "a part on its hinge; without one, its faces",
         optional=(

@@ -101,8 +101,8 @@ class Component(Described):
 
         return model(file, degree=geometry["degree"], solver=geometry["solver"], **keywords)
 
-    def body(self) -> "FlexibleBody":
-        """The reduced body."""
+    def body(self, model: "FEModel | None" = None) -> "FlexibleBody":
+        """The reduced body, of a model that is there already or of its own."""
         from rom.workflow import reduce
 
         reduction, kinds = self.values["reduction"], self.kinds
@@ -116,7 +116,7 @@ class Component(Described):
         if len(how["reference"]) == 1:
             (how["reference"],) = how["reference"]
         how |= {"interfaces": kinds, "name": self.name}
-        return reduce(self.model(), nonlinear=self.nonlinear(), **how)
+        return reduce(model or self.model(), nonlinear=self.nonlinear(), **how)
 
     def material(self) -> "Solid | dict[str, Solid]":
         """`Material`, `Orthotropic`, or a dictionary of them by region."""

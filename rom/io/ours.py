@@ -37,6 +37,7 @@ FILE_SIGNS = {  # kind of file: how each that rom writes begins
     "gif": rb"GIF8.*\x21\xfe." + MARK_BYTES,
     "mp4": rb".{4}ftyp.*" + MARK_BYTES,
     "html": rb"<!DOCTYPE html>.*<meta name='generator' content='" + MARK_BYTES,
+    "toml": rb"# [^\n]*" + MARK_BYTES + rb"\n",
     "csv": TABLE_HEAD + rb"[^\r\n]*\r?\n[0-9eE+.-]+,[0-9eE+.,-]*\r?\n",
     "h5": rb"\x89HDF\r\n.*rom-history",
     "glb": rb'glTF.{0,40}"asset": ?\{[^}]*"generator": ?"fenicsx-rom"',

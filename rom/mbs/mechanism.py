@@ -152,10 +152,10 @@ class Mechanism(Methods, metaclass=Open, kind="methods", bound=bound):
     def add_rigid(  # noqa: PLR0913  one keyword per property of a body
         self,
         name: str,
-        *,
         mass: Annotated[float, Positive("kg")],
         inertia: Annotated[npt.ArrayLike, Number("kg m^2", (3,), (3, 3))],
         at: Point,
+        *,
         orientation: Orientation | None = None,
         markers: dict[str, Point] | None = None,
         velocity: Velocity | None = None,

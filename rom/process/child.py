@@ -34,6 +34,8 @@ GRACE_PERIOD = 1.0  # [s] between SIGTERM and SIGKILL
 # The launcher of MPI recognises its processes by these; a child is none of them.
 MPI_VARIABLES = ("OMPI_", "PMIX_", "PMI_", "MPI_", "PRTE_", "HYDRA_", "SLURM_")
 
+Child = subprocess.Popen[bytes]
+
 
 @dataclass(frozen=True, slots=True)
 class Limits:
@@ -96,7 +98,7 @@ def start(
     limits: Limits | None = None,
     variables: Mapping[str, str] | None = None,
     fed: bool = False,
-) -> subprocess.Popen[bytes]:
+) -> Child:
     """Start a command beside this process; arguments as in `run`, `finish` waits for it.
 
     With ``fed`` its standard input is a pipe for what `finish` is given.
@@ -117,9 +119,7 @@ def start(
         )
 
 
-def finish(
-    process: subprocess.Popen[bytes], seconds: float = 0.0, given: bytes | None = None
-) -> Ended:
+def finish(process: Child, seconds: float = 0.0, given: bytes | None = None) -> Ended:
     """Wait until a child has ended; end it after so many seconds, or when this is interrupted."""
     overtime = False
     try:
@@ -127,17 +127,17 @@ def finish(
             out, err = process.communicate(given, timeout=seconds or None)
         except subprocess.TimeoutExpired:
             overtime = True
-            _end(process)
+            end(process)
             out, err = process.communicate()
     except BaseException:
         with uninterrupted():
-            _end(process)
+            end(process)
         raise
     message, complained = (text.decode(errors="replace") for text in (out, err))
     return Ended(process.returncode, message, complained, overtime)
 
 
-def _end(process: subprocess.Popen[bytes]) -> None:
+def end(process: Child) -> None:
     """End a child and everything in its session."""
     for number in (signal.SIGTERM, signal.SIGKILL):
         with suppress(ProcessLookupError, PermissionError):

@@ -33,7 +33,7 @@ class ImportedElsewhere:
         """Of one of them."""
         if name not in READERS:
             return None
-        others = (f for f in sys.meta_path if f is not self and hasattr(f, "find_spec"))
+        others = (f for f in sys.meta_path if not isinstance(f, ImportedElsewhere))
         spec = next(filter(None, (f.find_spec(name, path, target) for f in others)), None)
         if spec is not None and spec.loader is not None:
             usual = spec.loader.exec_module

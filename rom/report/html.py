@@ -4,7 +4,7 @@ import base64
 import hashlib
 import html
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -99,21 +99,27 @@ def write_report(sections: dict[str, Sequence[str]], path: str | Path, title: st
         ResourceError: if the disk is full.
     """
     path = check_ending(path, "a report", ".html")
+    return write_whole(path, page(sections, title).encode("utf-8"))
+
+
+def page(sections: Mapping[str, Sequence[str]], title: str, script: str = "") -> str:
+    """A page of sections; a script of its own may ask the server that the page comes from."""
     body = "".join(
         f"<h2>{html.escape(heading)}</h2>{''.join(blocks)}" for heading, blocks in sections.items()
     )
     turning = "<figure class='scene" in body
     scripts = [(SOURCE_FOLDER / name).read_text("utf-8") for name in SCRIPTS if turning]
+    scripts += [script] if script else []
+    policy = _policy(scripts) + ("; connect-src 'self'; frame-src 'self'" if script else "")
     name = html.escape(title)
-    text = (
+    return (
         f"<!DOCTYPE html><html lang='en'><head><meta charset='utf-8'><title>{name}</title>"
-        f'<meta http-equiv="Content-Security-Policy" content="{_policy(scripts)}">'
+        f'<meta http-equiv="Content-Security-Policy" content="{policy}">'
         f"<meta name='generator' content='{ORIGIN_MARK}'>"
         f"<meta name='viewport' content='width=device-width, initial-scale=1'>"
         f"<style>{PAGE_STYLE}</style></head><body><h1>{name}</h1>{_once_each(body)}"
-        f"{''.join(f'<script>{script}</script>' for script in scripts)}</body></html>\n"
+        f"{''.join(f'<script>{one}</script>' for one in scripts)}</body></html>\n"
     )
-    return write_whole(path, text.encode("utf-8"))
 
 
 def _policy(scripts: Sequence[str]) -> str:

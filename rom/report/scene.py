@@ -4,7 +4,7 @@ A scene is a dictionary for JSON, numbers in base 64. Flexible bodies keep their
 coordinates: the page computes the place of a point from x = r + A (X + S q), as the integrator.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import cycle
 from typing import TYPE_CHECKING, Any
@@ -44,6 +44,7 @@ SMALLEST_SHARE = 1e-4  # of a displacement or stress: coordinates that add less 
 FRAMES_AT_ONCE = 50  # while limits of colours are looked for
 ELASTIC_COLOURS = ("#2f7f9f", "#d1495b", "#edae49", "#66a182")
 Scene = dict[str, Any]  # for JSON
+FACE_COLOUR = "#c9d0d8"  # of a face that is not chosen
 NO_TURN = np.array([[1.0, 0.0, 0.0, 0.0]])
 
 
@@ -140,6 +141,21 @@ def start_scene(
     ]
     look = {"view": view, "up": up, "gravity": mechanism.gravity}
     return _scene(title, things, SHAPE_BYTES, look)
+
+
+def faces_scene(points: Array, patches: Mapping[str, Index], *, title: str) -> Scene:
+    """Faces of a part, to be clicked, from points (n, 3) [m] and {name: (t, 3) triangles}.
+
+    The name "" stands for the rest of the surface.
+    """
+    things = []
+    for name, triangles in patches.items():
+        used, corner = np.unique(triangles, return_inverse=True)
+        mesh = points[used], corner.reshape(-1, 3)
+        things.append(Thing(name, FACE_COLOUR, *mesh, np.zeros((1, 3)), NO_TURN))
+    return _scene(title, [one for one in things if len(one.points)], SHAPE_BYTES, {}) | {
+        "pick": True
+    }
 
 
 def _meshes(shapes: dict[str, Mesh], mechanism: "Mechanism") -> dict[str, Mesh]:

@@ -140,6 +140,21 @@
       this.still.frustumCulled = false;
     }
 
+    /** Where the segment a + s way first meets a triangle: s, above 1 if nowhere. */
+    hit(a, way) {
+      const x = this.at.array, index = this.mesh.geometry.index.array;
+      const corner = (k) => new THREE.Vector3().fromArray(x, 3 * index[k]);
+      let nearest = 2;
+      for (let k = 0; k < index.length; k += 3) {
+        const p = corner(k), u = corner(k + 1).sub(p), v = corner(k + 2).sub(p);
+        const h = way.clone().cross(v), size = u.dot(h), s = a.clone().sub(p), q = s.clone().cross(u);
+        const [f, g] = [s.dot(h) / size, way.dot(q) / size]; // weights of the other two corners
+        const depth = v.dot(q) / size;
+        if (f >= 0 && g >= 0 && f + g <= 1 && depth >= 0) nearest = Math.min(nearest, depth);
+      }
+      return nearest;
+    }
+
     lines(at, edges, color) {
       const geometry = new THREE.BufferGeometry();
       geometry.setAttribute("position", at);
@@ -298,6 +313,39 @@
       }, { capture: true });
       this.canvas.addEventListener("pointerdown", () => this.canvas.focus({ preventScroll: true }));
       this.canvas.addEventListener("keydown", (event) => this.key(event));
+      if (data.pick) this.listen();
+    }
+
+    /** Tell the page which body is clicked, and let it colour some: {name: colour}. */
+    listen() {
+      let pressed = null;
+      this.canvas.addEventListener("pointerdown", (event) => { pressed = event; });
+      this.canvas.addEventListener("pointerup", (event) => {
+        if (!pressed || event.button || Math.hypot(event.x - pressed.x, event.y - pressed.y) > 4) return;
+        const seen = this.seenAt(event.offsetX, event.offsetY);
+        if (seen) this.figure.dispatchEvent(new CustomEvent("pick", { detail: seen.name }));
+      });
+      this.figure.addEventListener("paint", ({ detail }) => {
+        for (const body of this.bodies) body.plain.color.set(detail[body.name] || body.colour);
+        this.ask();
+      });
+    }
+
+    /** The nearest body at a point of the picture [pixel], or none. */
+    seenAt(x, y) {
+      const { camera, data } = this, { clientWidth, clientHeight } = this.canvas;
+      const at = (depth) => new THREE.Vector3((2 * x) / clientWidth - 1,
+        1 - (2 * y) / clientHeight, depth).unproject(camera).multiplyScalar(data.view.radius);
+      const [from, to] = [at(-1), at(1)];
+      let nearest = 1, seen = null;
+      for (const body of this.bodies) {
+        const back = body.group.quaternion.clone().invert();
+        const [a, b] = [from, to].map((p) =>
+          p.clone().sub(body.group.position).applyQuaternion(back));
+        const depth = body.hit(a, b.sub(a));
+        if (depth < nearest) [nearest, seen] = [depth, body];
+      }
+      return seen;
     }
 
     help() {
@@ -409,6 +457,7 @@
     // -- the legend
 
     nameBodies() {
+      if (this.data.pick) return; // the page names what is clicked
       const dots = this.bodies.slice(0, 16).map((body) => {
         const dot = element("span", { class: "dot" });
         dot.style.background = body.colour;

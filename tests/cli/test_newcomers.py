@@ -39,7 +39,7 @@ def test_markers_go_by_the_names_that_files_use(pendulum):
 
 
 def test_a_body_whose_name_has_a_dot_is_found_before_its_marker(pendulum):
-    pendulum.add_rigid("bob.pin", mass=1, inertia=(1, 1, 1), at=(0, 0, 0), markers={"a": (0, 0, 1)})
+    pendulum.add_rigid("bob.pin", 1, (1, 1, 1), (0, 0, 0), markers={"a": (0, 0, 1)})
     assert pendulum.marker("bob.pin.a").body == "bob.pin"
     assert pendulum.marker("bob.pin").place == (0.0, 0.0, 0.0)
 

@@ -160,7 +160,7 @@ def test_every_verb_that_writes_has_force():
         options = {a.dest for a in sub._actions}
         have |= {verb} if "force" in options else set()
         write |= {verb} if options & {"output", "save"} else set()
-    named = {"mesh", "reduce", "export", "simulate", "view", "report", "swing", "update"}
+    named = {"open", "mesh", "reduce", "export", "simulate", "view", "report", "swing", "update"}
     assert have == write == named
 
 

@@ -18,6 +18,7 @@ from shlex import quote
 from typing import TYPE_CHECKING
 
 from rom.cli.answer import Answer, Data, failures, report_data
+from rom.cli.described import component, described
 from rom.cli.options import (
     ACCELERATION,
     DURATION,
@@ -52,6 +53,7 @@ EXAMPLES = """\
   rom swing part.step --hinge radius:0.006 --E 200GPa -o out
   rom swing part.step --hinge 0,0,0.01 --material aluminium --gravity 0,0,-9.81 --film -o out
 """
+OWN_OPTIONS = "hinge gravity t_end magnify film mp4".split()  # that say nothing of the part
 TABLE_FILE = "motion.csv"
 N_STEPS, N_INSTANTS = 240, 4  # of the motion; shown in the picture
 FAR_SWING = 1.18034  # period of a swing from the horizontal over that of a small one
@@ -155,8 +157,10 @@ def _reduced(
     args: argparse.Namespace, hinge: str, faces: dict[str, str]
 ) -> "tuple[FlexibleBody, Swing]":
     """The body, and how it will swing, which is refused before the reduction."""
-    how = reading(args)  # refused before dolfinx is loaded
-    how["faces"] = unique([*how["faces"].items(), *faces.items()], "--face")
+    part = component(args, *OWN_OPTIONS) if described(args) else None
+    how = {} if part else reading(args)  # refused before dolfinx is loaded
+    if part is None:
+        how["faces"] = unique([*how["faces"].items(), *faces.items()], "--face")
     from rom.body.damping import ModalDamping
     from rom.fe.elasticity import model
     from rom.reduction.bases.method import CraigBampton
@@ -164,10 +168,12 @@ def _reduced(
     from rom.reduction.interfaces.connection import found
     from rom.workflow import reduce
 
-    full = model(args.file, material=material(args), **how)
+    full = part.model() if part else model(args.file, material=material(args), **how)
     (at,), rigid = found(full, [hinge]), mass_properties(full)
     log.info("%s: %d dofs, %.4g kg", args.file, full.n_dofs, rigid.mass)
     swing = planned(rigid, at.origin, args.gravity, args.t_end, axis=at.axis)
+    if part:
+        return part.body(full), swing
     how = {"method": CraigBampton(args.modes), "damping": ModalDamping(0.01, fixed=(hinge,))}
     kinds = {hinge: "rbe2"}
     return reduce(full, interfaces=kinds, reference=hinge, name=args.file.stem, **how), swing
