@@ -6,6 +6,7 @@ from rom.components.rolling_bearing import bearings
 from rom.components.tendons import tendons
 from rom.mbs.elements import (
     bushings,
+    fmu,
     joint_laws,
     laws,
     loads,
@@ -24,6 +25,7 @@ class Methods:
     law = laws.law
     user_force = laws.user_force
     motor = motors.motor
+    fmu = fmu.fmu
     friction = joint_laws.friction
     stop = joint_laws.stop
     bushing = bushings.bushing
