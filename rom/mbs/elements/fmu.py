@@ -103,6 +103,8 @@ def fmu(
     known, told, targets = variables(file), dict(_readings(self)), dict(_targets(self))
     given = {**inputs, **outputs}
     words = {key: x.replace(".", " ") for key, x in given.items() if isinstance(x, str)}
+    if not outputs:
+        raise ConfigError(f"FMU {name!r} sets nothing; name outputs, and what follows them.")
     check_once([words[x] for x in outputs], f"the target of FMU {name!r}")
     for what, some in {"input parameter": inputs, "output": outputs}.items():
         there = [x for x, causality in known.items() if causality in what.split()]

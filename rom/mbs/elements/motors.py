@@ -66,9 +66,8 @@ def motor(
             `rom.mbs.elements.formulas.programs.Formula`.
         coordinate: "angle" or "displacement"; None for the only or the first one.
         compiled: True to insist, False to leave it to Python, None for what works.
-        every: time between two samples [s]: the law, of Python, is called at the start of a motion
-            and after each such time, once, and its value held in between. It may remember what it
-            likes. Steps of one length end on the samples; only motions have them.
+        every: time between two samples [s], if the law, of Python, is called once for each, from
+            the start of a motion on, and its value held. It may be an object that remembers.
 
     Raises:
         ConfigError: if the joint has no such coordinate, or the law is no function of three

@@ -79,7 +79,8 @@ def _sample(record: Record, W: Work, state: State) -> None:
     for fmu in record.mechanism.fmus.values():
         for law in [law for law in due if law.name in fmu.targets][:1]:
             record.seen = seen = record.seen or Instant(record.mechanism, record.packed)
-            seen.set(state.t, state.q, state.v).W.base[:], seen.lam = W.base, state.lam
+            seen.set(state.t, state.q, state.v)
+            seen.W.base[:], seen.lam = W.base, state.lam
             fmu.ask(seen, law.memory(W)[0])
     for law in due:
         law.sample(W, state.t)

@@ -38,37 +38,20 @@ def pendulum(angle=1.2):
     return mech
 
 
-MASS, STIFFNESS, EVERY = 2.0, 300.0, 1e-2
-
-
-def sampled_block(by="law"):
-    """A block on a spring under a sampled controller that remembers, and its times."""
-    mech, calls, total = Mechanism(gravity=(0, 0, 0)), [], [0.0]
-    mech.add_rigid("block", mass=MASS, inertia=(1, 1, 1), at=(0, 0, 0), velocity=(1, 0, 0))
-    mech.prismatic("guide", "ground", "block", axis=(1, 0, 0))
-    mech.spring_damper("spring", mech.ground.marker((-1, 0, 0)), "block", stiffness=STIFFNESS)
-
-    def motor(t, x, v, memory=total):
-        calls.append(t)
-        memory[0] += EVERY * x
-        return -400 * (x - 0.3) - 12 * v - 50 * memory[0]
-
-    def law(t, parameters, motion, memory, out):
-        out.memory[:] = memory
-        out.force[0, 0] = motor(t, motion.position[0, 0], motion.velocity[0, 0], out.memory)
-
-    def user_force(t, at):
-        return (motor(t, at.position[0], at.velocity[0]), 0, 0), (0, 0, 0)
-
-    given = {"motor": ("guide", motor), "law": (law, "block"), "user_force": (user_force, "block")}
-    memory = {"memory": [0.0]} if by == "law" else {}
-    getattr(mech, by)("servo", *given[by], every=EVERY, **memory)
-    return mech, calls
-
-
 def sampled():
-    """The mechanism alone."""
-    return sampled_block()[0]
+    """A block on a spring under a sampled controller, which adds up places and counts its calls."""
+    mech = Mechanism(gravity=(0, 0, 0))
+    mech.add_rigid("block", mass=2, inertia=(1, 1, 1), at=(0, 0, 0), velocity=(1, 0, 0))
+    mech.prismatic("guide", "ground", "block", axis=(1, 0, 0))
+    mech.spring_damper("spring", mech.ground.marker((-1, 0, 0)), "block", stiffness=300.0)
+
+    def servo(t, parameters, motion, memory, out):
+        x, v = motion.position[0, 0], motion.velocity[0, 0]
+        out.memory[:] = memory[0] + x, memory[1] + 1
+        out.force[0, 0] = -400 * (x - 0.3) - 12 * v - 0.5 * out.memory[0]
+
+    mech.law("servo", servo, "block", memory=[0.0, 0.0], every=1e-2)
+    return mech
 
 
 def swing():
