@@ -1,7 +1,7 @@
 """An FMU that runs in a process of its own, where it may crash or hang; what it must be.
 
 ``python -m rom.io.fmu.running FILE`` takes lines of JSON: a time and values of the inputs then, the
-first one also parameters and names; and answers each by the outputs, or by what went wrong.
+first one also the time between, parameters and names; it answers the outputs, or what went wrong.
 """
 
 import json
@@ -53,7 +53,7 @@ class Running:
 
     def __init__(self, path: Path, seconds: float):
         self.seconds = seconds
-        self.process = start(python("rom.io.fmu.running", str(path.resolve())), fed=True)
+        self.process = start(python("rom.io.fmu.running", str(path)), fed=True)
         finalize(self, finish, self.process, GRACE_PERIOD)
 
     def ask(self, *request: object) -> list[float]:
@@ -97,13 +97,13 @@ class Instance:
     def answer(self, t: float, values: list[float], *first: Any) -> list[float]:
         """Outputs at a time at which the inputs get these values."""
         if first:
-            parameters, *names = first
+            self.every, parameters, *names = first
             self.inputs, self.outputs = ([self.refs[x] for x in some] for some in names)
             self.set([self.refs[x] for x in parameters], list(parameters.values()))
             if not self.three:
                 self.fmu.setupExperiment(startTime=t)
             self.fmu.enterInitializationMode(**({"startTime": t} if self.three else {}))
-        elif (self.fmu.doStep(self.t, t - self.t) or (0, False))[1]:
+        elif (self.fmu.doStep(self.t, self.every) or (0, False))[1]:
             raise RuntimeError("it asks for the end of the motion")
         self.set(self.inputs, values)
         if first:

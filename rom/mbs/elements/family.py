@@ -22,7 +22,7 @@ from rom.mbs.kernels.tables import Table
 from rom.mbs.kernels.work import Work
 from rom.mbs.parts.bodies import GROUND, Marker
 from rom.mbs.parts.joints import Joint, Row
-from rom.mbs.parts.signals import Signal, TimeFunction
+from rom.mbs.parts.signals import CLOCK, Signal, TimeFunction
 from rom.model import Array, Index
 
 Element = Any  # a record, of the class that a family has
@@ -183,8 +183,7 @@ class Places:
     def clock(self) -> int:
         """Number of the function that tells the time."""
         if self.time < 0:
-            parts = (lambda t: t, lambda t: 1.0 + 0.0 * t, lambda t: 0.0 * t)
-            self.time = self._follow(Signal("clock", *parts))
+            self.time = self._follow(CLOCK)
         return self.time
 
     def _follow(self, signal: Signal) -> int:

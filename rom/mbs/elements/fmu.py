@@ -52,7 +52,7 @@ class Fmu:
         values = [source(instant) for source in self.inputs.values()]
         if due == NEVER:
             self.running = Running(self.path, self.time_limit)
-            first = [self.parameters, list(self.inputs), self.outputs]
+            first = [self.every, self.parameters, list(self.inputs), self.outputs]
         elif self.running is None or abs(self.t + self.every - due) > SAME_TIME * self.every:
             text = f"{what} does not stand one sample before t = {due:.9g} s, where it is to go on."
             raise ConfigError(text, hint="It keeps no states: begin anew, or where it ended.")
@@ -132,7 +132,7 @@ def fmu(
     joints = {told[words[x]][1] for x in sources if x in words and told[words[x]][0] == "joint"}
     rows = tuple((one, coordinate_of(self.joints, one, which, "FMU")) for one, which in joints)
     how = sources, parameters, tuple(outputs), rows, frozenset(picked), values
-    self.fmus[name] = Fmu(name, Path(file), every, time_limit, *how)
+    self.fmus[name] = Fmu(name, Path(file).resolve(), every, time_limit, *how)
 
 
 def _held(values: Array, at: int | list[int]) -> Callable[..., Array]:
@@ -164,9 +164,10 @@ def _readings(self: Whole) -> Iterator[tuple[str, Reading]]:
                 yield from (
                     (" ".join((*of, what, x)), (what, of, k)) for k, x in enumerate(letters)
                 )
-    for name, joint in self.joints.items():
+    for name in (*self.joints, *self.drives):
         for k, x in enumerate(f"{what} {x}" for what in ("force", "moment") for x in AXIS_LETTERS):
             yield f"{name} {x}", ("reaction", (name,), k)
+    for name, joint in self.joints.items():
         rows = {"angle": joint.turn, "displacement": joint.displacement}
         for what in (what for what, row in rows.items() if row is not None):
             for k, x in enumerate((what, f"{what} rate")):
