@@ -149,8 +149,12 @@ def _source(variable: str, given: object) -> Callable[[Seen], float]:
         fixed = number(variable, given)
         return lambda _: fixed
     what = f"the function of input {variable!r}"
-    answer = lambda t: numbers(what, t, ask(what, t, given, t), (), "a number")  # noqa: E731
-    return lambda instant: float(answer(instant.t))
+
+    def at(instant: Seen) -> float:
+        answer = ask(what, instant.t, given, instant.t)
+        return float(numbers(what, instant.t, answer, (), "a number"))
+
+    return at
 
 
 def _readings(self: Whole) -> Iterator[tuple[str, Reading]]:

@@ -117,7 +117,7 @@ class Whole(Protocol):
     joints: dict[str, Joint]
     drives: dict[str, Any]
     elements: dict[str, tuple[Any, Any]]  # {name: (family, element)}
-    fmus: dict[str, Any]
+    fmus: dict[str, object]
 
     @property
     def spherical(self) -> Callable[[str, Marker, Marker], None]:
