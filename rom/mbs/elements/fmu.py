@@ -100,8 +100,10 @@ def fmu(
     """
     name = Path(file).stem if name is None else name
     self.check_new(name)
-    known, told, targets = variables(file), dict(_readings(self)), dict(_targets(self))
-    given = {**inputs, **outputs}
+    known = variables(file)
+    told = {key.replace(".", " "): x for key, x in _readings(self)}
+    targets = {key.replace(".", " "): x for key, x in _targets(self)}
+    given = {**inputs, **{x: str(target) for x, target in outputs.items()}}
     words = {key: x.replace(".", " ") for key, x in given.items() if isinstance(x, str)}
     if not outputs:
         raise ConfigError(f"FMU {name!r} sets nothing; name outputs, and what follows them.")
@@ -112,11 +114,8 @@ def fmu(
     check_all_known([words[x] for x in inputs if x in words], told, f"FMU {name!r} cannot be told")
     check_all_known([words[x] for x in outputs], targets, f"FMU {name!r} can set no motor or load")
     parameters = {x: number(x, inputs[x]) for x in inputs if known[x] == "parameter"}
-    sources = {
-        x: _source(x, told[words[x]] if x in words else source)
-        for x, source in inputs.items()
-        if x not in parameters
-    }
+    asked = [x for x in inputs if x not in parameters]
+    sources = {x: _source(x, told[words[x]] if x in words else inputs[x]) for x in asked}
     picked, values = dict[str, list[int]](), np.zeros(len(outputs) + 1)
     for k, variable in enumerate(outputs):
         element, component = targets[words[variable]]
@@ -124,13 +123,15 @@ def fmu(
     for element, at in picked.items():
         family, one = self.elements.pop(element)
         if family is MOTORS_FAMILY:
-            law = _held(values, at[0])
-            self.add(element, replace(one, law=law, compiled=None, every=every), family)
+            own = {"law": _held(values, at[0]), "compiled": None, "every": every}
+            self.add(element, replace(one, **own), family)
         else:
             held = at_marker(_held(values, at), one.kind)
             self.user_force(element, held, one.marker, every=every)
     joints = {told[words[x]][1] for x in sources if x in words and told[words[x]][0] == "joint"}
-    rows = tuple((one, coordinate_of(self.joints, one, which, "FMU")) for one, which in joints)
+    rows = tuple(
+        (one, coordinate_of(self.joints, one, which, "FMU")) for one, which in sorted(joints)
+    )
     how = sources, parameters, tuple(outputs), rows, frozenset(picked), values
     self.fmus[name] = Fmu(name, Path(file).resolve(), every, time_limit, *how)
 

@@ -39,11 +39,9 @@ def _whole(law: Sampled, time: float, h: float) -> int:
     """Number of steps in a time; refused if it is no multiple of them."""
     n = round(time / h)
     if abs(n * h - time) > SAME_TIME * h or n < 1:
-        raise ConfigError(
-            f"every = {law.every:g} s of {law.name!r}, next after {time:.9g} s, is no multiple of "
-            f"the step of {h:.9g} s.",
-            hint="Take a dt that goes into every, and a t_end that is a multiple of it.",
-        )
+        text = f"the next sample of {law.name!r} comes after {time:.9g} s, no multiple of the step"
+        hint = "Take a dt that goes into every, and a t_end that is a multiple of it."
+        raise ConfigError(f"{text} of {h:.9g} s.", hint=hint)
     return n
 
 
