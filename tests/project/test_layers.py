@@ -45,7 +45,7 @@ io: files hdf5 archive native fields matrices sid programs fmu bodies history ex
 mbs: compiler kernels parts connections elements mechanism equations results integrate analysis
 mbs.analysis: local_equations rotors few_modes tangent equilibrium linearize campbell
   response steady_motion sensitivity inverse_dynamics law_check
-mbs.elements: field family law_calls joint_forces springs loads laws formulas motors fmu contact
+mbs.elements: field family law_calls joint_forces springs loads laws formulas motors contact
   joint_laws bushings nonlinear solids
 components.gear_mesh: gears compliance tooth_elements contact tooth_loads symbols keys field
 components.wheels: faces sector rotation modes travelling reduced blades prestress field

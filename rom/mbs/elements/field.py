@@ -19,7 +19,7 @@ springs:spring_damper joint_laws:rotational_spring loads:force loads:torque laws
 motors:motor joint_laws:friction joint_laws:stop bushings:bushing contact.shapes:sphere_on_plane
 contact.shapes:disc_on_plane contact.shapes:sphere_on_sphere contact.shapes:sphere_on_cylinder
 contact.shapes:capsule_on_capsule contact.shapes:surface_on_plane contact.shapes:surface_on_sphere
-contact.shapes:surface_on_cylinder loads:spread_load nonlinear:add_nonlinear fmu:fmu
+contact.shapes:surface_on_cylinder loads:spread_load nonlinear:add_nonlinear
 """.split()
 SYMBOLS = {"springs": "spring", "turns": "spiral", "bushings": "bushing"}
 NAMED = [*RECORDS, *(f"{place.partition(':')[2]}={place}" for place in METHODS)]

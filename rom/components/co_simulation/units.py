@@ -8,8 +8,8 @@ from typing import Annotated, Protocol
 import numpy as np
 
 from rom.arguments import Positive, number
+from rom.components.co_simulation.running import Running, variables
 from rom.errors import ConfigError, SolverError
-from rom.io.fmu.running import Running, variables
 from rom.io.history import AXIS_LETTERS, QUATERNION_PARTS
 from rom.mbs.elements.family import NEVER
 from rom.mbs.elements.loads import LOADS_FAMILY, at_marker

@@ -1,7 +1,8 @@
 """An FMU that runs in a process of its own, where it may crash or hang; what it must be.
 
-``python -m rom.io.fmu.running FILE`` takes lines of JSON: a time and values of the inputs then, the
-first one also the time between, parameters and names; it answers the outputs, or what went wrong.
+``python -m rom.components.co_simulation.running FILE`` takes lines of JSON: a time and values of
+the inputs then, the first one also the time between, parameters and names; it answers the outputs,
+or what went wrong.
 """
 
 import json
@@ -37,9 +38,8 @@ def variables(path: str | Path) -> dict[str, str]:
             raise FileFormatError(f"this is no FMU: {error}") from error
         version, model = found.fmiVersion, found.coSimulation
         if model is None or version[0] not in "23":
-            raise FileFormatError(
-                f"this FMU of FMI {version} is not for co-simulation of FMI 2, 3."
-            )
+            text = f"this FMU of FMI {version} is not for co-simulation of FMI 2 or 3"
+            raise FileFormatError(f"{text}; let its program write such a one.")
         place = fmpy.platform if version[0] == "2" else fmpy.platform_tuple
         needed = f"binaries/{place}/{model.modelIdentifier}{fmpy.sharedLibraryExtension}"
         if needed not in names:
@@ -53,7 +53,7 @@ class Running:
 
     def __init__(self, path: Path, seconds: float):
         self.seconds = seconds
-        self.process = start(python("rom.io.fmu.running", str(path)), fed=True)
+        self.process = start(python("rom.components.co_simulation.running", str(path)), fed=True)
         finalize(self, finish, self.process, GRACE_PERIOD)
 
     def ask(self, *request: object) -> list[float]:
