@@ -31,6 +31,7 @@ FIELDS = {
     "rom.components.round_bodies.field": "spin",
     "rom.components.cosserat.field": "rods",
     "rom.components.assumed_strain.field": "assumed_strain",
+    "rom.components.co_simulation.field": "fmu",
     "rom.components.best_matching.field": "best_matching",
     "rom.components.families.field": "save.BodyFamily load.rom-family",
     "rom.components.linkages.field": "linkages",

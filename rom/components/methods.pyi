@@ -1,4 +1,5 @@
 # What fields give to mechanisms and solutions, for who checks types; `rom.fields` finds them.
+from rom.components.co_simulation import units
 from rom.components.gear_mesh.gears import meshes
 from rom.components.journal_bearing import record
 from rom.components.journal_bearing.films import journal_bearings
@@ -24,6 +25,7 @@ class Methods:
     law = laws.law
     user_force = laws.user_force
     motor = motors.motor
+    fmu = units.fmu
     friction = joint_laws.friction
     stop = joint_laws.stop
     bushing = bushings.bushing

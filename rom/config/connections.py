@@ -89,19 +89,19 @@ def _drive(entry: Entry) -> None:
 
 def _motor(entry: Entry) -> None:
     law, (joint,) = entry.values["law"], entry.ends
-    coordinate = entry.values.get("coordinate")
+    how = {key: entry.values.get(key) for key in ("coordinate", "every")}
     if not isinstance(law, Mapping):
-        entry.made.motor(entry.name, joint, lambda t, x, rate: law, coordinate=coordinate)
+        entry.made.motor(entry.name, joint, lambda t, x, rate: law, **how)
         return
     value: Any = entry.law("law").value
     if law["kind"] in ("expression", "python"):  # they take coordinate and rate
-        entry.made.motor(entry.name, joint, value, coordinate=coordinate)
+        entry.made.motor(entry.name, joint, value, **how)
         return
 
     def by_time(t: float, _x: float, _rate: float) -> float:
         return float(value(t))
 
-    entry.made.motor(entry.name, joint, by_time, coordinate=coordinate, compiled=False)
+    entry.made.motor(entry.name, joint, by_time, **how, compiled=False)
 
 
 def _load(entry: Entry) -> None:
@@ -111,7 +111,8 @@ def _load(entry: Entry) -> None:
     if "factor" in entry.values:
         vector = entry.times(vector)
     method = entry.section.removesuffix("s")
-    getattr(entry.made, method)(entry.name, *entry.ends, vector, frame=entry.values["frame"])
+    how = {key: entry.values.get(key) for key in ("frame", "every")}
+    getattr(entry.made, method)(entry.name, *entry.ends, vector, **how)
 
 
 def _spread(entry: Entry) -> None:
@@ -158,8 +159,8 @@ def _points(entry: Entry) -> None:
 
 def _python_law(entry: Entry) -> None:
     function = plain_function_of(entry.values, entry.place, trust=entry.trust)
-    keys = ("parameters", "memory", "outputs", "energy")
-    given = {key: entry.values[key] for key in keys}
+    keys = ("parameters", "memory", "outputs", "energy", "every")
+    given: Values = {key: entry.values.get(key) for key in keys}
     entry.made.law(entry.name, function, *entry.ends, **given)
 
 
@@ -170,7 +171,7 @@ def _user_force(entry: Entry) -> None:
             f"{len(entry.ends)} markers: a force acts on one, or between two.",
             'More of them may have kind = "python".',
         )
-    entry.made.user_force(entry.name, function, *entry.ends)
+    entry.made.user_force(entry.name, function, *entry.ends, every=entry.values.get("every"))
 
 
 @dataclass(frozen=True)

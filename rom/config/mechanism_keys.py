@@ -157,7 +157,8 @@ POINTS = (
     Key("values", Quantity("N", ((None,),)), "Forces there.", ...),
     Key("interpolation", Text(("monotone", "cubic")), CURVES, "monotone"),
 )
-USER_FORCE = (MANY, *PYTHON_KEYS)
+SAMPLED = Key("every", Positive("s"), "Time between two samples; asked at all times if missing.")
+USER_FORCE = (MANY, *PYTHON_KEYS, SAMPLED)
 LAW = (
     *USER_FORCE,
     Key("memory", Quantity("1", ((None,),)), "Numbers it remembers, at the start.", []),

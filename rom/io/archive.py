@@ -86,7 +86,7 @@ def _checked(path: Path, kind: Kind, limit: int) -> tuple[dict[str, Any], dict[s
     """Manifest and arrays as they are."""
     try:
         with zipfile.ZipFile(path) as archive:
-            _refuse_hostile(archive, limit)
+            refuse_hostile(archive, limit)
             manifest = _read_manifest(archive, kind)
             names = sorted(_digests(manifest, kind))
             there = set(archive.namelist())
@@ -120,7 +120,7 @@ def digest(A: Array) -> str:
     return hashlib.sha256(f"{A.dtype.str}{A.shape}".encode() + A.tobytes()).hexdigest()
 
 
-def _refuse_hostile(archive: zipfile.ZipFile, limit: int) -> None:
+def refuse_hostile(archive: zipfile.ZipFile, limit: int) -> None:
     """What fills the memory, or is written elsewhere by whoever unpacks it by other means."""
     total = sum(info.file_size for info in archive.infolist())
     if total > limit:

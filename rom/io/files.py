@@ -7,8 +7,9 @@ import struct
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 from rom.errors import ConfigError, FileFormatError, ResourceError
 from rom.names import MAX_FILE_NAME_BYTES, TEMPORARY_BYTES
@@ -140,3 +141,11 @@ def check_last_line(path: Path) -> None:
                 where=str(path),
                 hint="Let the program that made it write it again, or end the line if it is whole.",
             )
+
+
+def library(name: str) -> Any:
+    """A library that is there for some files only."""
+    try:
+        return import_module(name)
+    except ModuleNotFoundError as error:
+        raise ResourceError(f"{name} is not installed.", hint=f"pip install {name}") from error

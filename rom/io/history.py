@@ -3,15 +3,14 @@
 import io
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from rom.arguments import AnySolution, typed, whole
-from rom.errors import ConfigError, ResourceError
-from rom.io.files import check_writable, write_whole
+from rom.errors import ConfigError
+from rom.io.files import check_writable, library, write_whole
 from rom.io.hdf5 import h5py
 from rom.model import Array
 from rom.names import csv_cell, offered
@@ -79,7 +78,7 @@ def _every(solution: Any, every: int) -> tuple[Array, tuple[Channel, ...]]:
 
 def data_frame(solution: Any, *, every: int = 1) -> Any:
     """The table as a pandas DataFrame, indexed by time; columns are named as in the file."""
-    pandas = _library("pandas")
+    pandas = library("pandas")
     t, found = _every(solution, every)
     values = np.hstack([c.values for c in found])
     return pandas.DataFrame(values, pandas.Index(t, name="t [s]"), _head(found))
@@ -87,7 +86,7 @@ def data_frame(solution: Any, *, every: int = 1) -> Any:
 
 def data_set(solution: Any, *, every: int = 1) -> Any:
     """The quantities as an xarray Dataset over "t", each with its unit as an attribute."""
-    xarray = _library("xarray")
+    xarray = library("xarray")
     t, found = _every(solution, every)
     variables = {}
     for c in found:
@@ -101,13 +100,6 @@ def data_set(solution: Any, *, every: int = 1) -> Any:
             c.values, coordinates, ("t", across), attrs={"units": c.unit}
         )
     return xarray.Dataset(variables, {"t": ("t", t, {"units": "s"})}, {"status": solution.status})
-
-
-def _library(name: str) -> Any:
-    try:
-        return import_module(name)
-    except ModuleNotFoundError as error:
-        raise ResourceError(f"{name} is not installed.", hint=f"pip install {name}") from error
 
 
 def channels(solution: Any) -> Iterator[Channel]:

@@ -114,6 +114,7 @@ class Mechanism(Methods, metaclass=Open, kind="methods", bound=bound):
     drives: dict[str, joint_drives.Drive] = field(default_factory=dict, init=False)
     elements: dict[str, tuple[Family, Any]] = field(default_factory=dict, init=False)
     events: dict[str, Event] = field(default_factory=dict, init=False)
+    fmus: dict[str, Any] = field(default_factory=dict, init=False)
 
     revolute = lower_pairs.revolute
     cylindrical = lower_pairs.cylindrical
@@ -377,6 +378,7 @@ class Mechanism(Methods, metaclass=Open, kind="methods", bound=bound):
         """
         check_name(name, "a part of the mechanism")
         taken = [GROUND, *self.parts, *self.joints, *self.drives, *self.elements, *self.events]
+        taken += self.fmus
         if name in taken:
             raise ConfigError(f"name {name!r} is used twice; in use are {offered(taken, name)}.")
 

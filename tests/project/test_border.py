@@ -61,7 +61,8 @@ BEYOND = {  # wrong values that annotations do not rule out: arguments by which 
 }
 REFUSED_AS_THEY_ARE = set(  # legal calls that lack more than arguments: a file, a mesh, a film
     "FlexibleBody.critical_loads "
-    "FlexibleBody.equilibria Mechanism.capsule_on_capsule Mechanism.distance Mechanism.law "
+    "FlexibleBody.equilibria Mechanism.capsule_on_capsule Mechanism.distance Mechanism.fmu "
+    "Mechanism.law "
     "certify_pieces read_component read_mechanism surface_load "
     "write_body_fmu write_fmu write_mechanism_fmu write_stress write_stress_history "
     "Solution.element Solution.law Solution.stress Solution.to_pandas "

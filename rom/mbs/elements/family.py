@@ -7,35 +7,80 @@ that `rom.fields` knows have methods of their own; any other enters a mechanism 
 ``mechanism.add``.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from typing import Annotated, Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
+from rom.arguments import Positive
 from rom.mbs.kernels.element_calls import ElementKernel, row_of
 from rom.mbs.kernels.system import Coordinates
 from rom.mbs.kernels.tables import Table
 from rom.mbs.kernels.work import Work
 from rom.mbs.parts.bodies import GROUND, Marker
 from rom.mbs.parts.joints import Joint, Row
-from rom.mbs.parts.signals import Signal, TimeFunction
+from rom.mbs.parts.signals import CLOCK, Signal, TimeFunction
 from rom.model import Array, Index
 
 Element = Any  # a record, of the class that a family has
 Filled = Any  # a table, likewise
+Hold = Annotated[float, Positive("s")] | None  # for which a sampled law is held
+NEVER = -1e300  # [s] when a law is due that was not asked yet: before all times
 
 
 class Asked(Protocol):
     """A law that stays in Python, asked whenever the forces are."""
+
+    @property
+    def name(self) -> str:
+        """Of its element."""
+
+    @property
+    def answer(self) -> Array:
+        """View of the numbers that `apply` sets, but for derivatives."""
 
     def apply(self, W: Work, t: float, *, slopes: bool) -> None:
         """Put the answer at time t, and its derivatives, where the kernels of its family look."""
 
 
 Laws = tuple[Asked, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Sampled:
+    """A law that is asked once a sample; between samples it answers what it remembers."""
+
+    law: Asked
+    every: float  # [s]
+    at: int  # where its memory begins: time of the next sample [s], then the answer
+
+    @property
+    def name(self) -> str:
+        """Of its element."""
+        return self.law.name
+
+    @property
+    def answer(self) -> Array:
+        """Numbers that it holds."""
+        return self.law.answer
+
+    def apply(self, W: Work, t: float, *, slopes: bool) -> None:
+        """Hold the answer; its derivatives are zero and stay so."""
+        held = self.memory(W)
+        self.answer[:], W.fresh[self.at : self.at + held.size] = held[1:], held
+
+    def sample(self, W: Work, t: float) -> None:
+        """Ask it for the motion in W at a time [s], and remember that."""
+        self.law.apply(W, t, slopes=False)
+        self.memory(W)[:] = t + self.every, *self.answer
+
+    def memory(self, W: Work) -> Array:
+        """View of what it remembers, see ``at``."""
+        at = W.x.size + self.at
+        return W.base[at : at + 1 + self.answer.size]
 
 
 def apply_laws(forces: Laws, W: Work, t: float, *, slopes: bool = False) -> None:
@@ -138,8 +183,7 @@ class Places:
     def clock(self) -> int:
         """Number of the function that tells the time."""
         if self.time < 0:
-            parts = (lambda t: t, lambda t: 1.0 + 0.0 * t, lambda t: 0.0 * t)
-            self.time = self._follow(Signal("clock", *parts))
+            self.time = self._follow(CLOCK)
         return self.time
 
     def _follow(self, signal: Signal) -> int:
@@ -156,6 +200,17 @@ class Places:
         if settling is not None:
             self.settling[owner] = settling
         return self._own(owner).start
+
+    def asked(
+        self, family: "Family", elements: Mapping[str, Element], table: Table
+    ) -> Iterator[Asked]:
+        """The laws of a family that stay in Python; elements with ``every`` have sampled ones."""
+        ask = family.hooks.asked
+        for law in ask(elements, table, len(self.coordinates)) if ask else ():
+            every = getattr(elements[law.name], "every", None)
+            first = np.append(NEVER, np.zeros(law.answer.size))
+            at = self.memory(f"samples of {law.name}", first) if every else -1
+            yield Sampled(law, every, at) if every else law
 
     def before(self, base: Array) -> Array:
         """(n_t, c + p) coordinates [rad, m] and memory over time; what settles is one instant late.

@@ -176,22 +176,27 @@ class AskedLaw:
         """What it is, by name."""
         return f"law {self.name!r}"
 
+    @property
+    def answer(self) -> Array:
+        """All that it says."""
+        begin, end = self.laws.answer_at[self.e : self.e + 2]
+        return np.asarray(self.laws.answer[begin:end])
+
     def apply(self, W: Work, t: float, *, slopes: bool) -> None:
         """Let it answer for the motion at hand, and tell its derivatives."""
         laws, e, n = self.laws, self.e, len(self.law.markers)
         begin, at = self.followed + laws.memory_at[e], laws.marker[e, :n]
         memory = W.base[begin : begin + self.law.memory.size].copy()
         motion = Motion(W.P[at], W.E[at], W.V[at, :3], W.V[at, 3:])
-        laws.answer[laws.answer_at[e] : laws.answer_at[e + 1]] = self.ask(t, motion, memory)
+        self.answer[:] = self.ask(t, motion, memory)
         if slopes:
             own = laws.derivatives[laws.derivatives_at[e] : laws.derivatives_at[e + 1]]
             own[:] = self.slopes(t, motion, memory).ravel()
 
     def ask(self, t: float, motion: Motion, memory: Array) -> Array:
-        """All that it says."""
-        begin, end = self.laws.answer_at[self.e : self.e + 2]
+        """The answer."""
         n, m, _ = self.law.sizes
-        flat = np.zeros(end - begin)
+        flat = np.zeros(self.answer.size)
         out = answer_of(flat, n, m)
         out.memory[:] = memory
         self.fill(t, motion, memory, out)

@@ -33,7 +33,7 @@ from numba.extending import intrinsic
 from rom.arguments import finite, shortened
 from rom.errors import ConfigError
 from rom.mbs.compiler.calls import called
-from rom.mbs.elements.family import Family, Hooks, Places, integers, starts
+from rom.mbs.elements.family import Family, Hold, Hooks, Places, integers, starts
 from rom.mbs.elements.law_calls import (
     DIFFERENCE_STEP,
     ENERGY_SIZE,
@@ -57,7 +57,7 @@ from rom.mbs.kernels.tables import (
     table,
 )
 from rom.mbs.parts.bodies import Marker
-from rom.mbs.parts.foreign import Entry, Function
+from rom.mbs.parts.foreign import Entry, Function, in_python
 from rom.mbs.parts.joints import Whole
 from rom.model import Array
 
@@ -74,6 +74,7 @@ class Law:
         outputs: names of its own outputs.
         stores: whether it accounts for its energy and its losses.
         compiled: entries in C with attribute ``address``, None where Python is asked.
+        every: from one sample to the next [s]; None if it is asked whenever the forces are.
     """
 
     function: Function
@@ -84,6 +85,7 @@ class Law:
     outputs: tuple[str, ...]
     stores: bool
     compiled: tuple[Entry | None, Entry | None]
+    every: float | None = None
 
     @property
     def sizes(self) -> tuple[int, int, int]:
@@ -107,6 +109,7 @@ def law(  # noqa: PLR0913  one keyword per property
     energy: bool = False,
     tangents: Any = None,
     compiled: bool | None = None,
+    every: Hold = None,
 ) -> None:
     """Force law of your own between any markers, see `rom.mbs.elements.laws`.
 
@@ -125,9 +128,11 @@ def law(  # noqa: PLR0913  one keyword per property
         tangents: likewise, of the derivatives; None for differences.
         compiled: True to insist, False to leave it to Python, None for what works. Compiled laws
             see outer variables as they were when the law was added.
+        every: see `rom.mbs.elements.motors.motor`.
 
     Raises:
-        ConfigError: for no marker, or a law that cannot be compiled although it must.
+        ConfigError: for no marker, or a law that cannot be compiled although it must, or is to be
+            sampled and in C.
     """
     given = {"function": function, "tangents": function if tangents is None else tangents}
     for what, one in given.items():
@@ -138,23 +143,31 @@ def law(  # noqa: PLR0913  one keyword per property
     if not markers:
         raise ConfigError(f"law {name!r} needs a marker to act on.")
     sizes = len(markers), kept.size, len(outputs)
-    called = entries(name, (function, tangents), (numbers.size, *sizes), compiled)
-    element = Law(function, tangents, markers, numbers, kept, tuple(outputs), energy, called)
+    asked = in_python(f"law {name!r}", function, every, compiled)
+    called = entries(name, (function, tangents), (numbers.size, *sizes), asked)
+    element = Law(function, tangents, markers, numbers, kept, tuple(outputs), energy, called, every)
     self.add(name, element, LAWS_FAMILY)
 
 
 def user_force(
-    self: Whole, name: str, function: Callable[..., Any], m1: Marker, m2: Marker | None = None
+    self: Whole,
+    name: str,
+    function: Callable[..., Any],
+    m1: Marker,
+    m2: Marker | None = None,
+    *,
+    every: Hold = None,
 ) -> None:
     """Force law in Python: ``function(t, a)`` or ``function(t, a, b)``.
 
     ``a`` and ``b`` are `rom.mbs.elements.law_calls.MarkerMotion`. The function returns
     (force, moment) in the world that act on the first marker; the reaction, at the same place in
     space, acts on the body of the second one, so that momentum is conserved whatever the law.
+    ``every`` as of `rom.mbs.elements.motors.motor`.
     """
     markers = (m1,) if m2 is None else (m1, m2)
     none = np.zeros(0)
-    element = UserForce(function, None, markers, none, none, (), False, (None, None))
+    element = UserForce(function, None, markers, none, none, (), False, (None, None), every)
     self.add(name, element, LAWS_FAMILY)
 
 

@@ -9,7 +9,8 @@ import numpy.typing as npt
 
 from rom.arguments import finite, number
 from rom.errors import ConfigError
-from rom.mbs.elements.family import OUTSIDE, Family, Places, integers, on_joint, rows_of
+from rom.mbs.elements.family import OUTSIDE, Family, Hold, Places, integers, on_joint, rows_of
+from rom.mbs.elements.law_calls import MarkerMotion
 from rom.mbs.kernels.algebra import (
     add,
     cross,
@@ -33,6 +34,7 @@ from rom.mbs.kernels.element_calls import residuals, tangents
 from rom.mbs.kernels.markers import own_block
 from rom.mbs.kernels.tables import Array1, Array2, Array3, Index1, Scratch2, Table, table
 from rom.mbs.parts.bodies import Marker, Part
+from rom.mbs.parts.foreign import Function
 from rom.mbs.parts.joints import Whole
 from rom.mbs.parts.signals import TimeFunction
 from rom.model import Array
@@ -54,20 +56,54 @@ class Load:
     function: TimeFunction | None
 
 
-def force(self: Whole, name: str, marker: Marker, vector: Any, *, frame: Axes = "world") -> None:
-    """Force at a marker: (3,) [N], or a function of time; axes of the world or the marker."""
-    _load(self, name, marker, vector, frame, FORCE_WORLD)
+def force(
+    self: Whole,
+    name: str,
+    marker: Marker,
+    vector: Any,
+    *,
+    frame: Axes = "world",
+    every: Hold = None,
+) -> None:
+    """Force at a marker: (3,) [N], or a function of time; axes of the world or the marker.
+
+    With ``every`` a `user_force` samples the function, and holds the force in the world.
+    """
+    _load(self, name, marker, vector, (FORCE_WORLD + (frame == "body"), every))
 
 
-def torque(self: Whole, name: str, marker: Marker, vector: Any, *, frame: Axes = "world") -> None:
-    """Torque at a marker: (3,) [N m], or a function of time; axes of world or marker."""
-    _load(self, name, marker, vector, frame, TORQUE_WORLD)
+def torque(
+    self: Whole,
+    name: str,
+    marker: Marker,
+    vector: Any,
+    *,
+    frame: Axes = "world",
+    every: Hold = None,
+) -> None:
+    """Torque at a marker: (3,) [N m], or a function of time; all as of `force`."""
+    _load(self, name, marker, vector, (TORQUE_WORLD + (frame == "body"), every))
 
 
-def _load(self: Whole, name: str, marker: Marker, vector: Given, frame: str, kind: int) -> None:
-    function = vector if callable(vector) else None
+def _load(self: Whole, name: str, marker: Marker, vector: Given, how: tuple[int, Hold]) -> None:
+    function, (kind, every) = vector if callable(vector) else None, how
+    if function and every:
+        self.user_force(name, at_marker(function, kind), marker, every=every)
+        return
     constant = np.zeros(3) if function else finite(f"vector of {name}", vector, (3,))
-    self.add(name, Load(marker, kind + (frame == "body"), constant, function), LOADS_FAMILY)
+    self.add(name, Load(marker, kind, constant, function), LOADS_FAMILY)
+
+
+def at_marker(function: TimeFunction, kind: int) -> Function:
+    """A load over time as the function of a `user_force`."""
+
+    def answer(t: float, at: MarkerMotion) -> Array:
+        wrench, x = np.zeros((2, 3)), np.asarray(function(t), dtype=float)
+        part = 0 if kind in (FORCE_WORLD, FORCE_BODY) else 1
+        wrench[part] = at.axes @ x if kind in (FORCE_BODY, TORQUE_BODY) else x
+        return wrench
+
+    return answer
 
 
 @table

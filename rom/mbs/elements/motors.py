@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from rom.mbs.elements.family import Hooks
+from rom.mbs.elements.family import Hold, Hooks
 from rom.mbs.elements.formulas.programs import Formula
 from rom.mbs.elements.joint_forces import MOTOR, NO_PROGRAM, Motors, joint_family
 from rom.mbs.elements.law_calls import DIFFERENCE_STEP
 from rom.mbs.kernels.work import Work
-from rom.mbs.parts.foreign import Entry, Function, ask, compiled_function, numbers
+from rom.mbs.parts.foreign import Entry, Function, ask, compiled_function, in_python, numbers
 from rom.mbs.parts.joints import Coordinate, Row, Whole, coordinate_of
 from rom.model import Array
 
@@ -24,6 +24,7 @@ class Motor:
     row: Row
     law: Callable[[float, float, float], float]
     compiled: Entry | None
+    every: float | None = None  # from one sample to the next [s]
 
     @property
     def laws(self) -> tuple[tuple[float, ...], ...]:
@@ -38,7 +39,7 @@ class Motor:
     @property
     def program(self) -> Array:
         """(n,) length and program of a formula; none of other laws."""
-        if not isinstance(self.law, Formula):
+        if self.compiled is None or not isinstance(self.law, Formula):
             return NO_PROGRAM
         return np.concatenate([[1.0 + self.law.program.size], self.law.program])
 
@@ -51,6 +52,7 @@ def motor(
     *,
     coordinate: Coordinate | None = None,
     compiled: bool | None = None,
+    every: Hold = None,
 ) -> None:
     """Motor with a control law: force [N] or torque [N m] = ``law(t, coordinate, rate)``.
 
@@ -64,18 +66,21 @@ def motor(
             `rom.mbs.elements.formulas.programs.Formula`.
         coordinate: "angle" or "displacement"; None for the only or the first one.
         compiled: True to insist, False to leave it to Python, None for what works.
+        every: time between two samples [s], if the law, of Python, is called once for each, from
+            the start of a motion on, and its value held. It may be an object that remembers.
 
     Raises:
         ConfigError: if the joint has no such coordinate, or the law is no function of three
             numbers, or cannot be compiled although it must.
     """
     row = coordinate_of(self.joints, joint, coordinate, "motor")
-    self.add(name, Motor(joint, row, law, _compiled(name, law, compiled)), MOTORS_FAMILY)
+    entry = _compiled(name, law, in_python(f"law of motor {name!r}", law, every, compiled))
+    self.add(name, Motor(joint, row, law, entry, every), MOTORS_FAMILY)
 
 
 def _compiled(name: str, law: Function, wanted: bool | None) -> Entry | None:
     """The law as a C function of three doubles, None when it is left to Python."""
-    if isinstance(law, Formula):
+    if isinstance(law, Formula) and wanted is not False:
         return law
     make = numba.cfunc("float64(float64, float64, float64)")
     hint = "Use numbers and NumPy functions of numbers only, or compiled=False."
@@ -90,6 +95,11 @@ class MotorLaw:
     law: Function
     k: int
     motors: Motors
+
+    @property
+    def answer(self) -> Array:
+        """Its force."""
+        return self.motors.answer[self.k : self.k + 1]
 
     def apply(self, W: Work, t: float, *, slopes: bool) -> None:
         """Set the force of the motor, and its slopes."""

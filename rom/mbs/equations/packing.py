@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from rom.errors import ConfigError, ModelError, warn
-from rom.mbs.elements.family import Asked, Family, Places, integers, rows_of, starts
+from rom.mbs.elements.family import Asked, Family, Places, Sampled, integers, rows_of, starts
 from rom.mbs.equations import renewal
 from rom.mbs.equations.graph import graph_of
 from rom.mbs.kernels.element_calls import ROW_WORDS
@@ -194,8 +194,11 @@ class Packed:
         return self.markers[marker]
 
 
-def pack(mechanism: Mechanism, *, whole: bool = False) -> Packed:
-    """Write the mechanism into arrays; whole matrices if wanted, else blocks where they pay."""
+def pack(mechanism: Mechanism, *, whole: bool = False, sampled: bool = False) -> Packed:
+    """Write the mechanism into arrays; whole matrices if wanted, else blocks where they pay.
+
+    Laws that are ``sampled`` are refused where no samples are taken.
+    """
     parts = tuple(mechanism.parts.values())
     if not parts:
         raise ConfigError("the mechanism has no body.", hint="Use add_rigid or add_flexible.")
@@ -208,10 +211,19 @@ def pack(mechanism: Mechanism, *, whole: bool = False) -> Packed:
     _doubt_place(mechanism, _length(parts))
     families = mechanism.families()
     elements = {family: family.pack(found, places) for family, found in families.items()}
-    for event in mechanism.events.values():
-        for joint, row in event.coordinates:
+    for one in (*mechanism.events.values(), *mechanism.fmus.values()):
+        for joint, row in one.coordinates:
             places.coordinate(joint, row)
-    followed = len(places.coordinates)
+    asked = tuple(
+        law
+        for family, table in elements.items()
+        for law in places.asked(family, families[family], table)
+    )
+    held = [law.name for law in asked if isinstance(law, Sampled)]
+    if held and not sampled:
+        text = f"{held[0]!r} is sampled: only in rom.simulate does it take values."
+        hint = "Leave out every=, or rom.release a state of the mechanism without it into this one."
+        raise ConfigError(text, hint=hint)
     markers = _markers(mechanism, handles, R)
     system = System(
         STAGE_ADDRESSES,
@@ -237,11 +249,7 @@ def pack(mechanism: Mechanism, *, whole: bool = False) -> Packed:
         sum(part.mass for part in parts),
         elements,
         {family: tuple(found) for family, found in families.items()},
-        tuple(
-            law
-            for family, ask, table in hooked(elements, "asked")
-            for law in ask(families[family], table, followed)
-        ),
+        asked,
         places,
     )
 

@@ -7,6 +7,7 @@ import numpy as np
 from scipy.sparse import bmat, csr_matrix, diags, identity
 
 from rom.errors import ModelError, SolverError, warn
+from rom.mbs.elements.family import apply_laws
 from rom.mbs.equations.equations import evaluate, linearize_constraints, rates, retract
 from rom.mbs.equations.linear_solve import factorise_bordered, gradient_times, solve_bordered
 from rom.mbs.equations.packing import Packed
@@ -79,6 +80,8 @@ def _start(packed: Packed, signal: Array, t: float, asked: tuple[bool, bool]) ->
     _check_start(packed, W, q, rank)
     v = fitting_velocity(packed, W, q, packed.v, led=True)
     closed, lam = _told(packed, W, q, v, *asked), np.zeros(W.value.size)
+    evaluate(packed.system, W, q, v)
+    apply_laws(packed.asked, W, t)
     return with_accelerations(packed, W, State(t, q, v, v * 0, lam, rank, closed=closed))
 
 

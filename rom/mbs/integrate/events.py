@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from scipy.optimize import brentq
@@ -39,12 +39,21 @@ class Instant(Whereabouts):
         self.mechanism, self.packed = mechanism, packed
         self.W = workspace(packed.seen, len(packed.signals))
         self.t, self.q, self.v = 0.0, packed.q, packed.v
+        self.lam: Array | None = None  # (m,) multipliers, where they are known
         self._fresh = False
 
-    def set(self, t: float, q: Array, v: Array) -> "Instant":
+    def set(self, t: float, q: Array, v: Array) -> Self:
         """Look at another time t [s], with q (n_q,) and v (n,) in units of `State`."""
         self.t, self.q, self.v, self._fresh = t, q, v, False
         return self
+
+    def reaction(self, name: str) -> Array:
+        """(6,) load of a joint or drive, as of a solution; an event does not know it."""
+        if self.lam is None:
+            raise ConfigError(f"the reaction in {name!r} is not known between two steps.")
+        self._evaluate()
+        rows = self.packed.rows_of(name)
+        return np.asarray(-self.lam[rows] @ self.W.g[rows, 6:12])
 
     def joint(self, name: str, coordinate: str | None = None) -> tuple[float, float]:
         """A joint coordinate, whole turns counted, and its rate [rad or m, per second].

@@ -15,13 +15,13 @@ from rom.mbs.integrate.consistent_start import assembled, fitting_velocity
 from rom.mbs.integrate.dop853 import first_steps
 from rom.mbs.integrate.events import Noted
 from rom.mbs.integrate.run import Record, standing_at
+from rom.mbs.integrate.sampling import begin_sampled, steps_up_to_sample
 from rom.mbs.integrate.step_memory import (
     RUN_COUNTS,
     accelerated,
-    begin,
     recall,
-    remember,
     signals_at,
+    state_of,
 )
 from rom.mbs.kernels import work as entry
 from rom.mbs.kernels.system import ANGLE
@@ -43,7 +43,7 @@ LOSING_SHARE = 0.9  # of half a turn a step, from where on one that gains speed 
 def run_implicit(record: Record, W: Work, state: State) -> None:
     """Fill the record by generalised-alpha or BDF with steps of one length."""
     forces, settings = record.packed.asked, record.settings
-    step, state = begin(record, W, state, forces, settings.h)
+    step, state = begin_sampled(record, W, state, forces)
     alpha.advance.link()
     record.start(state, step.work)
     record.clock = perf_counter()
@@ -54,7 +54,8 @@ def run_implicit(record: Record, W: Work, state: State) -> None:
 
     def take(most: int) -> int:
         nonlocal done
-        taken = _chunk(record, W, step, forces, done, min(most, n - done))
+        ahead = steps_up_to_sample(record, W, step, forces, min(most, n - done))
+        taken = _chunk(record, W, step, forces, done, ahead)
         done += taken
         return taken
 
@@ -153,7 +154,7 @@ def _retrace(record: Record, W: Work, mark: Mark, forces: Laws, chunk: Chunk) ->
         return
     if answer == alpha.CONVERGED:
         record.counts = counts(step)
-        record.reach(_state(record, W, step), noted)
+        record.reach(state_of(record, W, step), noted)
 
 
 def _advance(record: Record, W: Work, step: Step, forces: Laws, chunk: Chunk) -> int:
@@ -193,15 +194,7 @@ def _note(
         record.keep(t[saved], *(x[: t.size][chosen] for x in out))
     if t.size:
         record.t = float(t[-1])
-    record.reach(_state(record, W, step))
-
-
-def _state(record: Record, W: Work, step: Step) -> State:
-    """The last state with all that the next step depends on."""
-    q, v, a, lam = (x.copy() for x in (step.q, step.v, step.vd, step.lam))
-    memory = remember(record.settings, W, step, int(step.count[entry.STEPS]))
-    before = None if record.settings.method == "bdf" else step.a.copy()
-    return State(record.t, q, v, a, lam, record.final.rank, before, W.base.copy(), memory)
+    record.reach(state_of(record, W, step))
 
 
 def failed_step(record: Record, W: Work, step: Step, answer: int, t: float) -> SolverError:

@@ -10,7 +10,7 @@ import numpy as np
 
 from rom.errors import ConfigError
 from rom.mbs.equations.packing import Packed
-from rom.mbs.integrate.events import Noted, Watch
+from rom.mbs.integrate.events import Instant, Noted, Watch
 from rom.mbs.integrate.keeping import Keeping, until
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.signals import Span, padded, sampled
@@ -197,6 +197,7 @@ class Record:
     noted: Noted | None = None  # what the watch knew at ``final``
     keeping: Keeping | None = None  # folder that is written while the run lasts
     assemble: bool = False  # see `rom.simulate`
+    seen: Instant | None = None  # what FMUs are told of
 
     def keep(self, t: Array | float, *arrays: Array) -> None:
         """Add saved instants."""

@@ -18,6 +18,7 @@ from rom.mbs.integrate.events import Instant, Watch
 from rom.mbs.integrate.fixed_step import run_implicit
 from rom.mbs.integrate.keeping import Keeping, digests_of
 from rom.mbs.integrate.run import Record, Settings
+from rom.mbs.integrate.sampling import check_samples
 from rom.mbs.kernels.work import workspace
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.results.audit import warn_of_failures, warn_of_limits
@@ -133,8 +134,9 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
     if state is None and dt is not None and dt > (t_end - t_start) * (1 + 1e-9):
         text = f"dt = {dt:g} s is longer than the motion of {t_end - t_start:g} s"
         raise ConfigError(f"{text}; take a shorter one, or none: steps are then chosen by rtol.")
-    settings, packed = settings.after(state), pack(mechanism)
+    settings, packed = settings.after(state), pack(mechanism, sampled=True)
     settings.check_room(packed)
+    check_samples(packed, settings)
     record = Record(
         mechanism, packed, settings, perf_counter(), given=state, keeping=keep, assemble=assemble
     )
@@ -169,7 +171,7 @@ def release(mechanism: Mechanism, state: State, *, assemble: bool = False) -> St
         ConfigError: if the bodies are not the same.
         ModelError: naming a joint that is open there.
     """
-    packed = pack(mechanism)
+    packed = pack(mechanism, sampled=True)
     check_state(state, packed, joints=False)
     placed = replace(packed, q=state.q.copy(), v=state.v.copy())
     return initial_state(placed, state.t, assemble=assemble)

@@ -138,6 +138,14 @@ def remember(settings: Settings, W: Work, step: Step, steps: int) -> Memory:
     return Memory(settings.kind, settings.h, origin, settings.taken + steps, arrays)
 
 
+def state_of(record: Record, W: Work, step: Step) -> State:
+    """The last state with all that the next step depends on."""
+    q, v, a, lam = (x.copy() for x in (step.q, step.v, step.vd, step.lam))
+    memory = remember(record.settings, W, step, int(step.count[entry.STEPS]))
+    before = None if record.settings.method == "bdf" else step.a.copy()
+    return State(record.t, q, v, a, lam, record.final.rank, before, W.base.copy(), memory)
+
+
 def recall(memory: Memory, W: Work, step: Step) -> None:
     """Go on with the factorisation of an earlier run that `fits`."""
     step.a[:], step.psi[:] = memory.arrays["before"], memory.arrays["psi"]

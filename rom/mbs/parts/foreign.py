@@ -46,6 +46,13 @@ def ask(what: str, t: float, function: Function, *arguments: object) -> Any:
         raise _failure(what, t, error) from error
 
 
+def in_python(what: str, law: Function, every: float | None, wanted: bool | None) -> bool | None:
+    """Whether a law is to be compiled: one that is sampled is not, and cannot be in C."""
+    if every and not callable(law):
+        raise ConfigError(f"{what} is in C; every = {every:g} s is for laws of Python.")
+    return False if every else wanted
+
+
 def compiled_function(
     what: str, law: Function, make: Callable[[Function], Entry], wanted: bool | None, hint: str
 ) -> Entry | None:

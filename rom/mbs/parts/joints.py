@@ -117,6 +117,7 @@ class Whole(Protocol):
     joints: dict[str, Joint]
     drives: dict[str, Any]
     elements: dict[str, tuple[Any, Any]]  # {name: (family, element)}
+    fmus: dict[str, object]
 
     @property
     def spherical(self) -> Callable[[str, Marker, Marker], None]:
@@ -125,6 +126,10 @@ class Whole(Protocol):
     @property
     def law(self) -> Callable[..., None]:
         """Add a law of force, see `rom.mbs.elements.laws.law`."""
+
+    @property
+    def user_force(self) -> Callable[..., None]:
+        """Add a force, see `rom.mbs.elements.laws.user_force`."""
 
     def add(self, name: str, element: object, family: Any) -> None:
         """Enter an element."""

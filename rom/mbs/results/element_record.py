@@ -128,8 +128,7 @@ def _alone(
     packed, places = solution.packed, solution.packed.places.copy()
     family, element = solution.mechanism.elements[name]
     table = family.pack({name: element}, places)
-    ask, c = family.hooks.asked, len(places.coordinates)
-    asked = () if ask is None else tuple(ask({name: element}, table, c))
+    asked = tuple(places.asked(family, {name: element}, table))
     system = packed.system.replace(elements=np.array([family.row(table)], dtype=np.int64))
     W = workspace(system, len(places.signals))
     signals = np.concatenate([solution.signals, _sampled(solution, places)], axis=1)

@@ -340,6 +340,9 @@ JOIN = {  # of the methods of a mechanism
     "axis2": lambda mech: Y,
     "inertia": lambda mech: (1, 1, 1),
     "at": lambda mech: (0, 0, 0),
+    "file": lambda mech: "none.fmu",
+    **dict.fromkeys(("inputs", "outputs"), lambda mech: {}),
+    "every": lambda mech: 1e-2,
     "body": lambda mech: body(),
 }
 JOIN_OWN = {

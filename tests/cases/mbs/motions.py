@@ -38,6 +38,22 @@ def pendulum(angle=1.2):
     return mech
 
 
+def sampled():
+    """A block on a spring under a sampled controller, which adds up places and counts its calls."""
+    mech = Mechanism(gravity=(0, 0, 0))
+    mech.add_rigid("block", mass=2, inertia=(1, 1, 1), at=(0, 0, 0), velocity=(1, 0, 0))
+    mech.prismatic("guide", "ground", "block", axis=(1, 0, 0))
+    mech.spring_damper("spring", mech.ground.marker((-1, 0, 0)), "block", stiffness=300.0)
+
+    def servo(t, parameters, motion, memory, out):
+        x, v = motion.position[0, 0], motion.velocity[0, 0]
+        out.memory[:] = memory[0] + x, memory[1] + 1
+        out.force[0, 0] = -400 * (x - 0.3) - 12 * v - 0.5 * out.memory[0]
+
+    mech.law("servo", servo, "block", memory=[0.0, 0.0], every=1e-2)
+    return mech
+
+
 def swing():
     """A flexible body on a ball joint, pulled by a load and by a law in Python."""
     mech = Mechanism()

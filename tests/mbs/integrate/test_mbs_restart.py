@@ -9,10 +9,11 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import rom
 from cases.mbs.mechanisms import simeon_crank, simulate_quietly, slider_crank
-from cases.mbs.motions import PARTS, four_links, swing, wound_drive
+from cases.mbs.motions import PARTS, four_links, sampled, swing, wound_drive
 from cases.refusals import refuses
 
 CASES = [(swing, 1e-2), (simeon_crank, 1e-5), (wound_drive, 1e-3), (four_links, 1e-3)]
+CASES.append((sampled, 2.5e-3))
 PLAIN = [{}, {"rho_inf": 0.6}, {"method": "bdf"}]
 # drives need their rates for these: differences end where a run ends
 RATED = [{"stabilised": True}, {"method": "bdf", "order": 1}, {"method": "bdf", "order": 5}]
