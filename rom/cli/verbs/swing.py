@@ -52,6 +52,7 @@ EXAMPLES = """\
   rom swing part.step --hinge radius:0.006 --E 200GPa -o out
   rom swing part.step --hinge 0,0,0.01 --material aluminium --gravity 0,0,-9.81 --film -o out
 """
+USUAL = "steel"
 TABLE_FILE = "motion.csv"
 N_STEPS, N_INSTANTS = 240, 4  # of the motion; shown in the picture
 FAR_SWING = 1.18034  # period of a swing from the horizontal over that of a small one
@@ -66,7 +67,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "face it hangs on: a name, or in a .step file what --face takes, e.g. 12 or radius:0.006"
     )
     option(parser, "--hinge FACE", about, str)
-    add_solid(parser, usual="steel")
+    add_solid(parser, usual=USUAL)
     option(parser, "-m --modes", "modes kept (default: as many as are needed)", count)
     about = "[m/s^2], default 9.81 along the axis most across the part and across its bore"
     option(parser, "--gravity", about, ACCELERATION)
@@ -117,8 +118,8 @@ def _faces(args: argparse.Namespace) -> Answer:
     from rom.cli.verbs import mesh
 
     drawn, is_step = claim(args) / "faces.png", args.file.suffix.lower() in (".step", ".stp")
-    asked = {"faces": is_step, "save": drawn, "E": None, "nu": None, "rho": None}
-    found = mesh.run(argparse.Namespace(**vars(args) | asked))
+    asked = vars(args) | {"faces": is_step, "save": drawn, "E": None, "nu": None, "rho": None}
+    found = mesh.run(argparse.Namespace(**asked))
     bores = [face["number"] for face in found.data.get("faces", ()) if face["kind"] == "cylinder"]
     hinge = str((*bores, 1)[0]) if is_step else next(iter(found.data["interfaces"]), "FACE")
     command = " ".join(
@@ -164,7 +165,7 @@ def _reduced(
     from rom.reduction.interfaces.connection import found
     from rom.workflow import reduce
 
-    full = model(args.file, material=material(args), **how)
+    full = model(args.file, material=material(args, USUAL), **how)
     (at,), rigid = found(full, [hinge]), mass_properties(full)
     log.info("%s: %d dofs, %.4g kg", args.file, full.n_dofs, rigid.mass)
     swing = planned(rigid, at.origin, args.gravity, args.t_end, axis=at.axis)

@@ -6,7 +6,7 @@ readers of decks, which broken files can crash, run in a process of their own (`
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -35,6 +35,7 @@ from rom.fe.mesh.validate import checked
 from rom.model import Array, Index
 from rom.names import check_known, check_text
 from rom.readable import check_readable
+from rom.units import UnitSystem, unit_system
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -66,6 +67,7 @@ def read_mesh(  # noqa: PLR0913  limits and trust beside what is read
     parameters: Mapping[str, Any] | None = None,
     faces: Mapping[str, Any] | None = None,
     scale: float = 1.0,
+    units: str = "SI",
     order: int | None = None,
     trust: bool = False,
     time_limit: float | None = None,
@@ -86,6 +88,8 @@ def read_mesh(  # noqa: PLR0913  limits and trust beside what is read
             `rom.fe.mesh.picks`, or a list of these; lengths in metres. {"face": "every"} names
             all faces without a name "face 1", "face 2", ...
         scale: factor on all coordinates, e.g. 1e-3 for a mesh drawn in millimetres.
+        units: unit system of a mesh or deck, with the materials a deck says: "SI", "mm-t-s" (N,
+            MPa), "mm-kg-ms" or "in-lbf-s"; in place of a scale.
         order: degree of the geometry when the mesh is made here: 1 for straight edges, 2 for
             curved ones, with nodes amid edges and faces on the surface; None for 2 where the body
             is curved and 1 where it is not.
@@ -107,6 +111,10 @@ def read_mesh(  # noqa: PLR0913  limits and trust beside what is read
     path = Path(path)
     with in_file(path):
         request = _request(path, parameters, scale, trust=trust, faces=faces, order=order)
+        unit = unit_system(units)
+        if units != "SI" and (scale != 1.0 or is_geometry(path)):
+            text = f"units={units!r} is for finished meshes, in place of scale="
+            raise ConfigError(f"{text}; a .geo takes scale=, a .step says its unit.")
     reader = request["reader"]
     files = {path}  # a deck may include others
     if reader in INCLUDES:
@@ -117,10 +125,12 @@ def read_mesh(  # noqa: PLR0913  limits and trust beside what is read
     provenance = {
         "path": str(path),
         "sha256": _digest(*sorted(files)),
-        "scale": scale,
+        "scale": scale * unit.length,
         **notes["provenance"],
     }
-    mesh, remarks = _solid(arrays, notes, provenance, scale), notes["warnings"]
+    mesh, remarks = _solid(arrays, notes, provenance, scale * unit.length), notes["warnings"]
+    if mesh.materials:
+        mesh = replace(mesh, **_in_si(mesh.materials, unit, scale))
     if reader in GEOMETRIES:
         mesh, straightened = straighten(repair(mesh))
         mesh = mesh if order else without_middles(mesh)
@@ -247,8 +257,18 @@ def _solid(arrays: Arrays, notes: Notes, provenance: Notes, scale: float) -> Sol
             name: scaled(from_plain(Axis, axis), scale)
             for name, axis in notes.get("axes", {}).items()
         },
+        materials=notes.get("materials", {}),
+        unread=notes.get("unread", {}),
         faces=tuple(scaled(from_plain(Face, face), scale) for face in notes.get("faces", ())),
     )
+
+
+def _in_si(said: dict[str, Sequence[float]], unit: UnitSystem, scale: float) -> Notes:
+    """Materials of a deck by region, or why their units are not known."""
+    found = {k: (E * unit.pressure, nu, rho * unit.density) for k, (E, nu, rho) in said.items()}
+    text = f"scale={scale:g} is of lengths alone and says no unit of the materials of the deck."
+    why = {"message": text, "hint": "Give units= instead, e.g. 'mm-t-s', or other materials."}
+    return {"materials": found} | ({} if scale == 1.0 else {"unread": why})
 
 
 def _tables(arrays: Arrays, kind: str, names: Sequence[str]) -> dict[str, Index]:
@@ -289,6 +309,11 @@ def _request(
 def is_geometry(path: str | Path) -> bool:
     """Whether a file is meshed here, and is no finished mesh."""
     return READERS.get(Path(path).suffix.lower()) in GEOMETRIES
+
+
+def is_deck(path: str | Path) -> bool:
+    """Whether a file may say what its regions are made of."""
+    return READERS.get(Path(path).suffix.lower()) in INCLUDES
 
 
 def _check_request(request: Request, scale: float) -> None:

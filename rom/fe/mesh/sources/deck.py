@@ -1,6 +1,7 @@
 """What Abaqus and Nastran decks share: node order, faces by number, faces by node set."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -29,6 +30,16 @@ def only_type(found: Iterable[str]) -> str:
         text = f"the cells are of several types, {types}; one mesh needs one type"
         raise MeshError(f"{text}; mesh all volumes with tetrahedra, or all with hexahedra.")
     return types[0]
+
+
+def of_materials(
+    read: Callable[..., dict[str, list[float]]], *deck: object
+) -> dict[str, dict[str, Any]]:
+    """Materials of the regions, or why they are not read, which hurts where nobody gives others."""
+    try:
+        return {"materials": read(*deck)}
+    except FileFormatError as error:
+        return {"unread": {"message": error.message, "where": error.where, "hint": error.hint}}
 
 
 def outer_facets(cells: Index, cell_type: str, n_points: int) -> Index:
