@@ -57,6 +57,7 @@ READERS = {
     ".bdf": "nastran",
     ".nas": "nastran",
     ".dat": "nastran",
+    ".fem": "nastran",
 }
 
 
@@ -263,7 +264,7 @@ def _solid(arrays: Arrays, notes: Notes, provenance: Notes, scale: float) -> Sol
     )
 
 
-def _in_si(said: dict[str, Sequence[float]], unit: UnitSystem, scale: float) -> Notes:
+def _in_si(said: Mapping[str, Sequence[float]], unit: UnitSystem, scale: float) -> Notes:
     """Materials of a deck by region, or why their units are not known."""
     found = {k: (E * unit.pressure, nu, rho * unit.density) for k, (E, nu, rho) in said.items()}
     text = f"scale={scale:g} is of lengths alone and says no unit of the materials of the deck."
