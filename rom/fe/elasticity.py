@@ -23,6 +23,7 @@ from rom.fe.forms.stress import Stresses
 from rom.fe.jit import compiling
 from rom.fe.mesh.cad import Axis
 from rom.fe.mesh.curving import without_middles
+from rom.fe.mesh.quality import layer_doubt
 from rom.fe.mesh.solid import Notes, SolidMesh
 from rom.fe.operators.aij import symmetric, without_zeros, wrapped
 from rom.fe.operators.foreseen import automatic
@@ -179,6 +180,7 @@ def _models(
     from rom.fe.mesh.validate import checked
 
     parsed(options.solver)  # before a mesh is made in vain
+    whole("degree", options.degree, 1, HIGHEST_DEGREE)
     install_abort_hook(options.comm)  # whatever a script does next, one failing rank must end all
     parts: dict[str, SolidMesh] = {}
 
@@ -187,6 +189,9 @@ def _models(
             mesh_options["order"] = 1
         mesh = read_mesh(options.path, parameters=options.parameters, **mesh_options)
         mesh = without_middles(mesh)
+        if doubt := layer_doubt(mesh, options.degree):
+            warn(doubt)
+            mesh = replace(mesh, warnings=(*(mesh.warnings or ()), doubt))
         material = mesh.solids() if options.material is None else options.material
         if options.material is not None and mesh.materials:
             log.warning("material= takes the place of the materials that %s says.", options.path)
