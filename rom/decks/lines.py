@@ -18,7 +18,6 @@ CURES = {  # words of cards that are not read -> what to do instead
     r"CONM|MASS|NSM|INERTIA": "Masses: rom.Attachment adds them to the model; take them out.",
     r"CBUSH|CELAS|CDAMP|SPRING|DASHPOT": "Springs stand between bodies, in the mechanism.",
     r"PSHELL|PCOMP|SHELL SECTION": "Shells without this card only name faces of the solid.",
-    r"\bMAT(ERIAL|T?\d|H)|ELASTIC|DENSITY|without": "Materials: give material={region: ...}.",
     r"COPY|GEN|FILL|INSTANCE|PART|SYSTEM": "Write all nodes and elements out, in one system.",
 }
 

@@ -152,8 +152,8 @@ def _text(data: Data) -> str:
             "parameters: " + ", ".join(f"{k} = {x:.6g}" for k, x in data["parameters"].items())
         )
     if regions:
-        columns = ("region", "cells", "volume [m^3]", "E [Pa]", "nu", "rho [kg/m^3]")
-        parts += ["", table(columns[: len(regions[0])], regions)]
+        heads = ("region", "cells", "volume [m^3]", "E [Pa]", "nu", "rho [kg/m^3]")
+        parts += ["", table(heads[: len(regions[0])], regions)]
     header = ("interface", "facets", "nodes", "middle [m]", "axis")
     if faces or not listed:
         parts += ["", table(header, faces) if faces else "no interface"]

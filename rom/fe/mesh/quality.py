@@ -1,5 +1,6 @@
 """Shape of the cells: volume, Jacobian, aspect ratio."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import chain, repeat
 
@@ -109,7 +110,7 @@ def layer_doubt(mesh: SolidMesh, degree: int) -> str:
     )
     skin[faces.corners[faces.count == 1]] = True
     thin &= skin[mesh.corners].all(axis=1)
-    volumes, outer = _volumes(mesh), faces.of_cell[thin]
+    volumes, outer = cell_volumes(mesh), faces.of_cell[thin]
     x = mesh.points[faces.corners[outer[faces.count[outer] == 1]]]
     sides = np.cross(x[:, 2] - x[:, 0], x[:, -1] - x[:, 1])  # by diagonals, or two edges
     share = volumes[thin].sum() / volumes.sum()
@@ -129,6 +130,12 @@ def layer_doubt(mesh: SolidMesh, degree: int) -> str:
     )
 
 
+def cell_volumes(mesh: SolidMesh) -> Array:
+    """(m,) volumes of the cells [m^3], exact for curved ones too."""
+    at, weights = mesh.kind.quadrature
+    return _over_blocks(mesh.points, mesh.cells, mesh.kind.gradients(at), lambda x: x @ weights)
+
+
 def _sampled(mesh: SolidMesh) -> Array:
     """(m,) smallest determinant at the quadrature points."""
     kind = mesh.kind
@@ -139,20 +146,17 @@ def _sampled(mesh: SolidMesh) -> Array:
     return smallest
 
 
-def _volumes(mesh: SolidMesh) -> Array:
-    """(m,) volumes of the cells with straight edges."""
-    kind, corners = mesh.kind.straight, mesh.corners
-    at, weights = kind.quadrature
-    blocks = (corners[i : i + BLOCK_SIZE] for i in range(0, len(corners), BLOCK_SIZE))
-    found = [jacobians(mesh.points[block], kind.gradients(at)) @ weights for block in blocks]
-    return np.concatenate(found)
-
-
 def _smallest(points: Array, cells: Index, kind: CellType) -> Array:
     at, _ = kind.quadrature
     gradients = kind.gradients(at[:1] if kind.name == "tet4" else at)
+    return _over_blocks(points, cells, gradients, lambda x: x.min(axis=1))
+
+
+def _over_blocks(
+    points: Array, cells: Index, gradients: Array, of: Callable[[Array], Array]
+) -> Array:
     blocks = [cells[i : i + BLOCK_SIZE] for i in range(0, len(cells), BLOCK_SIZE)]
-    found = [jacobians(points[block], gradients).min(axis=1) for block in blocks]
+    found = [of(jacobians(points[block], gradients)) for block in blocks]
     return np.concatenate(found) if found else np.empty(0)
 
 

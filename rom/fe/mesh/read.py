@@ -6,7 +6,7 @@ readers of decks, which broken files can crash, run in a process of their own (`
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -129,9 +129,10 @@ def read_mesh(  # noqa: PLR0913  limits and trust beside what is read
         "scale": scale * unit.length,
         **notes["provenance"],
     }
-    mesh, remarks = _solid(arrays, notes, provenance, scale * unit.length), notes["warnings"]
-    if mesh.materials:
-        mesh = replace(mesh, **_in_si(mesh.materials, unit, scale))
+    if scale != 1.0 and "materials" in notes:
+        text = f"scale={scale:g} is of lengths alone and says no unit of the materials of the deck."
+        notes["unread"] = {"message": text, "hint": "Give units= instead, as 'mm-t-s', or others."}
+    mesh, remarks = _solid(arrays, notes, provenance, scale, unit), notes["warnings"]
     if reader in GEOMETRIES:
         mesh, straightened = straighten(repair(mesh))
         mesh = mesh if order else without_middles(mesh)
@@ -244,7 +245,10 @@ def to_dolfinx(
     return made, cell_tags, facet_tags
 
 
-def _solid(arrays: Arrays, notes: Notes, provenance: Notes, scale: float) -> SolidMesh:
+def _solid(
+    arrays: Arrays, notes: Notes, provenance: Notes, scale: float, unit: UnitSystem
+) -> SolidMesh:
+    scale *= unit.length
     return SolidMesh(
         points=arrays["points"] * scale,
         cells=arrays["cells"],
@@ -258,18 +262,13 @@ def _solid(arrays: Arrays, notes: Notes, provenance: Notes, scale: float) -> Sol
             name: scaled(from_plain(Axis, axis), scale)
             for name, axis in notes.get("axes", {}).items()
         },
-        materials=notes.get("materials", {}),
+        materials={
+            name: (E * unit.pressure, nu, rho * unit.density)
+            for name, (E, nu, rho) in notes.get("materials", {}).items()
+        },
         unread=notes.get("unread", {}),
         faces=tuple(scaled(from_plain(Face, face), scale) for face in notes.get("faces", ())),
     )
-
-
-def _in_si(said: Mapping[str, Sequence[float]], unit: UnitSystem, scale: float) -> Notes:
-    """Materials of a deck by region, or why their units are not known."""
-    found = {k: (E * unit.pressure, nu, rho * unit.density) for k, (E, nu, rho) in said.items()}
-    text = f"scale={scale:g} is of lengths alone and says no unit of the materials of the deck."
-    why = {"message": text, "hint": "Give units= instead, e.g. 'mm-t-s', or other materials."}
-    return {"materials": found} | ({} if scale == 1.0 else {"unread": why})
 
 
 def _tables(arrays: Arrays, kind: str, names: Sequence[str]) -> dict[str, Index]:

@@ -61,7 +61,7 @@ class SolidMesh:
         """{region: material} as the deck says; raises what keeps them from being read."""
         path = str(self.provenance.get("path", ""))
         if self.unread:
-            raise FileFormatError(**{"where": path} | self.unread)
+            raise FileFormatError(**self.unread | {"where": self.unread.get("where") or path})
         if missing := sorted(set(self.region_names.values()) - self.materials.keys()):
             text = f"the file says no material of the region {named(missing)}"
             raise ConfigError(

@@ -6,13 +6,12 @@ SPC and SPC1 cards by set number ("spc_7"), where they contain whole facets of t
 Every card is read, left aside because a free body does not need it, or refused by name.
 """
 
-from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 
 from rom.decks.bulk import POINTS, Card, cards, grids
-from rom.decks.lines import Unread, real
+from rom.decks.lines import Unread
 from rom.fe.mesh.cell_types import LOWER_EDGES, UPPER_EDGES, UPRIGHT_EDGES
 from rom.fe.mesh.solid import Read, packed
 from rom.fe.mesh.sources.deck import (
@@ -33,7 +32,7 @@ SKIN_CARDS = {"CTRIA3": 3, "CTRIA6": 3, "CQUAD4": 4, "CQUAD8": 4}  # corners
 LINES = ("CBAR",)  # without a property, as gmsh writes curves
 MESH_CARDS = {*POINTS, *SOLIDS, *SKIN_CARDS, "SPC", "SPC1"}
 SECTIONS, MATERIALS = ("PSOLID", "PLSOLID"), "MAT"
-OF_MAT1 = ("MAT1", "MATS1", "MATCID")  # with what a linear isotropic solid does not need
+OF_MAT1 = {"MAT1", "MATS1", "MATCID"}  # with what a linear isotropic solid does not need
 HARMLESS_CARDS = tuple("EIG TABLE SET1 SET3 PLOTEL ECHO".split())
 CONTRADICTION = 0.01  # of E, G and NU, from where Nastran warns
 # loads, supports, steps, and what a reduction there holds
@@ -63,7 +62,7 @@ def read(path: str) -> Read:
     names = {int(p): f"property_{p}" for p in np.unique(properties)}
     remarks = [*found[1], *remarks, *unused(ids, cells)]
     told = {"region_names": names, "warnings": remarks, "provenance": {"parameters": {}}}
-    told |= of_materials(_materials, found[0], solids)
+    told |= of_materials(_materials, found[0], list(names))
     return packed(points, cells, cell_type, properties, numbers, facets=facets, **told)
 
 
@@ -105,41 +104,29 @@ def _property(card: Card) -> int:
     return card.whole(1)
 
 
-def _materials(found: dict[str, list[Card]], solids: list[Card]) -> dict[str, list[float]]:
+def _materials(found: dict[str, list[Card]], properties: list[int]) -> dict[str, list[float]]:
     """{region: E, nu and rho} of the material of each property, in units of the deck."""
-    cells = {_property(card): card for card in reversed(solids)}
-    sections = _numbered(card for name in SECTIONS for card in found.get(name, ()))
-    others = [name for name in found if name.startswith(MATERIALS) and name not in OF_MAT1]
-    unlike = {card.whole(0): card for name in others for card in found[name]}
-    known, unread = _numbered(found.get("MAT1", ())), Unread()
-    factors = {card.text(1) for card in found.get("PARAM", ()) if card.text(0) == "WTMASS"}
+    sections = _numbered([card for name in SECTIONS for card in found.get(name, ())], properties)
+    used, unread = [card.whole(1) for card in sections], Unread()
+    for name in sorted(found.keys() - OF_MAT1):
+        for card in found[name]:
+            if name.startswith(MATERIALS) and card.whole(0) in used:
+                unread.add(name, card.place)
+    unread.refuse()
+    factors = {card.reals(1)[0] for card in found.get("PARAM", ()) if card.text(0) == "WTMASS"}
     if len(factors) > 1:
         raise found["PARAM"][0].wrong(f"WTMASS has the values {sorted(factors)}")
-    per_weight = real(factors.pop()) if factors else 1.0
-    numbers = {}
-    for number, cell in cells.items():
-        section = sections.get(number)
-        material = section.whole(1, 0) if section else 0
-        if section and material in known and material not in unlike:
-            numbers[f"property_{number}"] = _isotropic(known[material], per_weight)
-        elif section:
-            bad = unlike.get(material)
-            unread.add(bad.name if bad else f"{section.name} without MAT1", (bad or section).place)
-        else:
-            unread.add(f"{cell.name} without PSOLID", cell.place)
-    unread.refuse()
-    return numbers
+    solids = (_isotropic(card, *factors) for card in _numbered(found.get("MAT1", []), used))
+    return {f"property_{p}": numbers for p, numbers in zip(properties, solids, strict=True)}
 
 
-def _numbered(some: Iterable[Card]) -> dict[int, Card]:
-    found: dict[int, Card] = {}
-    for card in some:
-        if found.setdefault(card.whole(0), card) is not card:
-            raise card.wrong(f"{card.whole(0)} is defined twice")
-    return found
+def _numbered(some: list[Card], wanted: list[int]) -> list[Card]:
+    """The cards of these numbers, each there once."""
+    labels, name = np.array([card.whole(0) for card in some]), some[0].name if some else "MAT1"
+    return [some[k] for k in positions(labels, np.array(wanted), name)]
 
 
-def _isotropic(card: Card, per_weight: float) -> list[float]:
+def _isotropic(card: Card, per_weight: float = 1.0) -> list[float]:
     """E, nu and rho of a MAT1, of whose E, G and NU one may be missing."""
     E, G, nu, rho = card.reals(1, 2, 3, 4)
     if (E > 0) + (G > 0) + bool(card.text(3)) < 2:
