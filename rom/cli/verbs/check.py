@@ -36,10 +36,11 @@ OTHERS = (  # endings; words of which a line begins with one, if need be; what i
     (".inp", "*ELEMENT *INCLUDE", "a deck of Abaqus or CalculiX", *DECK),
     (".bdf .dat .pch .dmig", "DMIG", *MATRIX),
     (".op4 .mtx .mm .sti .mas", "", *MATRIX),
+    (".unv", "-1/2412", "a mesh of another program", *MESHED),
     (".unv .uff", "", "a vibration test", "rom update FAMILY {}"),
     (".json", "", "the record or the scene of a run", "rom report FOLDER"),
 )
-FIRST_WORDS = re.compile(r"^\s*([*$]?[A-Z]\w*)", re.MULTILINE)
+FIRST_WORDS = re.compile(r"^\s*([*$]?[A-Z]\w*|-1\s+2412\b)", re.MULTILINE)
 BODIES = (".npz", ".sid_fem")
 
 
@@ -81,7 +82,7 @@ def _kind(file: Path) -> tuple[str, ...]:
     rows = [row for row in OTHERS if ending in row[0].split()]
     if any(words for _, words, *_ in rows):
         text = file.read_bytes().decode("latin1")
-        found = set(FIRST_WORDS.findall(text.upper()))
+        found = {"/".join(word.split()) for word in FIRST_WORDS.findall(text.upper())}
     for _, words, *told in rows:
         if not words or found & set(words.split()):
             return tuple(told)

@@ -53,6 +53,7 @@ READERS = {
     ".step": "step",
     ".stp": "step",
     ".msh": "msh",
+    ".unv": "unv",
     ".inp": "abaqus",
     ".bdf": "nastran",
     ".nas": "nastran",
@@ -81,7 +82,8 @@ def read_mesh(  # noqa: PLR0913  limits and trust beside what is read
 
     Args:
         path: ``.geo`` gmsh geometry; ``.py`` file with ``build(gmsh, **parameters)``; ``.step``;
-            ``.msh`` 2.2 or 4.1; Abaqus ``.inp``; Nastran ``.bdf``.
+            ``.msh`` 2.2 or 4.1; ``.unv`` with groups of elements; Abaqus ``.inp``; Nastran
+            ``.bdf``.
         parameters: named values for a geometry: those with ``Name`` in a ``.geo``, the arguments of
             ``build``, or ``lc`` (element size [m]) for ``.step``.
         faces: surfaces to name in a ``.step``: a face number, a point (3) near the face, a box (6)
@@ -289,7 +291,9 @@ def _request(
     check_readable(path, LARGEST_FILE)
     reader = READERS.get(path.suffix.lower())
     if reader is None:
-        raise ConfigError(f"no reader for the suffix {path.suffix!r}; known are {sorted(READERS)}.")
+        text = f"no reader for the suffix {path.suffix!r}; known are {sorted(READERS)}."
+        hint = "Export the mesh with its named surfaces as .unv, .msh, .bdf or .inp."
+        raise ConfigError(text, hint=hint)
     request: Request = {
         "path": str(path.absolute()),
         "reader": reader,
