@@ -10,7 +10,7 @@ from rom.cli.options import (
     option,
     reading,
     require,
-    says_material,
+    solid_options,
     unique,
     verb_parsers,
 )
@@ -37,13 +37,6 @@ def add_matrices(parser: argparse.ArgumentParser) -> None:
     option(group, "--nodes FILE", ".inp, .bdf, .dat or .csv", Path)
     about = "nodes of an interface, e.g. pin=11-14,20; may be repeated"
     option(group, "--set NAME=LABELS", about, assignment)
-
-
-def solid_options(args: argparse.Namespace) -> dict[str, float | None]:
-    """What a geometry needs, and matrices and decks do not, by option."""
-    if args.mass is not None or says_material(args):
-        return {}
-    return {f"--{name}": getattr(args, name) for name in ("E", "nu", "rho")}
 
 
 def read_model(args: argparse.Namespace) -> "FEModel":

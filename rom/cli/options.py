@@ -233,20 +233,22 @@ def meshing(args: argparse.Namespace) -> Keywords:
     return {"trust": args.trust, "time_limit": args.time_limit, "memory_limit": memory}
 
 
-def says_material(args: argparse.Namespace) -> bool:
-    """Whether the file may say its material, and no option does."""
+def solid_options(args: argparse.Namespace) -> dict[str, float | None]:
+    """What a geometry needs, by option; matrices do not, nor a deck where nothing is given."""
     from rom.fe.mesh.read import is_deck
 
-    return is_deck(args.file) and args.E is args.nu is args.rho is None
+    found = {f"--{name}": getattr(args, name) for name in ("E", "nu", "rho")}
+    needless = is_deck(args.file) and set(found.values()) == {None}
+    return {} if needless or getattr(args, "mass", None) is not None else found
 
 
 def material(args: argparse.Namespace, usual: str = "") -> "Material | None":
     """The material the options ask for, if need be of a usual one; None for that of a deck."""
     from rom.model import Material
 
-    given = (args.E, args.nu, args.rho)
-    pairs = zip(given, SOLIDS.get(usual, given), strict=True)
-    return None if says_material(args) else Material(*(y if x is None else x for x, y in pairs))
+    given = tuple(solid_options(args).values())
+    pairs = zip(given, SOLIDS.get(usual, given), strict=False)
+    return Material(*(y if x is None else x for x, y in pairs)) if given else None
 
 
 def verb_parsers(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:

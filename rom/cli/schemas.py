@@ -113,16 +113,7 @@ VERBS: dict[str, Schema] = {
         box=each(each(number("[m]"), "lowest, highest [m]"), "extent along x, y, z"),
         volume=number("[m^3]"),
         regions=by_name(
-            record(
-                "a region",
-                optional=("E", "nu", "rho"),
-                cells=whole("number of cells"),
-                volume=number("[m^3]"),
-                E=number("as the deck says [Pa]"),
-                nu=number("likewise"),
-                rho=number("likewise [kg/m^3]"),
-            ),
-            "regions",
+            record("a region", cells=whole("number of cells"), volume=number("[m^3]")), "regions"
         ),
         interfaces=by_name(
             record(

@@ -126,10 +126,7 @@ def _text(data: Data) -> str:
         f"{name} {value}" if isinstance(value, int) else f"{name} {value:.3g}"
         for name, value in data["quality"].items()
     )
-    regions = [
-        (name, str(r["cells"]), *(f"{r[k]:.6g}" for k in ("volume", "E", "nu", "rho") if k in r))
-        for name, r in data["regions"].items()
-    ]
+    regions = [(name, str(r["cells"]), f"{r['volume']:.6g}") for name, r in data["regions"].items()]
     faces = [
         (
             name,
@@ -152,8 +149,7 @@ def _text(data: Data) -> str:
             "parameters: " + ", ".join(f"{k} = {x:.6g}" for k, x in data["parameters"].items())
         )
     if regions:
-        heads = ("region", "cells", "volume [m^3]", "E [Pa]", "nu", "rho [kg/m^3]")
-        parts += ["", table(heads[: len(regions[0])], regions)]
+        parts += ["", table(("region", "cells", "volume [m^3]"), regions)]
     header = ("interface", "facets", "nodes", "middle [m]", "axis")
     if faces or not listed:
         parts += ["", table(header, faces) if faces else "no interface"]

@@ -122,9 +122,9 @@ def _faces(args: argparse.Namespace) -> Answer:
     found = mesh.run(argparse.Namespace(**asked))
     bores = [face["number"] for face in found.data.get("faces", ()) if face["kind"] == "cylinder"]
     hinge = str((*bores, 1)[0]) if is_step else next(iter(found.data["interfaces"]), "FACE")
-    command = " ".join(
-        map(quote, ("rom", "swing", str(args.file), "--hinge", hinge, "-o", str(args.output)))
-    )
+    words = "rom", "swing", str(args.file), "--hinge", hinge, "-o", str(args.output)
+    units = ("--units", args.units) if args.units != "SI" else ()
+    command = " ".join(map(quote, (*words, *units)))
     text = f"{found.text}\n\n{drawn} shows them. Choose one for --hinge, for example\n  {command}"
     data = {"files": [str(drawn)], "faces": found.data.get("faces", []), "next": [command]}
     return replace(found, data=data, text=text)

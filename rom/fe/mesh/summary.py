@@ -35,7 +35,6 @@ def summary(mesh: SolidMesh) -> Notes:
             name: {
                 "cells": int((mesh.regions == tag).sum()),
                 "volume": float(volumes[mesh.regions == tag].sum()),
-                **dict(zip(("E", "nu", "rho"), mesh.materials.get(name, ()), strict=False)),
             }
             for tag, name in mesh.region_names.items()
         },
