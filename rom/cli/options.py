@@ -246,9 +246,9 @@ def material(args: argparse.Namespace, usual: str = "") -> "Material | None":
     """The material the options ask for, if need be of a usual one; None for that of a deck."""
     from rom.model import Material
 
-    given = tuple(solid_options(args).values())
-    pairs = zip(given, SOLIDS.get(usual, given), strict=False)
-    return Material(*(y if x is None else x for x, y in pairs)) if given else None
+    given = args.E, args.nu, args.rho
+    pairs = zip(given, SOLIDS.get(usual, given), strict=True)
+    return Material(*(y if x is None else x for x, y in pairs)) if solid_options(args) else None
 
 
 def verb_parsers(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
