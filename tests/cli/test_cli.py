@@ -25,8 +25,7 @@ from rom.cli.answer import Answer, table, to_json
 from rom.cli.main import main
 from rom.cli.parser import build_parser, verb_modules
 from rom.cli.verbs import check
-from rom.fe.mesh.quality import cell_volumes
-from rom.fe.mesh.summary import vtk_cells
+from rom.fe.mesh.summary import cell_volumes, vtk_cells
 from rom.io.fields.vtu import grid
 
 STEEL = ("--E", "210e9", "--nu", "0.3", "--rho", "7850")

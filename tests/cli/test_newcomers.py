@@ -149,11 +149,10 @@ def answer(capsys, *words):
 def test_any_file_is_told_what_it_is_with_the_next_command(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     for text, name, what, command in (
-        ("ISO-1", "part.step", "CAD", "rom swing part.step"),
+        ("$MeshFormat", "a.msh", "", "rom mesh a.msh"), ("ISO", "a.stp", "CAD", "rom swing a.stp"),
         ("CHEXA,1", "a.bdf", "Nastran", "rom mesh a.bdf --units mm-t-s"),
         ("ctetra 1", "a.dat", "Nastran", "rom mesh a.dat --units mm-t-s"),
         ("*Element, a", "a.inp", "Abaqus", "rom mesh a.inp --units mm-t-s"),
-        ("$MeshFormat", "a.msh", "mesh", "rom mesh a.msh"),
         ("    -1\n  2412\n", "a.unv", "mesh", "rom mesh a.unv"),
         ("DMIG,K", "K.dat", "matrix", "rom modes K.dat --mass MASS --nodes NODES"),
         ("x", "test.unv", "vibration test", "rom update FAMILY test.unv"),

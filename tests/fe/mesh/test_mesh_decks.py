@@ -14,15 +14,7 @@ from cases.long import few
 from cases.refusals import refuses
 from cases.solid import STEEL
 from rom.decks.bulk import cards
-from rom.errors import (
-    ConfigError,
-    FileFormatError,
-    MeshError,
-    ResourceError,
-    RomError,
-    RomWarning,
-    TagError,
-)
+from rom.errors import FileFormatError, MeshError, ResourceError, RomError, RomWarning, TagError
 from rom.fe.mesh import child
 from rom.fe.mesh.cell_types import CELL_TYPES
 from rom.fe.mesh.read import read_mesh
@@ -366,28 +358,25 @@ test_what_is_wrong_with_a_card_is_named = changed(
     error=RomError,
 )  # fmt: skip
 SAID = f"$\nBEGIN BULK\n{CUBE}PSOLID,1,4\nMAT1,4,210000.,,0.3,7.85-9\n"
-WEIGHED = "30.45792+6,,0.3,0.283599\nPARAM,WTMASS,2.59008-3"  # psi, lbf/in^3, over 386.089 in/s^2
-OF_RING = (
-    RING.replace("C3D8", "C3D8, ELSET=e")
-    + """*MATERIAL, NAME=STEEL\n*ELASTIC\n210., 0.3
-*DENSITY\n7.85e-6,\n*SOLID SECTION, ELSET=e, MATERIAL=Steel\n"""
+# psi, lbf/in^3, over 386.089 in/s^2 before the bulk data
+WEIGHED = (
+    f" param, wtmass, 2.59008-3\n{SAID.replace('210000.,,0.3,7.85-9', '3.045792+7,,.3,.283599')}"
 )
+OF_RING = f"""{RING.replace("C3D8", "C3D8, ELSET=e")}*MATERIAL, NAME=STEEL\n*ELASTIC\n210., 0.3
+*DENSITY\n7.85e-6,\n*SOLID SECTION, ELSET=e, MATERIAL=Steel\n"""
 
 
 @pytest.mark.parametrize(("units", "name", "text"), [
-    ("mm-t-s", "a.bdf", SAID),
+    ("mm-t-s", "a.bdf", SAID), ("mm-kg-ms", "a.inp", OF_RING.replace("*NODE\n 99, 0., 0., 5.\n", "")),
     ("mm-t-s", "a.bdf", SAID.replace("210000.,,0.3", "210000.,80769.2308,")),
     ("mm-t-s", "a.bdf", SAID.replace("210000.,,0.3", ",80769.2308,0.3")),
-    ("in-lbf-s", "a.bdf", SAID.replace("210000.,,0.3,7.85-9", WEIGHED)),
-    ("in-lbf-s", "a.bdf", " param, wtmass, 2.59008-3\n"
-     + SAID.replace("210000.,,0.3,7.85-9", WEIGHED.partition("\n")[0])),
-    ("mm-kg-ms", "a.inp", OF_RING.replace("*NODE\n 99, 0., 0., 5.\n", "")),
+    ("in-lbf-s", "a.bdf", WEIGHED), ("in-lbf-s", "a.bdf", WEIGHED.replace("BEGIN BULK\n", "")),
 ])  # fmt: skip
 def test_materials_of_decks_are_read_in_their_units(units, name, text, tmp_path):
     (tmp_path / name).write_text(text)
     (steel,) = read_mesh(tmp_path / name, units=units).solids().values()
     assert_allclose((steel.E, steel.nu, steel.rho), (210e9, 0.3, 7850.0), rtol=2e-5)
-    refuses(ConfigError, "scale", read_mesh, tmp_path / name, units=units, scale=2.0)
+    refuses(rom.ConfigError, "scale", read_mesh, tmp_path / name, units=units, scale=2.0)
     refuses(FileFormatError, "unit", read_mesh(tmp_path / name, scale=0.1).solids)
 
 
@@ -403,10 +392,10 @@ test_materials_that_are_not_ours_are_refused_by_card = changed(
 test_laws_that_are_not_ours_are_refused_by_keyword = changed(
     OF_RING, "a.inp", lambda path: read_mesh(path, units="mm-kg-ms").solids(),
     ("*ELASTIC", "*ELASTIC, TYPE=ANISO", r"\*ELASTIC, TYPE=ANISO \(1"),
-    ("210., 0.3", "210., 0.3\n200., 0.3, 100.", r"\*ELASTIC, 2 rows \(1"),
+    (".3\n*D", ".3\n200., 0.3, 100.\n*D", r"\*ELASTIC, 2 rows \(1"),
     ("*DENSITY\n7.85e-6,\n", "", r"without \*DENSITY \(1"),
     ("*DENSITY", "*MATERIAL, NAME=Steel\n*ELASTIC\n1.\n*DENSITY", "twice"),
-    ("*SOLID SECTION, ELSET=e, MATERIAL=Steel", "", ConfigError, "'e'"),
+    ("*SOLID SECTION, ELSET=e, MATERIAL=Steel", "", rom.ConfigError, "'e'"),
 )  # fmt: skip
 
 
@@ -427,9 +416,8 @@ def test_a_deck_alone_makes_a_cantilever(tmp_path, caplog):
     for k, row in enumerate((mesh.cells + 1).astype(str), 1):
         bulk += [f"CHEXA,{k},{1 + k % 2}," + ",".join(row[:6]), "," + ",".join(row[6:])]
     root = ",".join(str(k + 1) for k in np.unique(mesh.facets["root"]))
-    bulk += [f"SPC1,7,123,{root}", "PSOLID,1,4", "PSOLID,2,5"]
-    bulk += ["MAT1,4,210000.,,0.3,7.85-9", "MAT1,5,210000.,,0.3,3.85-9"]
-    (tmp_path / "a.bdf").write_text("\n".join(bulk))
+    bulk += [f"SPC1,7,123,{root}\nPSOLID,1,4\nPSOLID,2,5\nMAT1,4,210000.,,0.3,7.85-9"]
+    (tmp_path / "a.bdf").write_text("\n".join([*bulk, "MAT1,5,210000.,,0.3,3.85-9"]))
     for given, rho in ({}, 5850.0), ({"material": STEEL}, 7850.0):
         model = rom.fe.model(tmp_path / "a.bdf", units="mm-t-s", **given)
         assert model.mass() == pytest.approx(0.0015 * rho, rel=1e-9)
