@@ -223,10 +223,9 @@ def _materials(deck: Deck) -> dict[str, list[float]]:
     for section in deck.sections:
         own = laws.get(section.options.get("MATERIAL", "").upper(), {})
         for name in ("ELASTIC", "DENSITY"):
-            if name not in own:
-                unread.add(f"*SOLID SECTION without *{name}", section.place)
-            elif kind := _unlike(own[name]):
-                unread.add(f"*{name}, {kind}", own[name].place)
+            kind = _unlike(own[name]) if name in own else f"*SOLID SECTION without *{name}"
+            if kind:
+                unread.add(kind, own.get(name, section).place)
         if not unread:
             elastic = own["ELASTIC"].reals(0, 0, 1)
             numbers[section.option("ELSET")] = [*elastic, *own["DENSITY"].reals(0, 0)]
@@ -235,11 +234,11 @@ def _materials(deck: Deck) -> dict[str, list[float]]:
 
 
 def _unlike(block: Block) -> str:
-    """What tells a law from one of linear isotropic solids, or nothing."""
-    if not block.options.get("TYPE", "ISO").upper().startswith("ISO"):
-        return f"TYPE={block.options['TYPE']}"
-    odd = ", ".join(sorted(block.options.keys() - LAWS[block.keyword]))
-    return odd or f"{len(block.rows)} rows" * (len(block.rows) != 1)
+    """The keyword, with what tells it from one of linear isotropic solids; or nothing."""
+    kind, odd = block.options.get("TYPE", "ISO"), sorted(block.options.keys() - LAWS[block.keyword])
+    odd += [f"TYPE={kind}"] * (not kind.upper().startswith("ISO"))
+    odd += [f"{len(block.rows)} rows"] * (len(block.rows) != 1)
+    return ", ".join([f"*{block.keyword}", *odd]) if odd else ""
 
 
 def _facets(
