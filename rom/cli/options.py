@@ -134,7 +134,7 @@ NOT_GIVEN: dict[Kind | None, Keywords] = {
 
 def add_geometry(parser: argparse.ArgumentParser) -> None:
     """The file and how to read it."""
-    parser.add_argument("file", type=Path, help=".geo, .py, .step, .msh, .inp or .bdf")
+    parser.add_argument("file", type=Path, help=".geo, .py, .step, .msh, .unv, .inp or .bdf")
     about = "parameter of the geometry, e.g. lc=4e-3; may be repeated"
     option(parser, "-p --parameter NAME=VALUE", about, assignment)
     about = (

@@ -56,7 +56,7 @@ def model(
     """Finite element model of the solid in a geometry or mesh file.
 
     Args:
-        path: ``.geo``, ``.py``, ``.step``, ``.msh``, ``.inp`` or ``.bdf``, see
+        path: ``.geo``, ``.py``, ``.step``, ``.msh``, ``.unv``, ``.inp`` or ``.bdf``, see
             `rom.fe.mesh.read.read_mesh`.
         material: `Material`, `Orthotropic`, or {region name: material}; needless where a deck says
             its own, whose place it takes.
