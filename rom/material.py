@@ -216,9 +216,9 @@ def _solid_doubt(solid: Material | Orthotropic) -> str:
         return ""
     meant = [name for name, unit in SYSTEMS.items() if _is_stiff(solid, unit)]
     kind = type(solid).__name__
-    return (
-        f"{message} Units of {meant[0]}? {kind}.from_units({meant[0]!r}, …)." if meant else message
-    )
+    system = meant[0] if meant else ""
+    cure = f" Units of {system}? {kind}.from_units({system!r}, …), of a deck units={system!r}."
+    return message + cure * bool(meant)
 
 
 def _is_stiff(solid: Material | Orthotropic, unit: UnitSystem) -> bool:

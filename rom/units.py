@@ -42,6 +42,7 @@ SYSTEMS = {
         UnitSystem("SI", 1.0, 1.0, 1.0),
         UnitSystem("mm-t-s", 1e-3, 1e3, 1.0),  # N, MPa: the habit of Abaqus and Nastran users
         UnitSystem("mm-kg-ms", 1e-3, 1.0, 1e-3),  # kN, GPa: the habit of crash users
+        UnitSystem("in-lbf-s", 0.0254, 4.4482216152605 / 0.0254, 1.0),  # psi, lbf s^2/in^4
     )
 }
 

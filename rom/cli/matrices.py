@@ -4,7 +4,16 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rom.cli.options import assignment, material, option, reading, require, unique, verb_parsers
+from rom.cli.options import (
+    assignment,
+    material,
+    option,
+    reading,
+    require,
+    solid_options,
+    unique,
+    verb_parsers,
+)
 from rom.errors import ConfigError
 from rom.names import is_whole, named
 
@@ -18,7 +27,7 @@ MOST_NODES = 10_000_000  # in a range
 
 
 def add_matrices(parser: argparse.ArgumentParser) -> None:
-    """Mass, nodes and units; the file of the verb is then the stiffness."""
+    """Mass and nodes; the file of the verb is then the stiffness."""
     group = parser.add_argument_group(
         "matrices of another program",
         "FILE is then the stiffness: .mtx, .mm, .sti, .op4, .bdf, .dat, .pch or .dmig, with :NAME "
@@ -28,20 +37,13 @@ def add_matrices(parser: argparse.ArgumentParser) -> None:
     option(group, "--nodes FILE", ".inp, .bdf, .dat or .csv", Path)
     about = "nodes of an interface, e.g. pin=11-14,20; may be repeated"
     option(group, "--set NAME=LABELS", about, assignment)
-    option(group, "--units", "SI (default), mm-t-s or mm-kg-ms", str)
-
-
-def solid_options(args: argparse.Namespace) -> dict[str, float | None]:
-    """What a geometry needs and matrices do not, by option."""
-    names = ("E", "nu", "rho") if args.mass is None else ()
-    return {f"--{name}": getattr(args, name) for name in names}
 
 
 def read_model(args: argparse.Namespace) -> "FEModel":
     """The model that options ask for, of a geometry or of matrices."""
     if args.mass is not None:
         return read_matrices(args)
-    given = [f"--{name}" for name in ("nodes", "set", "units") if getattr(args, name)]
+    given = [f"--{name}" for name in ("nodes", "set") if getattr(args, name)]
     if given:
         raise ConfigError(f"{given[0]} needs --mass FILE: it is for matrices.")
     hint = "Or --material steel; for matrices of another program --mass and --nodes instead."
@@ -72,7 +74,7 @@ def read_matrices(args: argparse.Namespace) -> "FEModel":
         source(args.mass),
         nodes=args.nodes,
         interfaces=_sets(args, list(dict.fromkeys(names))),
-        units=args.units or "SI",
+        units=args.units,
     )
 
 

@@ -12,7 +12,7 @@ from rom.arguments import NotNegative, Number, Positive, Quantity
 from rom.errors import ConfigError
 from rom.material import SOLIDS
 from rom.names import check_once, is_whole
-from rom.units import in_si
+from rom.units import SYSTEMS, in_si
 
 if TYPE_CHECKING:
     from rom.model import Material
@@ -153,10 +153,12 @@ def add_geometry(parser: argparse.ArgumentParser) -> None:
 
 def add_file(parser: argparse.ArgumentParser) -> None:
     """The file and its parameters."""
-    parser.add_argument("file", type=Path, help=".geo, .py, .step, .msh, .inp or .bdf")
+    parser.add_argument("file", type=Path, help=".geo, .py, .step, .msh, .unv, .inp or .bdf")
     about = "parameter of the geometry, e.g. lc=4e-3; may be repeated"
     option(parser, "-p --parameter NAME=VALUE", about, assignment)
     option(parser, "--unite", "connect the solids of a .step file where they touch")
+    about = "of a deck and its materials, a mesh or matrices, in place of --scale (default SI)"
+    option(parser, "--units", about, str, default="SI", choices=tuple(SYSTEMS))
 
 
 def add_meshing(parser: argparse.ArgumentParser) -> None:
@@ -182,12 +184,11 @@ class Named(argparse.Action):
 
 def add_solid(parser: argparse.ArgumentParser, usual: str | None = None) -> None:
     """Numbers of an elastic solid, one by one or by a name, if need be a usual one."""
-    E, nu, rho = SOLIDS.get(str(usual), (None,) * 3)
-    about = "E, nu and rho of it" + (f" (default {usual})" if usual else "")
+    about = "E, nu and rho of it" + (f" (default {usual}, or as a deck says)" if usual else "")
     option(parser, "--material", about, str, choices=sorted(SOLIDS), action=Named)
-    option(parser, "--E", "Young's modulus [Pa], or as 210GPa", PRESSURE, default=E)
-    option(parser, "--nu", "Poisson's ratio", number, default=nu)
-    option(parser, "--rho", "density [kg/m^3], or as 7.85g/cm^3", DENSITY, default=rho)
+    option(parser, "--E", "Young's modulus [Pa], or as 210GPa", PRESSURE)
+    option(parser, "--nu", "Poisson's ratio", number)
+    option(parser, "--rho", "density [kg/m^3], or as 7.85g/cm^3", DENSITY)
 
 
 def add_interfaces(parser: argparse.ArgumentParser) -> None:
@@ -206,6 +207,7 @@ def reading(args: argparse.Namespace) -> Keywords:
         "parameters": unique([*pairs, *[("unite", 1.0)] * args.unite], "-p"),
         "faces": faces(args.face),
         "scale": args.scale,
+        "units": args.units,
         "order": args.order,
         **meshing(args),
     }
@@ -236,11 +238,22 @@ def meshing(args: argparse.Namespace) -> Keywords:
     return {"trust": args.trust, "time_limit": args.time_limit, "memory_limit": memory}
 
 
-def material(args: argparse.Namespace) -> "Material":
-    """The material the options ask for."""
+def solid_options(args: argparse.Namespace) -> dict[str, float | None]:
+    """What a geometry needs, by option; matrices do not, nor a deck where nothing is given."""
+    from rom.fe.mesh.read import is_deck
+
+    found = {f"--{name}": getattr(args, name) for name in ("E", "nu", "rho")}
+    needless = is_deck(args.file) and set(found.values()) == {None}
+    return {} if needless or getattr(args, "mass", None) is not None else found
+
+
+def material(args: argparse.Namespace, usual: str = "") -> "Material | None":
+    """The material the options ask for, if need be of a usual one; None for that of a deck."""
     from rom.model import Material
 
-    return Material(E=args.E, nu=args.nu, rho=args.rho)
+    given = args.E, args.nu, args.rho
+    pairs = zip(given, SOLIDS.get(usual, given), strict=True)
+    return Material(*(y if x is None else x for x, y in pairs)) if solid_options(args) else None
 
 
 def verb_parsers(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:

@@ -85,6 +85,7 @@ class Component(Described):
             for name, value in geometry.get("parameters", {}).items()
         }
         how = {"faces": geometry.get("faces", {}), "scale": scale, "order": geometry.get("order")}
+        how["units"] = geometry["units"]
         return geometry["file"], {"parameters": parameters} | how | self.meshing
 
     def model(self) -> "FEModel":
@@ -118,8 +119,12 @@ class Component(Described):
         how |= {"interfaces": kinds, "name": self.name}
         return reduce(model or self.model(), nonlinear=self.nonlinear(), **how)
 
-    def material(self) -> "Solid | dict[str, Solid]":
-        """`Material`, `Orthotropic`, or a dictionary of them by region."""
+    def material(self) -> "Solid | dict[str, Solid] | None":
+        """`Material`, `Orthotropic`, or a dictionary of them by region; None for that of a deck."""
+        from rom.fe.mesh.read import is_deck
+
+        if "material" not in self.values and is_deck(self._section("geometry")["file"]):
+            return None
         solids = self._section("material")
         if "regions" in solids:
             return {

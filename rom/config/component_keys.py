@@ -79,8 +79,10 @@ INTERFACE = Either(Text(), Variants(KINDS))
 TABLE = Table("A component.", (
     Key("name", Text(), "Name of the body; that of the file if missing."),
     Key("geometry", Table("The solid as a geometry or mesh; needs FEniCSx.", (
-        Key("file", FilePath(), "`.geo`, `.py`, `.step`, `.msh`, `.inp` or `.bdf`.", ...),
+        Key("file", FilePath(), "`.geo`, `.py`, `.step`, `.msh`, `.unv`, `.inp` or `.bdf`.", ...),
         Key("unit", Text(LENGTHS), "Length unit of its coordinates; a `.step` knows its own.", "m"),
+        Key("units", Text(tuple(SYSTEMS)), "Unit system of a deck, with the materials it says; in "
+            "place of a unit.", "SI"),
         Key("degree", Whole(1, 3), "Degree of the displacement, 1 to 3.", 2),
         Key("order", Whole(1, 2), "Degree of the cells' edges: 1 straight, 2 curved; 2 where the "
             "geometry is curved if missing."),
@@ -104,7 +106,8 @@ TABLE = Table("A component.", (
         Key("sets", Named(Quantity("1", ((None,),)), "labels"),
             "Labels of the nodes of an interface, where the `.inp` has no set of its name."),
     )), "The solid as matrices of another program."),
-    Key("material", Solids(), "What it is made of; by region where there are several."),
+    Key("material", Solids(), "What it is made of; by region where there are several. A deck "
+        "may say it."),
     Key("interfaces", Named(INTERFACE, "interfaces"),
         "Surfaces through which it touches others, and their kinds."),
     Key("attachments", Named(Declared(

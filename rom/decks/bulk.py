@@ -24,6 +24,7 @@ INCLUDE_PATTERN = re.compile(
 BEGIN_PATTERN, END_PATTERN = (
     re.compile(p, re.IGNORECASE) for p in (r"\s*BEGIN(\s+BULK)?\s*(\$|$)", r"ENDDATA")
 )
+PARAM_PATTERN = re.compile(r"\s*PARAM\s*,", re.IGNORECASE)
 POINTS = ("GRID", "GRDSET", "CORD1R", "CORD1C", "CORD1S", "CORD2R", "CORD2C", "CORD2S")
 Number = TypeVar("Number", int, float)
 PER_LINE = 8  # fields of a line, of 8 characters each or 4 of 16, behind the name
@@ -64,14 +65,15 @@ class Card:
 def cards(path: str | Path) -> Iterator[Card]:
     """All cards of the bulk data of a file and those it includes, continuations joined.
 
-    What stands before BEGIN BULK is left out; without that line, the file is bulk data alone.
+    What stands before BEGIN BULK is left out, but for PARAM; without that line, the file is bulk
+    data alone.
     """
     path = Path(path)
     bulk = not any(BEGIN_PATTERN.match(line) for _, line in lines(path, INCLUDE_PATTERN))
     card = Card("", [], (path, 0))
     for place, line in lines(path, INCLUDE_PATTERN):
         line = line.partition("$")[0].rstrip()
-        if not bulk or not line:
+        if not line or not (bulk or PARAM_PATTERN.match(line)):
             bulk = bulk or BEGIN_PATTERN.match(line) is not None
             continue
         if END_PATTERN.match(line):

@@ -23,6 +23,7 @@ from rom.fe.forms.stress import Stresses
 from rom.fe.jit import compiling
 from rom.fe.mesh.cad import Axis
 from rom.fe.mesh.curving import without_middles
+from rom.fe.mesh.quality import layer_doubt
 from rom.fe.mesh.solid import Notes, SolidMesh
 from rom.fe.operators.aij import symmetric, without_zeros, wrapped
 from rom.fe.operators.foreseen import automatic
@@ -34,6 +35,7 @@ from rom.model import Attachment, FEModel, Index, Material, Orthotropic
 from rom.names import check_known
 
 log = logging.getLogger("rom")
+Solids = Material | Orthotropic | Mapping[str, Material | Orthotropic]
 WHOLE_REGION = "solid"  # name of the only region of a mesh without named regions
 HIGHEST_DEGREE = 3  # of the displacement
 SOME_COORDINATES, SOME_MODES = 12, 20  # of two stiff interfaces, for the time of a small model
@@ -43,7 +45,7 @@ SOME_COORDINATES, SOME_MODES = 12, 20  # of two stiff interfaces, for the time o
 def model(
     path: str | Path,
     *,
-    material: Material | Orthotropic | Mapping[str, Material | Orthotropic],
+    material: Solids | None = None,
     degree: int = 2,
     parameters: dict[str, float] | None = None,
     attachments: Sequence[Attachment] = (),
@@ -54,9 +56,10 @@ def model(
     """Finite element model of the solid in a geometry or mesh file.
 
     Args:
-        path: ``.geo``, ``.py``, ``.step``, ``.msh``, ``.inp`` or ``.bdf``, see
+        path: ``.geo``, ``.py``, ``.step``, ``.msh``, ``.unv``, ``.inp`` or ``.bdf``, see
             `rom.fe.mesh.read.read_mesh`.
-        material: `Material`, `Orthotropic`, or {region name: material}.
+        material: `Material`, `Orthotropic`, or {region name: material}; needless where a deck says
+            its own, whose place it takes.
         degree: polynomial degree of the displacement, 1 to 3; 2 unless you know better.
         parameters: {name: value} of the geometry's parameters, in the units of the geometry.
         attachments: point masses and rigid bodies carried by interfaces.
@@ -67,7 +70,7 @@ def model(
             "iterative": multigrid, with little memory; that no mode is missed is then shown by
             random loads, with the probability in ``provenance["stages"]``.
         comm: the ranks that share the model.
-        mesh_options: ``scale``, ``faces``, ``order``, ``trust``, ``time_limit`` and
+        mesh_options: ``scale``, ``units``, ``faces``, ``order``, ``trust``, ``time_limit`` and
             ``memory_limit`` of `rom.fe.mesh.read.read_mesh`. Cells are curved where the geometry
             is; straight with ``order=1`` or ``degree=1``.
 
@@ -109,7 +112,7 @@ def pieces(  # noqa: PLR0913  those of `model`, and how to cut
     *,
     n: int | None = None,
     axis: Any = None,
-    material: Material | Orthotropic | Mapping[str, Material | Orthotropic],
+    material: Solids | None = None,
     degree: int = 2,
     parameters: dict[str, float] | None = None,
     attachments: Sequence[Attachment] = (),
@@ -158,7 +161,7 @@ class _Options:
     """What `model` and `pieces` are asked for."""
 
     path: str | Path
-    material: Material | Orthotropic | Mapping[str, Material | Orthotropic]
+    material: Solids | None
     degree: int
     parameters: dict[str, float] | None
     attachments: tuple[Attachment, ...]
@@ -177,6 +180,7 @@ def _models(
     from rom.fe.mesh.validate import checked
 
     parsed(options.solver)  # before a mesh is made in vain
+    whole("degree", options.degree, 1, HIGHEST_DEGREE)
     install_abort_hook(options.comm)  # whatever a script does next, one failing rank must end all
     parts: dict[str, SolidMesh] = {}
 
@@ -185,11 +189,17 @@ def _models(
             mesh_options["order"] = 1
         mesh = read_mesh(options.path, parameters=options.parameters, **mesh_options)
         mesh = without_middles(mesh)
-        by_region(options.material, {name: tag for tag, name in mesh.region_names.items()})
+        if doubt := layer_doubt(mesh, options.degree):
+            warn(doubt)
+            mesh = replace(mesh, warnings=(*(mesh.warnings or ()), doubt))
+        material = mesh.solids() if options.material is None else options.material
+        if options.material is not None and mesh.materials:
+            log.warning("material= takes the place of the materials that %s says.", options.path)
+        by_region(material, {name: tag for tag, name in mesh.region_names.items()})
         _check_attachments(options.attachments, mesh.facets)
         for name, part in division(mesh).items():
             parts[name] = part if part.warnings is not None else checked(part)
-        return {name: _Head.of(part) for name, part in parts.items()}
+        return {name: _Head.of(part, material) for name, part in parts.items()}
 
     heads = on_root(options.comm, head)
     return {name: _model(options, parts.pop(name, None), one) for name, one in heads.items()}
@@ -204,18 +214,21 @@ class _Head:
     warnings: tuple[str, ...]
     origin: Notes
     axes: dict[str, Axis]
+    material: Solids
 
     @classmethod
-    def of(cls, mesh: SolidMesh) -> "_Head":
+    def of(cls, mesh: SolidMesh, material: Solids) -> "_Head":
         regions = {name: tag for tag, name in mesh.region_names.items()}
-        return cls(regions, tuple(mesh.facets), mesh.warnings or (), mesh.provenance, mesh.axes)
+        return cls(
+            regions, tuple(mesh.facets), mesh.warnings or (), mesh.provenance, mesh.axes, material
+        )
 
 
 def _model(options: _Options, part: SolidMesh | None, head: _Head) -> FEModel:
     """The model of one mesh, which rank 0 holds."""
     from rom.fe.mesh.read import to_dolfinx
 
-    comm, material = options.comm, options.material
+    comm, material = options.comm, head.material
     with compiling(comm):
         mesh, cell_tags, facet_tags = to_dolfinx(part, comm)
     if isinstance(material, Mapping):
@@ -250,7 +263,7 @@ def assemble(
     cell_tags: Any = None,
     facet_tags: dict[str, Any] | None = None,
     *,
-    material: Material | Orthotropic | Mapping[str, Material | Orthotropic],
+    material: Solids,
     degree: int = 2,
     regions: dict[str, int] | None = None,
     attachments: Sequence[Attachment] = (),

@@ -89,7 +89,7 @@ def _fields(fields: Mapping[str, tuple[str, str]]) -> str:
 
 
 def component_text(
-    geometry: str,
+    geometry: Mapping[str, str],
     parameters: Mapping[str, float | str],
     faces: Mapping[str, str],
     hinge: str,
@@ -97,7 +97,7 @@ def component_text(
 ) -> str:
     """The component file of what is chosen: faces by name, E [GPa], nu, rho [kg/m^3]."""
     tables = {
-        "geometry": {"file": geometry},
+        "geometry": geometry,
         "geometry.parameters": parameters,
         "geometry.faces": {name: face for name, face in faces.items() if name != face},
         "material": {"E": f"{solid['E']:.12g} GPa", "nu": solid["nu"], "rho": solid["rho"]},

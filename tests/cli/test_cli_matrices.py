@@ -49,7 +49,6 @@ def test_a_body_of_matrices_with_labels(capsys, tmp_path):
 FAULTS = {
     "no nodes": (CALCULIX[:3], "--mass needs --nodes"),
     "nodes without mass": ((CALCULIX[0], *CALCULIX[3:]), "--nodes needs --mass"),
-    "units without mass": (("x.geo", "--units", "SI"), "--units needs --mass"),
     "material twice": ((*CALCULIX, "--rho", "1"), "--rho is for geometries"),
     "scale": ((*CALCULIX, "--scale", "1e-3"), "--scale is for geometries"),
     "no set": ((*NASTRAN, "--fixed", "root"), "which nodes are the interface 'root'?",

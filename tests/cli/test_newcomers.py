@@ -148,20 +148,24 @@ def answer(capsys, *words):
 
 def test_any_file_is_told_what_it_is_with_the_next_command(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    for name, what, command in (
-        ("part.step", "CAD", "rom swing part.step"), ("a.bdf", "mesh", "rom mesh a.bdf"),
-        ("K.op4", "matrix", "rom modes K.op4 --mass MASS --nodes NODES"),
-        ("test.unv", "vibration test", "rom update FAMILY test.unv"),
+    for text, name, what, command in (
+        ("$MeshFormat", "a.msh", "", "rom mesh a.msh"), ("ISO", "a.stp", "CAD", "rom swing a.stp"),
+        ("CHEXA,1", "a.bdf", "Nastran", "rom mesh a.bdf --units mm-t-s"),
+        ("ctetra 1", "a.dat", "Nastran", "rom mesh a.dat --units mm-t-s"),
+        ("*Element, a", "a.inp", "Abaqus", "rom mesh a.inp --units mm-t-s"),
+        ("    -1\n  2412\n", "a.unv", "mesh", "rom mesh a.unv"),
+        ("DMIG,K", "K.dat", "matrix", "rom modes K.dat --mass MASS --nodes NODES"),
+        ("x", "test.unv", "vibration test", "rom update FAMILY test.unv"),
     ):  # fmt: skip
-        Path(name).write_text("x")
+        Path(name).write_text(text)
         code, found = answer(capsys, "check", name)
         assert code == 0 and what in found["kind"] and command in found["next"]
     Path("bad.toml").write_text("[bodies.a]\nmas = 1\n")
     code, found = answer(capsys, "check", "bad.toml")
     assert code == 2 and "mas" in found["message"]
-    Path("none.step").write_text("")
-    assert answer(capsys, "check", "none.step")[0] == 3
-    assert answer(capsys, "check", "missing.step")[0] == 3
+    for name in "a.bdf a.inp a.msh a.step a.xyz a.op4".split():
+        Path(name).write_text("" if name == "a.op4" else "x")
+        assert answer(capsys, "check", name)[0] == answer(capsys, "check", "gone")[0] == 3
 
 
 def test_outputs_have_names_of_their_own(tmp_path, monkeypatch, capsys):

@@ -80,7 +80,7 @@ def test_news_go_to_one_page_and_the_server_ends_with_it(page):
 ])  # fmt: skip
 def test_what_cannot_be_chosen_is_refused_and_nothing_written(tmp_path, change, words):
     faces = {"face 7": {"fixed": False}}
-    chosen = Chosen(tmp_path / "part.step", {}, faces, tmp_path / "out" / "part.toml", [])
+    chosen = Chosen(tmp_path / "part.step", {}, {}, faces, tmp_path / "out" / "part.toml", [])
     (tmp_path / "out").mkdir()
     refuses(rom.ConfigError, words, chosen.save, CHOICE | change)
     assert not chosen.file.exists()

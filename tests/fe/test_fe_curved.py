@@ -25,8 +25,8 @@ pytestmark = [pytest.mark.fenicsx, pytest.mark.filterwarnings("ignore:linear tet
 from rom.fe.elasticity import assemble, model  # noqa: E402
 from rom.fe.forms import region  # noqa: E402
 from rom.fe.mesh.input_deck import input_deck  # noqa: E402
+from rom.fe.mesh.quality import cell_volumes  # noqa: E402
 from rom.fe.mesh.read import read_mesh, to_dolfinx  # noqa: E402
-from rom.fe.mesh.summary import cell_volumes  # noqa: E402
 
 HEAD = """
 SetFactory("OpenCASCADE");

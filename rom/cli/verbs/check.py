@@ -5,11 +5,13 @@ with it.
 """
 
 import argparse
+import re
 from pathlib import Path
 
 from rom.cli.answer import Answer, Data, failures, report_data
-from rom.cli.described import described
+from rom.cli.described import TOML_SUFFIX, described
 from rom.errors import FileFormatError
+from rom.readable import check_readable
 
 SUMMARY = "check a body file and print its certificate"
 EXAMPLES = """\
@@ -19,18 +21,27 @@ EXAMPLES = """\
   rom check slider_crank.toml    # mistakes in a description, by line
   rom check part.step            # what it is, and the next command
 """
-OTHERS = {  # endings: (what such a file is, next commands)
-    ".step .stp": ("a part of a CAD program", "rom swing {}", "rom mesh {} --faces"),
-    ".geo .py": ("a program of gmsh", "rom mesh {}", "rom modes {} --material steel"),
-    ".msh .inp .bdf": ("a mesh", "rom mesh {}", "rom modes {} --material steel"),
-    ".op4 .mtx .mm .pch .dmig .dat .sti .mas": (
-        "a matrix of another program",
-        "rom modes {} --mass MASS --nodes NODES",
-        "rom reduce {} --mass MASS --nodes NODES -i NAME=rbe2",
-    ),
-    ".unv .uff": ("a vibration test", "rom update FAMILY {}"),
-    ".json": ("the record or the scene of a run", "rom report FOLDER"),
-}
+DECK = "rom mesh {} --units mm-t-s", "rom modes {} --units mm-t-s  # else --material steel"
+MATRIX = (
+    "a matrix of another program",
+    "rom modes {} --mass MASS --nodes NODES",
+    "rom reduce {} --mass MASS --nodes NODES -i NAME=rbe2",
+)
+MESHED = "rom mesh {}", "rom modes {} --material steel"
+OTHERS = (  # endings; words of which a line begins with one, if need be; what it is, next commands
+    (".step .stp", "ISO", "a part of a CAD program", "rom swing {}", "rom mesh {} --faces"),
+    (".geo .py", "", "a program of gmsh", *MESHED),
+    (".msh", "$MESHFORMAT", "a mesh of gmsh", *MESHED),
+    (".bdf .nas .dat .fem", "CTETRA CHEXA INCLUDE", "a deck of Nastran", *DECK),
+    (".inp", "*ELEMENT *INCLUDE", "a deck of Abaqus or CalculiX", *DECK),
+    (".bdf .dat .pch .dmig", "DMIG", *MATRIX),
+    (".op4 .mtx .mm .sti .mas", "", *MATRIX),
+    (".unv", "-1/2412", "a mesh of another program", *MESHED),
+    (".unv .uff", "", "a vibration test", "rom update FAMILY {}"),
+    (".json", "", "the record or the scene of a run", "rom report FOLDER"),
+)
+FIRST_WORDS = re.compile(r"^\s*([*$]?[A-Z]\w*|-1\s+2412\b)", re.MULTILINE)
+BODIES = (".npz", ".sid_fem")
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -45,9 +56,10 @@ def run(args: argparse.Namespace) -> Answer:
 
     data: Data = {"file": str(args.file)}
     ending = args.file.suffix.lower()
-    known = next((told for endings, told in OTHERS.items() if ending in endings.split()), None)
-    if known or described(args):
-        return _told(args.file, *known) if known else _description(args.file)
+    if described(args):
+        return _description(args.file)
+    if ending not in BODIES:
+        return _told(args.file, *_kind(args.file))
     if ending == ".sid_fem":
         from rom.io.sid.dialect import check_sid, read_sid
 
@@ -62,11 +74,25 @@ def run(args: argparse.Namespace) -> Answer:
     return Answer(data, f"{args.file}\n{report}", failed=failures(report))
 
 
-def _told(file: Path, what: str, *commands: str) -> Answer:
-    from rom.io.files import check_readable
-
+def _kind(file: Path) -> tuple[str, ...]:
+    """What another file is, by its ending and what its lines begin with, and the next commands."""
     if not check_readable(file).stat().st_size:
         raise FileFormatError("the file is empty.", where=str(file))
+    ending, found = file.suffix.lower(), set[str]()
+    rows = [row for row in OTHERS if ending in row[0].split()]
+    if any(words for _, words, *_ in rows):
+        text = file.read_bytes().decode("latin1")
+        found = {"/".join(word.split()) for word in FIRST_WORDS.findall(text.upper())}
+    for _, words, *told in rows:
+        if not words or found & set(words.split()):
+            return tuple(told)
+    kinds = " ".join([*BODIES, TOML_SUFFIX, *(endings for endings, *_ in OTHERS)])
+    wanted = " or ".join(words.replace(" ", ", ") for _, words, *_ in rows)
+    text = f"is no {ending} file: no line begins with {wanted}" if rows else "is of no known kind"
+    raise FileFormatError(f"{text}.", where=str(file), hint="" if rows else f"Known are {kinds}.")
+
+
+def _told(file: Path, what: str, *commands: str) -> Answer:
     then = [command.format(file) for command in commands]
     text = "\n".join([f"{file} is {what}. Next, for example", *(f"  {x}" for x in then)])
     return Answer({"file": str(file), "kind": what, "next": then}, text)

@@ -56,7 +56,7 @@ def run(args: argparse.Namespace) -> Answer:
     from rom.report.part import known_faces, part_page
 
     how = reading(args)
-    parameters = how["parameters"]
+    given = {"units": how["units"]} if how["units"] != "SI" else {}
     if args.file.suffix.lower() in (".step", ".stp"):
         how["faces"] = {"face": EVERY_FACE}
     mesh = read_mesh(args.file, **how)
@@ -68,7 +68,7 @@ def run(args: argparse.Namespace) -> Answer:
     for name in ("time_limit", "memory_limit"):
         value = getattr(args, name)
         limits += [] if value is None else [f"--{name.replace('_', '-')}={value!r}"]
-    chosen = Chosen(args.file, parameters, faces, file, limits)
+    chosen = Chosen(args.file, given, how["parameters"], faces, file, limits)
     orders = {"swing": chosen.swing, "save": chosen.save, "stop": chosen.stop}
     server = Loopback(lambda name: page if not name else chosen.report(name), orders)
     chosen.tell = server.tell
@@ -88,6 +88,7 @@ class Chosen:
     """What the page may ask for: the file of what is chosen, and one swing at a time."""
 
     part: Path
+    given: dict[str, str]  # more of its geometry
     parameters: dict[str, float | str]  # of its geometry
     faces: dict[str, dict[str, object]]  # that there are, by their labels
     file: Path  # of the component
@@ -118,7 +119,7 @@ class Chosen:
         numbers = {key: _number(asked, key) for key in BOUNDS if key != "size" or asked.get(key)}
         size = numbers.pop("size", None)
         parameters = self.parameters | ({"lc": f"{size:g} mm"} if size else {})
-        geometry = os.path.relpath(self.part, self.file.parent)
+        geometry = {"file": os.path.relpath(self.part, self.file.parent)} | self.given
         text = component_text(geometry, parameters, faces, hinge, numbers)
         write_whole(self.file, text.encode())
         self._keep(self.file)

@@ -54,6 +54,7 @@ EXAMPLES = """\
   rom swing part.step --hinge 0,0,0.01 --material aluminium --gravity 0,0,-9.81 --film -o out
 """
 OWN_OPTIONS = "hinge gravity t_end magnify film mp4".split()  # that say nothing of the part
+USUAL = "steel"
 TABLE_FILE = "motion.csv"
 N_STEPS, N_INSTANTS = 240, 4  # of the motion; shown in the picture
 FAR_SWING = 1.18034  # period of a swing from the horizontal over that of a small one
@@ -68,7 +69,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "face it hangs on: a name, or in a .step file what --face takes, e.g. 12 or radius:0.006"
     )
     option(parser, "--hinge FACE", about, str)
-    add_solid(parser, usual="steel")
+    add_solid(parser, usual=USUAL)
     option(parser, "-m --modes", "modes kept (default: as many as are needed)", count)
     about = "[m/s^2], default 9.81 along the axis most across the part and across its bore"
     option(parser, "--gravity", about, ACCELERATION)
@@ -119,13 +120,13 @@ def _faces(args: argparse.Namespace) -> Answer:
     from rom.cli.verbs import mesh
 
     drawn, is_step = claim(args) / "faces.png", args.file.suffix.lower() in (".step", ".stp")
-    asked = {"faces": is_step, "save": drawn, "E": None, "nu": None, "rho": None}
-    found = mesh.run(argparse.Namespace(**vars(args) | asked))
+    asked = vars(args) | {"faces": is_step, "save": drawn, "E": None, "nu": None, "rho": None}
+    found = mesh.run(argparse.Namespace(**asked))
     bores = [face["number"] for face in found.data.get("faces", ()) if face["kind"] == "cylinder"]
     hinge = str((*bores, 1)[0]) if is_step else next(iter(found.data["interfaces"]), "FACE")
-    command = " ".join(
-        map(quote, ("rom", "swing", str(args.file), "--hinge", hinge, "-o", str(args.output)))
-    )
+    words = "rom", "swing", str(args.file), "--hinge", hinge, "-o", str(args.output)
+    units = ("--units", args.units) if args.units != "SI" else ()
+    command = " ".join(map(quote, (*words, *units)))
     text = f"{found.text}\n\n{drawn} shows them. Choose one for --hinge, for example\n  {command}"
     data = {"files": [str(drawn)], "faces": found.data.get("faces", []), "next": [command]}
     return replace(found, data=data, text=text)
@@ -168,7 +169,7 @@ def _reduced(
     from rom.reduction.interfaces.connection import found
     from rom.workflow import reduce
 
-    full = part.model() if part else model(args.file, material=material(args), **how)
+    full = part.model() if part else model(args.file, material=material(args, USUAL), **how)
     (at,), rigid = found(full, [hinge]), mass_properties(full)
     log.info("%s: %d dofs, %.4g kg", args.file, full.n_dofs, rigid.mass)
     swing = planned(rigid, at.origin, args.gravity, args.t_end, axis=at.axis)

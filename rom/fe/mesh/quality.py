@@ -1,5 +1,6 @@
 """Shape of the cells: volume, Jacobian, aspect ratio."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import chain, repeat
 
@@ -8,6 +9,7 @@ import numpy as np
 from rom.fe.mesh.cell_types import CellType, jacobians
 from rom.fe.mesh.curving import BOUND_GAP, bent, smallest_determinants, straightened
 from rom.fe.mesh.solid import SolidMesh, cell_names, refuse_cells
+from rom.fe.mesh.topology import faces_of
 from rom.model import Array, Index
 
 # Smallest over largest possible determinant: round-off of coordinates gives 1e-16 times the
@@ -17,6 +19,11 @@ MIN_CURVED_QUALITY = 1e-3  # curved cells below are made straighter if this is a
 SHARES = (0.1, 0.2, 0.4, 1.0)  # of the way to the straight cell, one after the other
 FEW_STRAIGHTENED = 0.01  # of the curved cells: a geometry with fillets has some in any mesh
 MAX_ASPECT_RATIO = 100.0  # beyond it we warn; tetrahedra of a good mesh stay below 10
+# Of one layer of tetrahedra by the degree of the displacement: length over thickness of the cells
+# from where it is told, and error of frequencies at ten times; measured on plates against finer
+# ones. On a ring of 50 thicknesses it is 1 % at five times and 50 % at ten. Bricks do better.
+ONE_LAYER = {1: (1.5, 0.0), 2: (6.0, 0.03), 3: (12.0, 0.003)}
+BRICKS, THIN_SHARE, FINE_RATIO = 1.5, 0.3, 5.0  # limits of them, share of the cells, what cures
 BLOCK_SIZE = 20_000  # cells looked at together, bounds the memory
 
 
@@ -90,6 +97,45 @@ def straighten(mesh: SolidMesh) -> tuple[SolidMesh, list[str]]:
     ]
 
 
+def layer_doubt(mesh: SolidMesh, degree: int) -> str:
+    """What a single layer of cells through a thin body costs, in a sentence, or nothing."""
+    (limit, cost), slender = ONE_LAYER[degree], aspect_ratio(mesh)
+    limit *= BRICKS if mesh.kind.shape == "hexahedron" else 1.0
+    thin = slender > limit
+    if thin.mean() < THIN_SHARE:
+        return ""
+    faces, skin = (
+        faces_of(mesh.cells, mesh.kind, len(mesh.points)),
+        np.zeros(len(mesh.points), bool),
+    )
+    skin[faces.corners[faces.count == 1]] = True
+    thin &= skin[mesh.corners].all(axis=1)
+    volumes, outer = cell_volumes(mesh), faces.of_cell[thin]
+    x = mesh.points[faces.corners[outer[faces.count[outer] == 1]]]
+    sides = np.cross(x[:, 2] - x[:, 0], x[:, -1] - x[:, 1])  # by diagonals, or two edges
+    share = volumes[thin].sum() / volumes.sum()
+    if share < THIN_SHARE or not sides.any():
+        return ""
+    thickness = 4 * volumes[thin].sum() / np.linalg.norm(sides, axis=1).sum()
+    ratio = np.median(np.minimum(slender, _longest_edge(mesh) / thickness)[thin])
+    if ratio < limit:
+        return ""
+    error = f"{ratio:.2g} times" if degree == 1 else f"{cost * ratio**2:.0f} %"
+    cure = ("degree=2, with", "degree=3, or", "at most")[degree - 1]
+    size = FINE_RATIO * thickness
+    return (
+        f"cells with {share:.0%} of the volume reach from surface to surface, {ratio:.2g} times as "
+        f"long as thick: with degree={degree} frequencies of bending come out up to about {error} "
+        f"too high, far more where it is curved. Use {cure} elements of {size:.2g} m."
+    )
+
+
+def cell_volumes(mesh: SolidMesh) -> Array:
+    """(m,) volumes of the cells [m^3], exact for curved ones too."""
+    at, weights = mesh.kind.quadrature
+    return _over_blocks(mesh.points, mesh.cells, mesh.kind.gradients(at), lambda x: x @ weights)
+
+
 def _sampled(mesh: SolidMesh) -> Array:
     """(m,) smallest determinant at the quadrature points."""
     kind = mesh.kind
@@ -103,8 +149,14 @@ def _sampled(mesh: SolidMesh) -> Array:
 def _smallest(points: Array, cells: Index, kind: CellType) -> Array:
     at, _ = kind.quadrature
     gradients = kind.gradients(at[:1] if kind.name == "tet4" else at)
+    return _over_blocks(points, cells, gradients, lambda x: x.min(axis=1))
+
+
+def _over_blocks(
+    points: Array, cells: Index, gradients: Array, of: Callable[[Array], Array]
+) -> Array:
     blocks = [cells[i : i + BLOCK_SIZE] for i in range(0, len(cells), BLOCK_SIZE)]
-    found = [jacobians(points[block], gradients).min(axis=1) for block in blocks]
+    found = [of(jacobians(points[block], gradients)) for block in blocks]
     return np.concatenate(found) if found else np.empty(0)
 
 

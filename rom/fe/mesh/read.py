@@ -35,6 +35,7 @@ from rom.fe.mesh.validate import checked
 from rom.model import Array, Index
 from rom.names import check_known, check_text
 from rom.readable import check_readable
+from rom.units import UnitSystem, unit_system
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -52,10 +53,12 @@ READERS = {
     ".step": "step",
     ".stp": "step",
     ".msh": "msh",
+    ".unv": "unv",
     ".inp": "abaqus",
     ".bdf": "nastran",
     ".nas": "nastran",
     ".dat": "nastran",
+    ".fem": "nastran",
 }
 
 
@@ -66,6 +69,7 @@ def read_mesh(  # noqa: PLR0913  limits and trust beside what is read
     parameters: Mapping[str, Any] | None = None,
     faces: Mapping[str, Any] | None = None,
     scale: float = 1.0,
+    units: str = "SI",
     order: int | None = None,
     trust: bool = False,
     time_limit: float | None = None,
@@ -78,7 +82,8 @@ def read_mesh(  # noqa: PLR0913  limits and trust beside what is read
 
     Args:
         path: ``.geo`` gmsh geometry; ``.py`` file with ``build(gmsh, **parameters)``; ``.step``;
-            ``.msh`` 2.2 or 4.1; Abaqus ``.inp``; Nastran ``.bdf``.
+            ``.msh`` 2.2 or 4.1; ``.unv`` with groups of elements; Abaqus ``.inp``; Nastran
+            ``.bdf``.
         parameters: named values for a geometry: those with ``Name`` in a ``.geo``, the arguments of
             ``build``, or ``lc`` (element size [m]) for ``.step``.
         faces: surfaces to name in a ``.step``: a face number, a point (3) near the face, a box (6)
@@ -86,6 +91,8 @@ def read_mesh(  # noqa: PLR0913  limits and trust beside what is read
             `rom.fe.mesh.picks`, or a list of these; lengths in metres. {"face": "every"} names
             all faces without a name "face 1", "face 2", ...
         scale: factor on all coordinates, e.g. 1e-3 for a mesh drawn in millimetres.
+        units: unit system of a mesh or deck, with the materials a deck says: "SI", "mm-t-s" (N,
+            MPa), "mm-kg-ms" or "in-lbf-s"; in place of a scale.
         order: degree of the geometry when the mesh is made here: 1 for straight edges, 2 for
             curved ones, with nodes amid edges and faces on the surface; None for 2 where the body
             is curved and 1 where it is not.
@@ -107,6 +114,10 @@ def read_mesh(  # noqa: PLR0913  limits and trust beside what is read
     path = Path(path)
     with in_file(path):
         request = _request(path, parameters, scale, trust=trust, faces=faces, order=order)
+        unit = unit_system(units)
+        if units != "SI" and (scale != 1.0 or is_geometry(path)):
+            text = f"units={units!r} is for finished meshes, in place of scale="
+            raise ConfigError(f"{text}; a .geo takes scale=, a .step says its unit.")
     reader = request["reader"]
     files = {path}  # a deck may include others
     if reader in INCLUDES:
@@ -117,10 +128,13 @@ def read_mesh(  # noqa: PLR0913  limits and trust beside what is read
     provenance = {
         "path": str(path),
         "sha256": _digest(*sorted(files)),
-        "scale": scale,
+        "scale": scale * unit.length,
         **notes["provenance"],
     }
-    mesh, remarks = _solid(arrays, notes, provenance, scale), notes["warnings"]
+    if scale != 1.0 and "materials" in notes:
+        text = f"scale={scale:g} is of lengths alone and says no unit of the materials of the deck."
+        notes["unread"] = {"message": text, "hint": "Give units= instead, as 'mm-t-s', or others."}
+    mesh, remarks = _solid(arrays, notes, provenance, scale, unit), notes["warnings"]
     if reader in GEOMETRIES:
         mesh, straightened = straighten(repair(mesh))
         mesh = mesh if order else without_middles(mesh)
@@ -233,7 +247,10 @@ def to_dolfinx(
     return made, cell_tags, facet_tags
 
 
-def _solid(arrays: Arrays, notes: Notes, provenance: Notes, scale: float) -> SolidMesh:
+def _solid(
+    arrays: Arrays, notes: Notes, provenance: Notes, scale: float, unit: UnitSystem
+) -> SolidMesh:
+    scale *= unit.length
     return SolidMesh(
         points=arrays["points"] * scale,
         cells=arrays["cells"],
@@ -247,6 +264,11 @@ def _solid(arrays: Arrays, notes: Notes, provenance: Notes, scale: float) -> Sol
             name: scaled(from_plain(Axis, axis), scale)
             for name, axis in notes.get("axes", {}).items()
         },
+        materials={
+            name: (E * unit.pressure, nu, rho * unit.density)
+            for name, (E, nu, rho) in notes.get("materials", {}).items()
+        },
+        unread=notes.get("unread", {}),
         faces=tuple(scaled(from_plain(Face, face), scale) for face in notes.get("faces", ())),
     )
 
@@ -269,7 +291,9 @@ def _request(
     check_readable(path, LARGEST_FILE)
     reader = READERS.get(path.suffix.lower())
     if reader is None:
-        raise ConfigError(f"no reader for the suffix {path.suffix!r}; known are {sorted(READERS)}.")
+        text = f"no reader for the suffix {path.suffix!r}; known are {sorted(READERS)}."
+        hint = "Export the mesh with its named surfaces as .unv, .msh, .bdf or .inp."
+        raise ConfigError(text, hint=hint)
     request: Request = {
         "path": str(path.absolute()),
         "reader": reader,
@@ -289,6 +313,11 @@ def _request(
 def is_geometry(path: str | Path) -> bool:
     """Whether a file is meshed here, and is no finished mesh."""
     return READERS.get(Path(path).suffix.lower()) in GEOMETRIES
+
+
+def is_deck(path: str | Path) -> bool:
+    """Whether a file may say what its regions are made of."""
+    return READERS.get(Path(path).suffix.lower()) in INCLUDES
 
 
 def _check_request(request: Request, scale: float) -> None:

@@ -7,10 +7,11 @@ from typing import Any, NotRequired, TypedDict
 import numpy as np
 import numpy.typing as npt
 
-from rom.errors import MeshError
+from rom.errors import ConfigError, FileFormatError, MeshError, in_file
 from rom.fe.mesh.cad import Axis, Face
 from rom.fe.mesh.cell_types import READ_TYPES, CellType
-from rom.model import Array, Index, Integers, Mask
+from rom.model import Array, Index, Integers, Mask, Material
+from rom.names import named
 
 MAX_SHOWN = 5  # culprits named in a message
 GEOMETRIES = ("geo", "builder", "step")  # readers that make a mesh
@@ -41,6 +42,9 @@ class SolidMesh:
     warnings: tuple[str, ...] | None = None
     # axis of each named surface that the CAD knows as cylinder faces about one line
     axes: dict[str, Axis] = field(default_factory=dict)
+    # E [Pa], nu [1] and rho [kg/m^3] of regions by name, as a deck says, or why that is not read
+    materials: dict[str, tuple[float, float, float]] = field(default_factory=dict)
+    unread: Notes = field(default_factory=dict)
     faces: tuple[Face, ...] = ()  # all faces of the CAD, where they were asked for
 
     @property
@@ -52,6 +56,20 @@ class SolidMesh:
     def size(self) -> float:
         """Diagonal of the bounding box [m]."""
         return float(np.linalg.norm(np.ptp(self.points, axis=0)))
+
+    def solids(self) -> dict[str, Material]:
+        """{region: material} as the deck says; raises what keeps them from being read."""
+        path = str(self.provenance.get("path", ""))
+        if self.unread:
+            raise FileFormatError(**self.unread | {"where": self.unread.get("where") or path})
+        if missing := sorted(set(self.region_names.values()) - self.materials.keys()):
+            text = f"the file says no material of the region {named(missing)}"
+            raise ConfigError(
+                f"{text}; give material=, on the command line --material.", where=path
+            )
+        with in_file(path):  # the same numbers are one material
+            made = {row: Material(*row) for row in set(self.materials.values())}
+        return {name: made[row] for name, row in self.materials.items()}
 
     @property
     def corners(self) -> Index:

@@ -5,8 +5,8 @@ from dataclasses import asdict
 import numpy as np
 
 from rom.fe.mesh.cad import Axis
-from rom.fe.mesh.cell_types import DECK_EDGES, jacobians
-from rom.fe.mesh.quality import aspect_ratio, scaled_jacobian
+from rom.fe.mesh.cell_types import DECK_EDGES
+from rom.fe.mesh.quality import aspect_ratio, cell_volumes, scaled_jacobian
 from rom.fe.mesh.solid import Notes, SolidMesh
 from rom.fe.mesh.topology import faces_of, row_ids
 from rom.model import Array, Index
@@ -103,13 +103,6 @@ def _axis(axis: Axis | None) -> Notes:
 def _middle(points: Array) -> list[float]:
     """Middle of the box around the points."""
     return (0.5 * (points.min(axis=0) + points.max(axis=0))).tolist()
-
-
-def cell_volumes(mesh: SolidMesh) -> Array:
-    """(m,) volumes of the cells [m^3], exact for curved ones too."""
-    kind = mesh.kind
-    points, weights = kind.quadrature
-    return jacobians(mesh.points[mesh.cells], kind.gradients(points)) @ weights
 
 
 def vtk_cells(mesh: SolidMesh) -> tuple[Index, int]:

@@ -49,18 +49,13 @@ def check_box(found, mesh):
 
 
 @pytest.mark.parametrize("kind", MESHIO)
-def test_abaqus_written_by_meshio_comes_back(tmp_path, kind):
+def test_decks_written_by_meshio_come_back(tmp_path, kind):
+    """Of Nastran regions by property number, interfaces by the set number of SPC1 cards."""
     meshio, box, mesh = meshio_box(kind)
     meshio.write(tmp_path / "box.inp", box)
     found = read_mesh(tmp_path / "box.inp")
     assert list(found.facets) == ["root"] and found.region_names == {1: "body"}
     check_box(found, mesh)
-
-
-@pytest.mark.parametrize("kind", MESHIO)
-def test_nastran_written_by_meshio_comes_back(tmp_path, kind):
-    """Regions by property number, interfaces by the set number of SPC1 cards."""
-    meshio, box, mesh = meshio_box(kind)
     box.cell_data = {"nastran:ref": [np.where(np.arange(len(box.cells[0].data)) < 3, 4, 9)]}
     path = tmp_path / "box.bdf"
     meshio.write(path, box, file_format="nastran")
@@ -340,15 +335,6 @@ def test_every_card_that_would_be_lost_is_refused_by_name(name, tmp_path):
     assert f"{name} (1, {path.name} line " in str(caught.value)
 
 
-def test_a_piece_of_a_ring_weighs_what_it_does(tmp_path):
-    (tmp_path / "ring.inp").write_text(RING)
-    pytest.importorskip("dolfinx", reason="dolfinx is not installed")
-    with pytest.warns(rom.errors.RomWarning, match="1 nodes belong to no solid .* 99; check"):
-        model = rom.fe.model(tmp_path / "ring.inp", material=STEEL, degree=1)
-    area = 0.5 * (0.1**2 - 0.08**2) * np.sin(np.radians(ARC))
-    assert model.mass() == pytest.approx(7850 * area * 0.03, rel=1e-12)
-
-
 CORNERS = ("0.,0.,0.", "1.,0.,0.", "1.,1.,0.", "0.,1.,0.",
            "0.,0.,1.", "1.,0.,1.", "1.,1.,1.", "0.,1.,1.")  # fmt: skip
 CUBE = "".join(f"GRID,{k},,{x}\n" for k, x in enumerate(CORNERS, 1))
@@ -371,6 +357,76 @@ test_what_is_wrong_with_a_card_is_named = changed(
     ("$", "INCLUDE 'deck.bdf'", "include each other too deep"),
     error=RomError,
 )  # fmt: skip
+SAID = f"$\nBEGIN BULK\n{CUBE}PSOLID,1,4\nMAT1,4,210000.,,0.3,7.85-9\n"
+# psi, lbf/in^3, over 386.089 in/s^2 before the bulk data
+WEIGHED = (
+    f" param, wtmass, 2.59008-3\n{SAID.replace('210000.,,0.3,7.85-9', '3.045792+7,,.3,.283599')}"
+)
+OF_RING = f"""{RING.replace("C3D8", "C3D8, ELSET=e")}*MATERIAL, NAME=STEEL\n*ELASTIC\n210., 0.3
+*DENSITY\n7.85e-6,\n*SOLID SECTION, ELSET=e, MATERIAL=Steel\n"""
+
+
+@pytest.mark.parametrize(("units", "name", "text"), [
+    ("mm-t-s", "a.bdf", SAID), ("mm-kg-ms", "a.inp", OF_RING),
+    ("mm-t-s", "a.bdf", SAID.replace("210000.,,0.3", "210000.,80769.2308,")),
+    ("mm-t-s", "a.bdf", SAID.replace("210000.,,0.3", ",80769.2308,0.3")),
+    ("in-lbf-s", "a.bdf", WEIGHED), ("in-lbf-s", "a.bdf", WEIGHED.replace("BEGIN BULK\n", "")),
+])  # fmt: skip
+def test_materials_of_decks_are_read_in_their_units(units, name, text, tmp_path):
+    (tmp_path / name).write_text(text)
+    (steel,) = read_mesh(tmp_path / name, units=units).solids().values()
+    assert_allclose((steel.E, steel.nu, steel.rho), (210e9, 0.3, 7850.0), rtol=2e-5)
+    refuses(rom.ConfigError, "scale", read_mesh, tmp_path / name, units=units, scale=2.0)
+    refuses(FileFormatError, "unit", read_mesh(tmp_path / name, scale=0.1).solids)
+
+
+test_materials_that_are_not_ours_are_refused_by_card = changed(
+    SAID, "a.bdf", lambda path: read_mesh(path, units="mm-t-s").solids(),
+    ("MAT1,4", "MAT9,4", r"MAT9 \(1, a.bdf line"), ("PSOLID,1,4", "PSOLID,1,5", "MAT1 5 is used"),
+    ("MAT1,4", "MATT1,4,1\nMAT1,4", r"MATT1 \(1"), ("PSOLID,1", "PSOLID,2", "PSOLID 1 is used"),
+    ("PSOLID,1,4", "PSOLID,1,4,,,,,PFLUID", r"PSOLID, PFLUID \(1"), (",7.85-9", "", "RHO = 0"),
+    ("000.,,0.3", "000.,9.+4,0.3", "contradict"), ("210000.,,0.3", ",,0.3", "two of E, G and NU"),
+    ("PSOLID", "MAT1,4,1.,,0.3,1.\nPSOLID", "MAT1 4 is defined twice"),
+    ("$", "PARAM,WTMASS,1.\nPARAM,WTMASS,2.", "WTMASS has the values"),
+)  # fmt: skip
+test_laws_that_are_not_ours_are_refused_by_keyword = changed(
+    OF_RING, "a.inp", lambda path: read_mesh(path, units="mm-kg-ms").solids(),
+    ("*ELASTIC", "*ELASTIC, TYPE=ANISO", r"\*ELASTIC, TYPE=ANISO \(1"),
+    (".3\n*D", ".3\n200., 0.3, 100.\n*D", r"\*ELASTIC, 2 rows \(1"),
+    ("*DENSITY\n7.85e-6,\n", "", r"without \*DENSITY \(1"),
+    ("*DENSITY", "*MATERIAL, NAME=Steel\n*ELASTIC\n1.\n*DENSITY", "twice"),
+    ("*SOLID SECTION, ELSET=e, MATERIAL=Steel", "", rom.ConfigError, "'e'"),
+)  # fmt: skip
+
+
+@pytest.mark.fenicsx
+def test_a_piece_of_a_ring_weighs_what_it_does(tmp_path):
+    (tmp_path / "ring.inp").write_text(OF_RING)
+    with pytest.warns(RomWarning, match="1 nodes belong to no solid .* 99; check"):
+        model = rom.fe.model(tmp_path / "ring.inp", units="mm-kg-ms", degree=1)
+    area = 0.5 * (0.1**2 - 0.08**2) * np.sin(np.radians(ARC))
+    assert model.mass() == pytest.approx(7850e-9 * area * 0.03, rel=1e-12)
+
+
+@pytest.mark.fenicsx
+def test_a_deck_alone_makes_a_cantilever(tmp_path, caplog):
+    """Two properties; what the user gives wins and is told. Euler-Bernoulli, 1.8751^2 = 3.516."""
+    mesh = solid("hex8", (40, 1, 1), (1000.0, 50.0, 30.0))
+    bulk = [f"GRID,{k},," + ",".join(f"{v:.9g}" for v in x) for k, x in enumerate(mesh.points, 1)]
+    for k, row in enumerate((mesh.cells + 1).astype(str), 1):
+        bulk += [f"CHEXA,{k},{1 + k % 2}," + ",".join(row[:6]), "," + ",".join(row[6:])]
+    root = ",".join(str(k + 1) for k in np.unique(mesh.facets["root"]))
+    bulk += [f"SPC1,7,123,{root}\nPSOLID,1,4\nPSOLID,2,5\nMAT1,4,210000.,,0.3,7.85-9"]
+    (tmp_path / "a.bdf").write_text("\n".join([*bulk, "MAT1,5,210000.,,0.3,3.85-9"]))
+    for given, rho in ({}, 5850.0), ({"material": STEEL}, 7850.0):
+        model = rom.fe.model(tmp_path / "a.bdf", units="mm-t-s", **given)
+        assert model.mass() == pytest.approx(0.0015 * rho, rel=1e-9)
+        (first,) = rom.modes(model, 1, fixed=("spc_7",)).frequencies
+        beam = 3.516 * 0.03 / (2 * np.pi) * np.sqrt(210e9 / (12 * rho))
+        assert first == pytest.approx(beam, rel=0.01)
+        assert ("takes the place" in caplog.text) == bool(given)
+
+
 PART = "*PART, NAME=a\n" + RING.partition("*NODE\n")[0] + "*END PART\n"
 ONE, TWO = ("*INSTANCE, NAME=a-1, PART=a\n*END INSTANCE\n", "*INSTANCE, NAME=a-2, PART=a\n")
 TRUSS = "*ELEMENT, TYPE=T3D2, ELSET=e\n9, 1, 2\n"
@@ -451,16 +507,18 @@ def test_meshes_cut_for_several_processes_are_whole(version, ghosts, tmp_path):
     assert (mesh.points[mesh.facets["root"], 0] == 0.0).all()
 
 
-@pytest.mark.parametrize("form", ["bdf", "inp"])
+@pytest.mark.parametrize("form", ["bdf", "inp", "unv"])
 @pytest.mark.parametrize("order", [1, 2])
 def test_decks_of_gmsh_are_read(form, order, tmp_path):
     """It writes curves as CBAR or T3D2 without properties, and faces as plane elements."""
     with box_in_gmsh() as gmsh:
         gmsh.option.setNumber("Mesh.SaveAll", 1)
         gmsh.model.mesh.setOrder(order)
+        if form == "unv":  # which has one number for all dimensions
+            gmsh.model.removePhysicalGroups([(3, 1)])
         gmsh.write(str(tmp_path / f"box.{form}"))
-    arrays, notes = READERS[form](str(tmp_path / f"box.{form}"))
-    assert notes["cell_type"] == ("tet4", "tet10")[order - 1]
-    assert len(notes["facet_names"]) == {"bdf": 6, "inp": 7}[form]  # in .inp also by its group
-    volume = volume_and_centre(arrays["points"], arrays["cells"])[0]
+    mesh = read_mesh(tmp_path / f"box.{form}")
+    assert mesh.cell_type == ("tet4", "tet10")[order - 1]
+    assert len(mesh.facets) == {"bdf": 6, "inp": 7, "unv": 1}[form]  # in .inp also by its group
+    volume = volume_and_centre(mesh.points, mesh.cells)[0]
     assert volume == pytest.approx(np.prod(SIZE), rel=1e-5)

@@ -14,7 +14,7 @@ from cases.refusals import refuses
 from rom.errors import MeshError, TagError
 from rom.fe.mesh.cell_types import CELL_TYPES, jacobians
 from rom.fe.mesh.curving import TET_HALVES, smallest_determinants, without_middles
-from rom.fe.mesh.quality import aspect_ratio, scaled_jacobian, straighten
+from rom.fe.mesh.quality import aspect_ratio, layer_doubt, scaled_jacobian, straighten
 from rom.fe.mesh.repair import repair
 from rom.fe.mesh.solid import SolidMesh
 from rom.fe.mesh.topology import faces_of, parts, row_ids
@@ -68,6 +68,20 @@ def test_mirrored_cells_are_turned_round():
         fixed = repair(replace(mesh, cells=cells))
         assert_array_equal(fixed.cells, mesh.cells)
         assert validate(fixed) == []
+
+
+@pytest.mark.parametrize(("size", "counts", "told"), [
+    ((100.0, 60.0, 1.0), (10, 6, 1), (14, 14, 14)),  # cells of 14 mm, along the diagonal
+    ((100.0, 60.0, 1.0), (40, 24, 1), (3.5, 0, 0)), ((100.0, 60.0, 1.0), (10, 6, 2), (0, 0, 0)),
+    ((100.0, 60.0, 50.0), (4, 3, 3), (0, 0, 0)), ((100.0, 3.0, 3.0), (20, 1, 1), (3.1, 0, 0)),
+])  # fmt: skip
+def test_one_layer_of_cells_is_told_flat_or_rolled(size, counts, told):
+    mesh = solid("tet4", counts, size)
+    x, y, z = mesh.points.T
+    rolled = np.column_stack([(80 + z) * np.sin(x / 80), y, (80 + z) * np.cos(x / 80)])
+    for points, (degree, ratio) in product((mesh.points, rolled), enumerate(told, 1)):
+        text = layer_doubt(replace(mesh, points=points), degree) or "surface, 0 times"
+        assert float(text.partition("surface, ")[2].split()[0]) == pytest.approx(ratio, rel=0.1)
 
 
 def test_unused_nodes_are_dropped():

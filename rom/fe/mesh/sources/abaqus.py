@@ -1,6 +1,7 @@
 """Decks of Abaqus and CalculiX.
 
-Regions are the element sets of ``*SOLID SECTION``, or without any the ``ELSET`` of ``*ELEMENT``.
+Regions are the element sets of ``*SOLID SECTION``, made of its ``*ELASTIC`` and ``*DENSITY``, or
+without any the ``ELSET`` of ``*ELEMENT``.
 Interfaces are ``*SURFACE`` of element faces or nodes, sets of skin elements (S3, S4, M3D3, CPS3,
 ...), and each ``*NSET`` that contains whole facets of the outer surface. Every keyword is read,
 left aside because a free body does not need it, or refused by name.
@@ -24,6 +25,7 @@ from rom.fe.mesh.cell_types import READ_TYPES
 from rom.fe.mesh.solid import Read, packed
 from rom.fe.mesh.sources.deck import (
     facets_of_nodes,
+    of_materials,
     only_type,
     outer_facets,
     positions,
@@ -49,7 +51,7 @@ class Deck(Nodes):
     """What a deck says, in its own numbers.
 
     Solids are {number: (cell type, nodes)}, skin {number: nodes}, surfaces {name: (type, rows)};
-    own and sections are names of element sets: of ``*ELEMENT``, of sections.
+    own are names of the element sets of ``*ELEMENT``, laws what is said of materials.
     """
 
     aside: Unread = field(default_factory=Unread)
@@ -58,7 +60,8 @@ class Deck(Nodes):
     cell_sets: Sets = field(default_factory=lambda: Sets("elements"))
     surfaces: dict[str, tuple[str, list[list[str]]]] = field(default_factory=dict)
     own: list[str] = field(default_factory=list)
-    sections: list[str] = field(default_factory=list)
+    sections: list[Block] = field(default_factory=list)
+    laws: list[Block] = field(default_factory=list)
 
 
 def read(path: str) -> Read:
@@ -67,6 +70,8 @@ def read(path: str) -> Read:
     for block in deck.blocks():
         if block.keyword in MESH_KEYWORDS:
             deck.take(block, MESH_KEYWORDS)
+        elif block.keyword in LAWS:
+            deck.laws.append(block)
         elif block.keyword not in HARMLESS_KEYWORDS:
             counted = deck.aside if block.keyword in LOAD_KEYWORDS else deck.unread
             counted.add(f"*{block.keyword}", block.place)
@@ -80,6 +85,7 @@ def read(path: str) -> Read:
     facets, remarks = _facets(deck, ids, cells, cell_type, node_ids)
     remarks = [*deck.aside.remark(), *remarks, *unused(node_ids, cells)]
     told = {"region_names": names, "warnings": remarks, "provenance": {"parameters": {}}}
+    told |= of_materials(_materials, deck)
     return packed(points, cells, cell_type, regions, ids, facets=facets, **told)
 
 
@@ -160,12 +166,14 @@ MESH_KEYWORDS: Table = {
     "ELSET": (lambda deck, block: deck.cell_sets.add(block.option("ELSET"), block.members()),
               ("ELSET", *SET_OPTIONS)),
     "SURFACE": (_surface, ("NAME", "TYPE", "INTERNAL")),
-    "SOLID SECTION": (lambda deck, block: deck.sections.append(block.option("ELSET")),
+    "SOLID SECTION": (lambda deck, block: deck.sections.append(block),
                       ("ELSET", "MATERIAL", "ORIENTATION", "CONTROLS")),
     "SURFACE SECTION": (lambda deck, block: None, ("ELSET",)),  # without a density
 }  # fmt: skip
-HARMLESS_KEYWORDS = set(  # materials are given here; output
-    "HEADING,PREPRINT,ASSEMBLY,END ASSEMBLY,MATERIAL,ELASTIC,DENSITY,EXPANSION,CONDUCTIVITY,"
+# of materials, with the options of each that may be there
+LAWS = {"MATERIAL": {"NAME"}, "ELASTIC": {"TYPE", "MODULI"}, "DENSITY": set[str]()}
+HARMLESS_KEYWORDS = set(  # what else a material says; output
+    "HEADING,PREPRINT,ASSEMBLY,END ASSEMBLY,EXPANSION,CONDUCTIVITY,"
     "SPECIFIC HEAT,PLASTIC,CYCLIC HARDENING,CREEP,DAMPING,HYPERELASTIC,VISCOELASTIC,DEPVAR,"
     "USER MATERIAL,ORIENTATION,TRANSFORM,SECTION CONTROLS,AMPLITUDE,PHYSICAL CONSTANTS,"
     "SURFACE INTERACTION,SURFACE BEHAVIOR,FRICTION,RESTART,TIME POINTS,NODE PRINT,EL PRINT,"
@@ -176,7 +184,8 @@ LOAD_KEYWORDS = set("STEP,BOUNDARY,INITIAL CONDITIONS,CLOAD,DLOAD,DSLOAD,TEMPERA
 
 def _regions(deck: Deck, ids: Index) -> tuple[dict[int, str], Index]:
     """{region number: name} and the region number of each cell."""
-    names = dict(enumerate(dict.fromkeys(deck.sections or deck.own), 1))
+    sets = [section.option("ELSET") for section in deck.sections] or deck.own
+    names = dict(enumerate(dict.fromkeys(sets), 1))
     regions = np.zeros(ids.size, dtype=np.int64)
     for number, name in names.items():
         members = deck.cell_sets.of(name)
@@ -199,6 +208,37 @@ def _regions(deck: Deck, ids: Index) -> tuple[dict[int, str], Index]:
             hint="Every solid element needs a *SOLID SECTION.",
         )
     return names, regions
+
+
+def _materials(deck: Deck) -> dict[str, list[float]]:
+    """{region: E, nu and rho} of the material of each section, in units of the deck."""
+    laws: dict[str, dict[str, Block]] = {}
+    own: dict[str, Block] = {}
+    for block in deck.laws:
+        if block.keyword == "MATERIAL":
+            own = laws.setdefault(block.option("NAME").upper(), {})
+        if own.setdefault(block.keyword, block) is not block:
+            raise block.wrong("it is defined twice")
+    unread, numbers = Unread(), {}
+    for section in deck.sections:
+        own = laws.get(section.options.get("MATERIAL", "").upper(), {})
+        for name in ("ELASTIC", "DENSITY"):
+            kind = _unlike(own[name]) if name in own else f"*SOLID SECTION without *{name}"
+            if kind:
+                unread.add(kind, own.get(name, section).place)
+        if not unread:
+            elastic = own["ELASTIC"].reals(0, 0, 1)
+            numbers[section.option("ELSET")] = [*elastic, *own["DENSITY"].reals(0, 0)]
+    unread.refuse()
+    return numbers
+
+
+def _unlike(block: Block) -> str:
+    """The keyword, with what tells it from one of linear isotropic solids; or nothing."""
+    kind, odd = block.options.get("TYPE", "ISO"), sorted(block.options.keys() - LAWS[block.keyword])
+    odd += [f"TYPE={kind}"] * (not kind.upper().startswith("ISO"))
+    odd += [f"{len(block.rows)} rows"] * (len(block.rows) != 1)
+    return ", ".join([f"*{block.keyword}", *odd]) if odd else ""
 
 
 def _facets(

@@ -1,11 +1,12 @@
 """What Abaqus and Nastran decks share: node order, faces by number, faces by node set."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 import numpy as np
 
 from rom.errors import FileFormatError, MeshError
 from rom.fe.mesh.cell_types import DECK_EDGES, READ_TYPES
+from rom.fe.mesh.solid import Notes
 from rom.fe.mesh.topology import faces_of
 from rom.model import Index
 from rom.names import named
@@ -29,6 +30,15 @@ def only_type(found: Iterable[str]) -> str:
         text = f"the cells are of several types, {types}; one mesh needs one type"
         raise MeshError(f"{text}; mesh all volumes with tetrahedra, or all with hexahedra.")
     return types[0]
+
+
+def of_materials(read: Callable[..., Notes], *deck: object) -> dict[str, Notes]:
+    """Materials of the regions, or why they are not read, which hurts where nobody gives others."""
+    try:
+        return {"materials": read(*deck)}
+    except FileFormatError as error:
+        hint = "Materials of your own take their place: material=, or --material."
+        return {"unread": {"message": error.message, "where": error.where, "hint": hint}}
 
 
 def outer_facets(cells: Index, cell_type: str, n_points: int) -> Index:

@@ -60,7 +60,8 @@ def collect(gmsh: ModuleType, declared: Path, *, strict: bool, repeated: bool) -
     once for each of its groups, as version 2 does.
     """
     check_declared(gmsh, declared)
-    groups = _group_names(gmsh)
+    # of a .unv, gmsh puts all that is in no group into one of the number 0
+    groups = {key: name for key, name in _group_names(gmsh).items() if key[1] or strict}
     tags, points = _nodes(gmsh)
     kind, blocks = _solids(gmsh)
     region = _regions(gmsh, blocks, groups, strict=strict)

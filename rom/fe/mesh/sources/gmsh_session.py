@@ -24,7 +24,7 @@ MSH_START = (b"$MeshFormat", b"$Comments")
 
 
 def run(request: Request) -> Read:
-    """Answer a request for ``.geo``, ``.py``, ``.step`` or ``.msh``, see `child.read`."""
+    """Answer a request for ``.geo``, ``.py``, ``.step``, ``.msh`` or ``.unv``, see `child.read`."""
     import gmsh
 
     path, reader = Path(request["path"]), request["reader"]
@@ -36,13 +36,15 @@ def run(request: Request) -> Read:
             values, defaults = MAKERS[reader](gmsh, path, request)
         if request.get("flat"):
             return _flat(gmsh, request, values)
-        if reader == "msh":
+        if reader in ("msh", "unv"):
             declared = path
         else:
             _generate(gmsh, request, declared)
         picked = pick(gmsh, request["faces"], path.name)
         repeated = reader == "msh" and version(path) == 2
-        arrays, notes = collect(gmsh, declared, strict=reader != "step", repeated=repeated)
+        arrays, notes = collect(
+            gmsh, declared, strict=reader not in ("step", "unv"), repeated=repeated
+        )
         notes["axes"] = {name: asdict(axis) for name, axis in axes(gmsh).items()}
         if EVERY_FACE in request["faces"].values():
             notes["faces"] = [asdict(face) for face in faces(gmsh)]
@@ -158,6 +160,18 @@ def _msh(gmsh: ModuleType, path: Path, request: Request) -> Made:
         raise FileFormatError("is cut: the last section has no end.", hint="Write it again.")
     # parts of a version 2 file would become volumes of their own, without groups
     gmsh.option.setNumber("Mesh.PartitionConvertMsh2", 0)
+    return _merged(gmsh, path, request)
+
+
+def _unv(gmsh: ModuleType, path: Path, request: Request) -> Made:
+    found = set(re.findall(r"^ +-1\s+(\d+)\s*$", path.read_text("latin1"), re.MULTILINE))
+    if "2412" not in found:
+        text = f"is no universal file with a mesh: it has the datasets {sorted(found)}, not 2412."
+        raise FileFormatError(text)
+    return _merged(gmsh, path, request)
+
+
+def _merged(gmsh: ModuleType, path: Path, request: Request) -> Made:
     # gmsh would also execute a file of the same name with .opt; beside this link there is none
     link = Path(request["folder"], path.name)
     link.symlink_to(path)
@@ -207,4 +221,4 @@ def _generate(gmsh: ModuleType, request: Request, declared: Path) -> None:
         gmsh.model.mesh.setOrder(order)
 
 
-MAKERS = {"geo": _geo, "builder": builder.make, "step": step.make, "msh": _msh}
+MAKERS = {"geo": _geo, "builder": builder.make, "step": step.make, "msh": _msh, "unv": _unv}

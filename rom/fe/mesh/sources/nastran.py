@@ -1,9 +1,9 @@
 """Nastran bulk data.
 
-Regions are the property numbers of the solids ("property_1"). Interfaces are skin elements
-(CTRIA3, CTRIA6, CQUAD4, CQUAD8) by property number ("property_5") and the nodes of SPC and SPC1
-cards by set number ("spc_7"), where they contain whole facets of the outer surface. Every card is
-read, left aside because a free body does not need it, or refused by name.
+Regions are the property numbers of the solids ("property_1"), made of their MAT1. Interfaces are
+skin elements (CTRIA3, CTRIA6, CQUAD4, CQUAD8) by property number ("property_5") and the nodes of
+SPC and SPC1 cards by set number ("spc_7"), where they contain whole facets of the outer surface.
+Every card is read, left aside because a free body does not need it, or refused by name.
 """
 
 from pathlib import Path
@@ -16,6 +16,7 @@ from rom.fe.mesh.cell_types import LOWER_EDGES, UPPER_EDGES, UPRIGHT_EDGES
 from rom.fe.mesh.solid import Read, packed
 from rom.fe.mesh.sources.deck import (
     facets_of_nodes,
+    of_materials,
     only_type,
     outer_facets,
     positions,
@@ -30,7 +31,10 @@ EDGES = {"hex20": (*LOWER_EDGES, *UPRIGHT_EDGES, *UPPER_EDGES)}
 SKIN_CARDS = {"CTRIA3": 3, "CTRIA6": 3, "CQUAD4": 4, "CQUAD8": 4}  # corners
 LINES = ("CBAR",)  # without a property, as gmsh writes curves
 MESH_CARDS = {*POINTS, *SOLIDS, *SKIN_CARDS, "SPC", "SPC1"}
-HARMLESS_CARDS = tuple("PARAM MAT EIG TABLE PSOLID PLSOLID SET1 SET3 PLOTEL ECHO".split())
+SECTIONS, MATERIALS = ("PSOLID", "PLSOLID"), "MAT"
+OF_MAT1 = {"MAT1", "MATS1", "MATCID"}  # with what a linear isotropic solid does not need
+HARMLESS_CARDS = tuple("EIG TABLE SET1 SET3 PLOTEL ECHO".split())
+CONTRADICTION = 0.01  # of E, G and NU, from where Nastran warns
 # loads, supports, steps, and what a reduction there holds
 LOAD_CARDS = set(
     "FORCE FORCE1 FORCE2 MOMENT MOMENT1 MOMENT2 PLOAD PLOAD1 PLOAD2 PLOAD4 GRAV ACCEL ACCEL1 "
@@ -58,6 +62,7 @@ def read(path: str) -> Read:
     names = {int(p): f"property_{p}" for p in np.unique(properties)}
     remarks = [*found[1], *remarks, *unused(ids, cells)]
     told = {"region_names": names, "warnings": remarks, "provenance": {"parameters": {}}}
+    told |= of_materials(_materials, found[0], list(names))
     return packed(points, cells, cell_type, properties, numbers, facets=facets, **told)
 
 
@@ -66,7 +71,9 @@ def _sorted(path: Path) -> tuple[dict[str, list[Card]], list[str]]:
     found: dict[str, list[Card]] = {}
     unread, aside = Unread(), Unread()
     for card in cards(path):
-        if card.name in MESH_CARDS:
+        if card.name in SECTIONS and card.text(6) not in ("", "SMECH"):
+            unread.add(f"{card.name}, {card.text(6)}", card.place)
+        elif card.name in (*MESH_CARDS, *SECTIONS, "PARAM") or card.name.startswith(MATERIALS):
             found.setdefault(card.name, []).append(card)
         elif card.name in LOAD_CARDS or card.name in LINES:
             aside.add(card.name, card.place)
@@ -95,6 +102,42 @@ def _property(card: Card) -> int:
     if not card.text(1):
         raise card.wrong("it has no property number")
     return card.whole(1)
+
+
+def _materials(found: dict[str, list[Card]], properties: list[int]) -> dict[str, list[float]]:
+    """{region: E, nu and rho} of the material of each property, in units of the deck."""
+    sections = _numbered([card for name in SECTIONS for card in found.get(name, ())], properties)
+    used, unread = [card.whole(1) for card in sections], Unread()
+    for name in sorted(found.keys() - OF_MAT1):
+        for card in found[name]:
+            if name.startswith(MATERIALS) and card.whole(0) in used:
+                unread.add(name, card.place)
+    unread.refuse()
+    factors = {card.reals(1)[0] for card in found.get("PARAM", ()) if card.text(0) == "WTMASS"}
+    if len(factors) > 1:
+        raise found["PARAM"][0].wrong(f"WTMASS has the values {sorted(factors)}")
+    solids = (_isotropic(card, *factors) for card in _numbered(found.get("MAT1", []), used))
+    return {f"property_{p}": numbers for p, numbers in zip(properties, solids, strict=True)}
+
+
+def _numbered(some: list[Card], wanted: list[int]) -> list[Card]:
+    """The cards of these numbers, each there once."""
+    labels, name = np.array([card.whole(0) for card in some]), some[0].name if some else "MAT1"
+    return [some[k] for k in positions(labels, np.array(wanted), name)]
+
+
+def _isotropic(card: Card, per_weight: float = 1.0) -> list[float]:
+    """E, nu and rho of a MAT1, of whose E, G and NU one may be missing."""
+    E, G, nu, rho = card.reals(1, 2, 3, 4)
+    if (E > 0) + (G > 0) + bool(card.text(3)) < 2:
+        raise card.wrong("two of E, G and NU are needed")
+    if rho <= 0:
+        raise card.wrong(f"RHO = {rho:g}, and a body needs mass")
+    E = E or 2 * (1 + nu) * G
+    nu = nu if card.text(3) else E / (2 * G) - 1
+    if G and abs(E - 2 * (1 + nu) * G) > CONTRADICTION * E:
+        raise card.wrong(f"E = {E:g}, G = {G:g} and NU = {nu:g} contradict each other")
+    return [E, nu, rho * per_weight]
 
 
 def _sets(found: dict[str, list[Card]], ids: Index) -> dict[str, list[int]]:
