@@ -88,10 +88,10 @@ def _keys_of(made: Any, kinds: Mapping[str, Kind], defaults: Mapping[str, object
     sentences = _sentences(getdoc(made) or "")
     found = []
     for one in parameters_of(made):
-        if one.kind is not Parameter.KEYWORD_ONLY and not is_dataclass(made):
-            continue
         default = ... if one.default is Parameter.empty else one.default
-        if (kind := kinds.get(one.name) or _kind(one.annotation)) is not None:
+        kind = kinds.get(one.name) or _kind(one.annotation)
+        named = one.kind is Parameter.KEYWORD_ONLY or isinstance(kind, Quantity)
+        if kind is not None and (named or is_dataclass(made)):
             about = sentences.get(one.name) or f"{one.name.replace('_', ' ').capitalize()}."
             found.append(Key(one.name, kind, about, defaults.get(one.name, default)))
     return found
