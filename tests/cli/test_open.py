@@ -109,7 +109,7 @@ def test_a_face_that_is_clicked_is_what_the_part_hangs_on(tmp_path):
         assert f"plane, {area:.4g} mm²" in shown.run("document.querySelector('#chosen').innerText")
         shown.run("document.querySelector('[name=name]').value = 'side'")
         shown.click("[name=swing]")
-        shown.until("document.querySelector('#result iframe') !== null")
+        shown.until("document.querySelector('#result iframe') !== null", 600)
         assert "rom swing plate_open/plate.toml --hinge side" in shown.run(progress)
         assert "held at side" in shown.run(progress) and not shown.complaints
         shown.click("[name=swing]")

@@ -105,9 +105,9 @@ class Browser:
         assert "exceptionDetails" not in found, found["exceptionDetails"]
         return found["result"].get("value")
 
-    def until(self, condition):
+    def until(self, condition, seconds=TIME_LIMIT):
         """Wait for what the page says itself."""
-        end = time.monotonic() + TIME_LIMIT
+        end = time.monotonic() + seconds
         while not self.run(condition):
             assert time.monotonic() < end, condition
 
