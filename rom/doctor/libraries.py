@@ -9,6 +9,7 @@ import re
 import shutil
 import sys
 import time
+import timeit
 from collections.abc import Iterator, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -51,12 +52,16 @@ def light() -> list[Finding]:
     """Python and the libraries everything needs; without them nothing of rom starts."""
     kind = "environment" if sys.prefix != sys.base_prefix else "system"
     found = [Finding("Python", "python", f"{platform.python_version()} ({kind}, {sys.prefix})")]
-    for name in ("numpy", "scipy", "numba"):
-        try:
-            found.append(Finding("Python", name, version(name)))
-        except PackageNotFoundError:
-            found.append(Finding("Python", name, "", "broken", f"pip install {name}"))
-    return found
+    needed = ("numpy", "scipy", "numba")
+    return found + [_package("Python", name, "broken", f"pip install {name}") for name in needed]
+
+
+def _package(topic: str, name: str, otherwise: str, advice: str) -> Finding:
+    """A package by its version, or the state of what lacks it."""
+    try:
+        return Finding(topic, name, version(name))
+    except PackageNotFoundError:
+        return Finding(topic, name, "not installed", otherwise, advice)
 
 
 def fenicsx(found: dict[str, Answer], ending: str) -> list[Finding]:
@@ -117,13 +122,9 @@ def command(debian: str, pip: str) -> str:
 
 def sees_debian() -> bool:
     """Whether this Python looks where Debian installs its packages."""
-    return not _closed() and Path(sys.base_prefix).samefile("/usr")
-
-
-def _closed() -> bool:
     config = Path(sys.prefix, "pyvenv.cfg")
-    text = config.read_text() if config.is_file() else ""
-    return "include-system-site-packages = false" in text
+    closed = config.is_file() and "include-system-site-packages = false" in config.read_text()
+    return not closed and Path(sys.base_prefix).samefile("/usr")
 
 
 def _other_ways() -> list[Finding]:
@@ -146,58 +147,39 @@ def _other_ways() -> list[Finding]:
 
 def pictures(found: dict[str, Answer], ending: str) -> list[Finding]:
     """Versions, and whether a sphere could be drawn off-screen."""
+    advice = INSTALL_COMMAND + (BESIDE_DEBIAN if sees_debian() else "")
+    matplotlib = _package("pictures", "matplotlib", "missing", advice)
     if "pyvista" not in found:
         state = "missing" if "No module named" in ending else "broken"
         value = "not installed" if state == "missing" else ending
-        return [Finding("pictures", "pyvista", value, state, _for_pictures()), _matplotlib()]
+        return [Finding("pictures", "pyvista", value, state, advice), matplotlib]
     versions = [Finding("pictures", name, found[name]["version"]) for name in ("pyvista", "vtk")]
-    return [*versions, _matplotlib(), _display(found.get("picture"), ending)]
-
-
-def _matplotlib() -> Finding:
-    try:
-        return Finding("pictures", "matplotlib", version("matplotlib"))
-    except PackageNotFoundError:
-        return Finding("pictures", "matplotlib", "not installed", "missing", _for_pictures())
-
-
-def _for_pictures() -> str:
-    return INSTALL_COMMAND + (BESIDE_DEBIAN if sees_debian() else "")
+    return [*versions, matplotlib, _display(found.get("picture"), ending)]
 
 
 def _display(picture: Answer | None, ending: str) -> Finding:
-    name = "drawing off-screen"
-    if picture is None:
-        return Finding("pictures", name, ending or "no answer", "broken", SYSTEM_COMMAND)
-    if picture["contrast"] < MIN_CONTRAST:
-        return Finding(
-            "pictures", name, f"{picture['window']} draws blank", "broken", SYSTEM_COMMAND
-        )
-    return Finding("pictures", name, f"{picture['window']}, {picture['seconds']} s")
+    name, window = "drawing off-screen", picture["window"] if picture else ""
+    if picture and picture["contrast"] >= MIN_CONTRAST:
+        return Finding("pictures", name, f"{window}, {picture['seconds']} s")
+    value = f"{window} draws blank" if picture else ending or "no answer"
+    return Finding("pictures", name, value, "broken", SYSTEM_COMMAND)
 
 
 def blas(mapped: list[str]) -> list[Finding]:
     """Which BLAS of the files a process with PETSc has mapped, or this one, and how fast it is."""
-    speed = _gigaflops()
     files = sorted({f for f in mapped or mapped_files() if BLAS_FILE.search(f)})
     slow = [f for f in files if not FAST_BLAS.search(f)]
-    named = ", ".join(slow or files) or "not found in the memory map"
-    found = [Finding("BLAS", "library", named)]
+    found = [Finding("BLAS", "library", ", ".join(files) or "not found in the memory map")]
     if slow:
-        found = [Finding("BLAS", "library", f"reference, {named}", "note", SLOW_ADVICE)]
+        named = f"reference, {', '.join(slow)}"
+        found = [Finding("BLAS", "library", named, "note", SLOW_ADVICE)]
     wanted = better(taken_for(), abilities())
     if wanted:
         advice = f"several times faster: export OPENBLAS_CORETYPE={wanted}"
         found.append(Finding("BLAS", "processor", f"taken for a {taken_for()}", "note", advice))
-    return [*found, Finding("BLAS", "matrix product", f"{speed:.1f} GFlop/s")]
-
-
-def _gigaflops(n: int = 400) -> float:
-    A = np.ones((n, n))
-    A @ A
-    began = time.perf_counter()
-    A @ A
-    return 2e-9 * n**3 / (time.perf_counter() - began)
+    A = np.ones((400, 400))
+    seconds = timeit.repeat(lambda: A @ A, number=1, repeat=2)[1]  # the first one wakes it up
+    return [*found, Finding("BLAS", "matrix product", f"{2e-9 * 400**3 / seconds:.1f} GFlop/s")]
 
 
 def machine() -> list[Finding]:
