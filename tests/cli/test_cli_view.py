@@ -64,7 +64,7 @@ def test_with_a_display_it_opens_a_window(folder, bar, monkeypatch, capsys):
 
 def test_a_mode_swings_about_the_shape_at_rest(bar):
     scene = window.mode_scenes(bar, 1, ("root",))[0]
-    X, moved = bar.surface.points, scene.actors[0].points
+    X, moved = bar.surface.points, scene.things["moving"].points
     np.testing.assert_allclose(moved.mean(axis=0), X, atol=1e-12)
     largest = np.linalg.norm(moved - X, axis=2).max()
     np.testing.assert_allclose(largest, 0.08 * np.ptp(X, axis=0).max(), rtol=1e-9)

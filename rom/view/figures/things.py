@@ -294,7 +294,7 @@ def _edges(name: str, thing: Thing, points: Array, cells: Index) -> list[Actor]:
     pairs = np.asarray(thing.edges).reshape(-1, 2)
     n = points.shape[1]
     _require(_between(pairs, n), name, f"edges must be pairs from 0 to {n - 1}")
-    return [Actor(points, pairs, colour="#6b7480", width=0.6)]
+    return [Actor(points, pairs, colour="#6b7480", width=0.6)] if len(pairs) else []
 
 
 def _require(holds: bool, name: str, what: str) -> None:

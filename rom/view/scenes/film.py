@@ -22,7 +22,6 @@ from rom.view.figures.things import (
     STILL_WIDTH,
     Scene,
     Thing,
-    actors_of,
     as_thing,
     film,
     scene_page,
@@ -315,23 +314,25 @@ def start(
     Raises:
         ConfigError: if pictures cannot be made here.
     """
-    up = upright(mechanism, up)
-    things = _things(mechanism, symbols=symbols, up=up)
-    whole = seen(Scene(title, things, view=view, up=up), START_WIDTH)
+    scene = start_scene(mechanism, title, symbols=symbols, view=view, up=up)
     words = (
         f"{len(mechanism.parts)} bodies as they are placed, before joints pull them together. "
         "Flexible bodies are drawn by their surface, rigid ones as tubes from the mass centre to "
         "their markers, in a block of the same mass and inertia."
     )
-    return scene_page(whole, words)
+    return scene_page(seen(scene, START_WIDTH), words)
 
 
-def start_actors(mechanism: "Mechanism") -> list[Actor]:
-    """Bodies as they are placed, their sharp edges, and the symbols between them."""
-    return actors_of(Scene("", _things(mechanism, symbols=True, up=None)))
-
-
-def _things(mechanism: "Mechanism", *, symbols: bool, up: Direction) -> dict[str, Thing | Mesh]:
+def start_scene(
+    mechanism: "Mechanism",
+    title: str,
+    *,
+    symbols: bool = True,
+    view: Direction = None,
+    up: Direction = None,
+) -> Scene:
+    """A mechanism as its bodies are placed; arguments as of `start`."""
+    up = upright(mechanism, up)
     places = at_start(mechanism)
     things: dict[str, Thing | Mesh] = {}
     for k, part in enumerate(mechanism.parts.values()):
@@ -343,4 +344,5 @@ def _things(mechanism: "Mechanism", *, symbols: bool, up: Direction) -> dict[str
             block = placed(form.block[0][None], pose), form.block[1]
             things[f"_block {k}"] = Thing(*block, colour, None, BOX_OPACITY, 1.0, NO_LINES)
     more = together(symbols_of(places, Look({}, up=up))) if symbols else []
-    return things | {f"_symbol {k}": as_thing(actor) for k, actor in enumerate(more)}
+    things |= {f"_symbol {k}": as_thing(actor) for k, actor in enumerate(more)}
+    return Scene(title, things, view=view, up=up)
