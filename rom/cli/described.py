@@ -4,6 +4,7 @@ import argparse
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+import rom
 from rom.arguments import Quantity, Whole
 from rom.cli.options import count, faces, meshing, names, number_or_text, numbers_of, option, unique
 from rom.config.component_keys import TABLE
@@ -74,16 +75,12 @@ def described(args: argparse.Namespace) -> bool:
 
 def component(args: argparse.Namespace, *extra: str) -> "Component":
     """The component of the file, with what the command line changes but for extra options."""
-    from rom.config.component import read_component
-
-    return read_component(args.file, changes(args.given, PLACES, extra), **meshing(args))
+    return rom.read_component(args.file, changes(args.given, PLACES, extra), **meshing(args))
 
 
 def mechanism(args: argparse.Namespace, *extra: str) -> "MechanismFile":
     """The mechanism of the file, with what the command line changes but for extra options."""
-    from rom.config.mechanism import read_mechanism
-
-    return read_mechanism(args.file, changes(args.given, MOTION_KEYS, extra), **meshing(args))
+    return rom.read_mechanism(args.file, changes(args.given, MOTION_KEYS, extra), **meshing(args))
 
 
 def changes(

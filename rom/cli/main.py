@@ -7,6 +7,7 @@ import traceback
 from contextlib import ExitStack
 from functools import partial
 
+import rom
 from rom.cli.described import TOML_SUFFIX
 from rom.cli.parser import build_parser, given
 from rom.cli.speech import OutputOptions, output_options, present, print_error, say, speaking
@@ -73,9 +74,7 @@ def run(argv: list[str], options: OutputOptions) -> int:
         args.given = given(argv)
     args.argv = argv
     if args.version:
-        from rom import __version__
-
-        say(f"rom {__version__}")
+        say(f"rom {rom.__version__}")
         return 0
     if args.verb is None:
         raise ConfigError("no verb was given.", hint="rom --help lists the verbs.")

@@ -2,14 +2,12 @@
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+import rom
 from rom.cli.options import assignment, material, option, reading, require, unique, verb_parsers
 from rom.errors import ConfigError
+from rom.model import FEModel, Index
 from rom.names import is_whole, named
-
-if TYPE_CHECKING:
-    from rom.model import FEModel, Index
 
 GEOMETRY_OPTIONS = (
     "E nu rho degree solver parameter face scale order trust time_limit memory_limit".split()
@@ -37,7 +35,7 @@ def solid_options(args: argparse.Namespace) -> dict[str, float | None]:
     return {f"--{name}": getattr(args, name) for name in names}
 
 
-def read_model(args: argparse.Namespace) -> "FEModel":
+def read_model(args: argparse.Namespace) -> FEModel:
     """The model that options ask for, of a geometry or of matrices."""
     if args.mass is not None:
         return read_matrices(args)
@@ -53,10 +51,9 @@ def read_model(args: argparse.Namespace) -> "FEModel":
     return model(args.file, **how)
 
 
-def read_matrices(args: argparse.Namespace) -> "FEModel":
+def read_matrices(args: argparse.Namespace) -> FEModel:
     """The model of the matrices the options name."""
     from rom.config.component import source
-    from rom.io.matrices.read_model import read_model
 
     parser = verb_parsers(args.parser)[args.verb]
     odd = [name for name in GEOMETRY_OPTIONS if getattr(args, name) != parser.get_default(name)]
@@ -67,7 +64,7 @@ def read_matrices(args: argparse.Namespace) -> "FEModel":
         raise ConfigError("--mass needs --nodes, the file with the places of the nodes.")
     held = [word.partition(":")[0] for word in getattr(args, "fixed", ())]
     names = [*unique(args.interface, "-i"), *held]
-    return read_model(
+    return rom.read_model(
         source(str(args.file)),
         source(args.mass),
         nodes=args.nodes,
@@ -76,10 +73,8 @@ def read_matrices(args: argparse.Namespace) -> "FEModel":
     )
 
 
-def _sets(args: argparse.Namespace, names: list[str]) -> "dict[str, list[int] | Index]":
+def _sets(args: argparse.Namespace, names: list[str]) -> dict[str, list[int] | Index]:
     """Labels of the nodes of each interface."""
-    from rom.io.matrices.node_files import read_node_sets
-
     found = unique([(name, labels(text)) for name, text in args.set], "--set")
     if unused := sorted(set(found) - set(names)):
         raise ConfigError(f"--set {', '.join(unused)} is no interface; name it by -i or --fixed.")
@@ -87,7 +82,7 @@ def _sets(args: argparse.Namespace, names: list[str]) -> "dict[str, list[int] | 
     if remaining and args.nodes.suffix.lower() != ".inp":
         what = f"which nodes are the interface {named(remaining)}? {args.nodes} has no node sets"
         raise ConfigError(f"{what}; for example --set {remaining[0]}=11-14,20.")
-    return found | (read_node_sets(args.nodes, remaining) if remaining else {})
+    return found | (rom.io.read_node_sets(args.nodes, remaining) if remaining else {})
 
 
 def labels(text: str) -> list[int]:

@@ -4,18 +4,16 @@ import argparse
 from collections.abc import Callable, Mapping
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
 from rom.arguments import NotNegative, Number, Positive, Quantity
 from rom.errors import ConfigError
 from rom.material import SOLIDS
+from rom.model import Material
 from rom.names import check_once, is_whole
 from rom.units import in_si
-
-if TYPE_CHECKING:
-    from rom.model import Material
 
 T = TypeVar("T")
 Kind = Callable[[str], object]  # what reads the value of an option
@@ -236,10 +234,8 @@ def meshing(args: argparse.Namespace) -> Keywords:
     return {"trust": args.trust, "time_limit": args.time_limit, "memory_limit": memory}
 
 
-def material(args: argparse.Namespace) -> "Material":
+def material(args: argparse.Namespace) -> Material:
     """The material the options ask for."""
-    from rom.model import Material
-
     return Material(E=args.E, nu=args.nu, rho=args.rho)
 
 

@@ -7,11 +7,13 @@ coordinates: the page computes the place of a point from x = r + A (X + S q), as
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import cycle
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+import rom.body
+import rom.mbs
 from rom.arguments import finite, positive
 from rom.body.records import Surface
 from rom.body.recovery import StressRecovery, von_mises
@@ -26,12 +28,6 @@ from rom.view.scenes.film import METAL_COLOURS, shades_of
 from rom.view.scenes.mode_shapes import AMPLITUDE_RATIO, displacement
 from rom.view.scenes.places import evenly, placed
 from rom.view.scenes.rigid import bars, check_bodies, ends_of
-
-if TYPE_CHECKING:
-    from rom.body.flexible import FlexibleBody
-    from rom.mbs.mechanism import Mechanism
-    from rom.mbs.parts.bodies import Part
-    from rom.mbs.results.solution import Solution
 
 SCHEMA_NAME, SCHEMA_VERSION = "rom-scene", [1, 0]
 SHAPE_BYTES = 1_300_000  # of all shapes and stresses of a scene
@@ -70,7 +66,7 @@ class Thing:
         return placed(box[None], (self.position, turned)).reshape(-1, 3)
 
 
-def modes_scene(body: "FlexibleBody", *, size: int = SHAPE_BYTES) -> Scene:
+def modes_scene(body: "rom.body.FlexibleBody", *, size: int = SHAPE_BYTES) -> Scene:
     """The modes of a body in each support of its comparison, and its elastic coordinates.
 
     A surface whose shapes take more bytes than ``size`` is made coarser.
@@ -101,7 +97,7 @@ def modes_scene(body: "FlexibleBody", *, size: int = SHAPE_BYTES) -> Scene:
 
 
 def motion_scene(
-    solution: "Solution",
+    solution: "rom.mbs.Solution",
     *,
     title: str = "Motion",
     shapes: dict[str, Mesh] | None = None,
@@ -128,7 +124,7 @@ def motion_scene(
 
 
 def start_scene(
-    mechanism: "Mechanism",
+    mechanism: "rom.mbs.Mechanism",
     *,
     title: str = "Mechanism at its start",
     view: npt.ArrayLike | None = None,
@@ -158,7 +154,7 @@ def faces_scene(points: Array, patches: Mapping[str, Index], *, title: str) -> S
     }
 
 
-def _meshes(shapes: dict[str, Mesh], mechanism: "Mechanism") -> dict[str, Mesh]:
+def _meshes(shapes: dict[str, Mesh], mechanism: "rom.mbs.Mechanism") -> dict[str, Mesh]:
     """The shapes of bodies, if the mechanism has these and the triangles have their corners."""
     check_bodies(mechanism, "shapes", shapes)
     found = {}
@@ -179,7 +175,7 @@ def _surface(body: object) -> Surface | None:
     return surface if surface is not None and len(surface.triangles) else None
 
 
-def _stress(body: "FlexibleBody") -> Array | None:
+def _stress(body: "rom.body.FlexibleBody") -> Array | None:
     """(6 s, r) stress on the points of the surface, where the body has it and it is linear."""
     surface, recovery = _surface(body), body.stress
     if surface is None or not isinstance(recovery, StressRecovery):
@@ -187,7 +183,7 @@ def _stress(body: "FlexibleBody") -> Array | None:
     return recovery.operator if recovery.points.shape == surface.points.shape else None
 
 
-def _modes(body: "FlexibleBody") -> Iterator[Scene]:
+def _modes(body: "rom.body.FlexibleBody") -> Iterator[Scene]:
     """The modes whose frequencies a report lists, support by support."""
     compared = body.provenance.get("comparison", {})
     supports = {"free": ()} | {f"{name} held": (name,) for name in body.markers}
@@ -214,26 +210,26 @@ def _felt(shapes: Array, stress: Array | None, Q: Array, far: Array) -> Index:
     return np.flatnonzero(seen.any(axis=0))
 
 
-def _steps(solution: "Solution") -> Index:
+def _steps(solution: "rom.mbs.Solution") -> Index:
     """Numbers of the instants that are kept, evenly over the saved ones."""
     per_frame = 4 * sum(7 + part.r for part in solution.mechanism.parts.values())
     n = int(np.clip(MOTION_BYTES // max(per_frame, 1), 2, N_FRAMES))
     return np.unique(evenly(len(solution.t), n))
 
 
-def _colours(mechanism: "Mechanism") -> list[str]:
+def _colours(mechanism: "rom.mbs.Mechanism") -> list[str]:
     shades, elastic = shades_of(mechanism), cycle(ELASTIC_COLOURS)
     bare = {name for name, part in mechanism.parts.items() if _surface(part.flexible) is None}
     return [METAL_COLOURS[shades[n]] if n in bare else next(elastic) for n in mechanism.parts]
 
 
-def _bars(mechanism: "Mechanism", name: str) -> Mesh:
+def _bars(mechanism: "rom.mbs.Mechanism", name: str) -> Mesh:
     """What stands for a body without a surface."""
     return bars(mechanism.parts[name], ends_of(mechanism, name))
 
 
 def _of_part(
-    part: "Part", colour: str, shape: Mesh, pose: tuple[Array, Array], q: Array | None
+    part: "rom.mbs.Part", colour: str, shape: Mesh, pose: tuple[Array, Array], q: Array | None
 ) -> Thing:
     """A body of a mechanism, by its surface, or else a shape."""
     surface = _surface(part.flexible)

@@ -7,6 +7,7 @@ with it.
 import argparse
 from pathlib import Path
 
+import rom
 from rom.cli.answer import Answer, Data, failures, report_data
 from rom.cli.described import described
 from rom.errors import FileFormatError
@@ -40,7 +41,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> Answer:
     """Load and check."""
-    from rom.checks.gates import check
     from rom.io.native import load
 
     data: Data = {"file": str(args.file)}
@@ -49,14 +49,12 @@ def run(args: argparse.Namespace) -> Answer:
     if known or described(args):
         return _told(args.file, *known) if known else _description(args.file)
     if ending == ".sid_fem":
-        from rom.io.sid.dialect import check_sid, read_sid
-
-        record = read_sid(args.file, ge="as_written")
-        report = check_sid(record)
+        record = rom.read_sid(args.file, ge="as_written")
+        report = rom.io.check_sid(record)
         data |= {"name": record.name, "dialect": record.dialect}
     else:
         body = load(args.file)
-        report = check(body)
+        report = rom.check(body)
         data |= {"name": body.name}
     data |= {"report": report_data(report)}
     return Answer(data, f"{args.file}\n{report}", failed=failures(report))
@@ -73,12 +71,10 @@ def _told(file: Path, what: str, *commands: str) -> Answer:
 
 
 def _description(file: Path) -> Answer:
-    from rom.config.component import read_component
     from rom.config.document import read_document
-    from rom.config.mechanism import read_mechanism
 
     if "bodies" in read_document(file).data:
-        read_mechanism(file)
+        rom.read_mechanism(file)
         return _told(file, "a mechanism without mistakes", "rom simulate {}", "rom view {}")
-    read_component(file)
+    rom.read_component(file)
     return _told(file, "a component without mistakes", "rom reduce {}", "rom modes {}")

@@ -6,6 +6,7 @@ A mechanism becomes a Functional Mock-up Unit, .fmu.
 import argparse
 from pathlib import Path
 
+import rom
 from rom.cli.answer import Answer
 from rom.cli.described import described, mechanism
 from rom.cli.options import DURATION, add_meshing, names, option
@@ -45,7 +46,6 @@ def run(args: argparse.Namespace) -> Answer:
 
 
 def _mechanism(args: argparse.Namespace) -> Answer:
-    from rom.config.mechanism_fmu import write_mechanism_fmu
     from rom.io.files import check_writable
 
     check_writable(args.output)
@@ -54,11 +54,11 @@ def _mechanism(args: argparse.Namespace) -> Answer:
     data = {"file": str(args.file), "output": str(args.output), "format": "fmu"}
     text = f"{args.output}: mechanism {file.name} as fmu"
     ends = {"inputs": args.inputs, "outputs": args.outputs}
-    return Answer(data, text, lambda: write_mechanism_fmu(file, args.output, **ends))
+    return Answer(data, text, lambda: rom.write_mechanism_fmu(file, args.output, **ends))
 
 
 def _body(args: argparse.Namespace) -> Answer:
-    from rom.io.export import export, format_of, read_body
+    from rom.io.export import format_of, read_body
     from rom.io.files import check_writable
 
     if wrong := [option for option in MECHANISM_OPTIONS if getattr(args, option)]:
@@ -69,4 +69,4 @@ def _body(args: argparse.Namespace) -> Answer:
     body = read_body(args.file)
     data = {"file": str(args.file), "output": str(args.output), "format": kind}
     text = f"{args.output}: body {body.name} as {kind}"
-    return Answer(data, text, lambda: export(body, args.output, to=kind, held=args.held))
+    return Answer(data, text, lambda: rom.export(body, args.output, to=kind, held=args.held))

@@ -6,6 +6,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import rom
 from rom.cli.answer import Answer, Data, table
 from rom.cli.described import component, described
 from rom.cli.options import add_geometry, add_solid, material, option, reading
@@ -16,7 +17,6 @@ from rom.names import check_ending
 if TYPE_CHECKING:
     from rom.config.component import Solid
     from rom.fe.mesh.solid import SolidMesh
-    from rom.model import Material
 
 DECK_SUFFIX = ".inp"
 CAD_RTOL = 1e-5  # of the size: error of middles of faces, which the CAD finds by integration
@@ -80,7 +80,7 @@ def run(args: argparse.Namespace) -> Answer:
     return Answer(data, _text(data), write=lambda: _save(mesh, args.save, solid))
 
 
-def _solid(args: argparse.Namespace) -> "Material | None":
+def _solid(args: argparse.Namespace) -> rom.Material | None:
     """The material of a deck; None for the mesh alone."""
     given = [f"--{name}" for name in ("E", "nu", "rho") if getattr(args, name) is not None]
     if not given:

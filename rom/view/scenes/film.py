@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+import rom.mbs
 from rom.arguments import AnyMechanism, AnySolution, typed
 from rom.model import Array, Index
 from rom.view.canvas import page
@@ -34,9 +35,6 @@ from rom.view.scenes.rigid import BOX_OPACITY, check_bodies, form_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from rom.mbs.mechanism import Mechanism
-    from rom.mbs.results.solution import Solution
 
 Direction = npt.ArrayLike | None
 N_INSTANTS = 4  # that are chosen where none are asked for
@@ -189,7 +187,9 @@ class Stage:
         return Scene(title, things, label, view, up, self.limits)
 
 
-def _stage(mechanism: "Mechanism", solution: "Solution", steps: Index, look: Look) -> Stage:
+def _stage(
+    mechanism: "rom.mbs.Mechanism", solution: "rom.mbs.Solution", steps: Index, look: Look
+) -> Stage:
     check_bodies(mechanism, "shapes", look.shapes)
     check_bodies(mechanism, "traces", look.traces)
     places = moving(mechanism, solution, steps, look.magnify)
@@ -235,13 +235,13 @@ def symbols_of(places: Places, look: Look) -> list[Actor]:
     return connections(places, drawn, surfaces, up)
 
 
-def upright(mechanism: "Mechanism", up: Direction = None) -> Direction:
+def upright(mechanism: "rom.mbs.Mechanism", up: Direction = None) -> Direction:
     """(3,) what is asked for, or against gravity; None without."""
     gravity = np.asarray(mechanism.gravity, dtype=float)
     return -gravity if up is None and gravity.any() else up
 
 
-def shades_of(mechanism: "Mechanism") -> dict[str, int]:
+def shades_of(mechanism: "rom.mbs.Mechanism") -> dict[str, int]:
     """Number of the grey of each body; all frames of a non-linear body have one."""
     whole = {part.name: name for name, all_ in mechanism.nonlinear.items() for part in all_.parts}
     owner = {name: whole.get(name, name) for name in mechanism.parts}
@@ -324,7 +324,7 @@ def start(
 
 
 def start_scene(
-    mechanism: "Mechanism",
+    mechanism: "rom.mbs.Mechanism",
     title: str,
     *,
     symbols: bool = True,
