@@ -102,8 +102,10 @@ def translated(error: BaseException) -> RomError:
         )
     if isinstance(error, OSError) and error.filename is not None:
         return FileFormatError(f"{error.strerror}.", where=str(error.filename))
+    last = traceback.extract_tb(error.__traceback__)[-1]
+    place = f"{os.path.basename(last.filename)}, line {last.lineno}"
     return InternalError(
-        f"{type(error).__name__}: {error} ({_place(error)})",
+        f"{type(error).__name__}: {error} ({place})",
         hint="This is a mistake of ours: please report it with what --debug prints.",
     )
 
@@ -119,8 +121,3 @@ def _out_of_memory(error: MemoryError) -> ResourceError:
         f"the memory ran out{asked}; this process may take {free_bytes() / 2**30:.3g} GiB more.",
         hint="Use larger elements or fewer modes.",
     )
-
-
-def _place(error: BaseException) -> str:
-    frames = traceback.extract_tb(error.__traceback__)
-    return f"{os.path.basename(frames[-1].filename)}, line {frames[-1].lineno}"

@@ -74,7 +74,6 @@ def read_matrices(args: argparse.Namespace) -> FEModel:
 
 
 def _sets(args: argparse.Namespace, names: list[str]) -> dict[str, list[int] | Index]:
-    """Labels of the nodes of each interface."""
     found = unique([(name, labels(text)) for name, text in args.set], "--set")
     if unused := sorted(set(found) - set(names)):
         raise ConfigError(f"--set {', '.join(unused)} is no interface; name it by -i or --fixed.")

@@ -57,7 +57,6 @@ def checks(report: Report, caption: str) -> str:
 
 
 def _table(header: Sequence[str], lines: Iterable[str], caption: str) -> str:
-    """A table of lines of cells."""
     head = "".join(f"<th>{html.escape(name)}</th>" for name in header)
     rows = "".join(f"<tr>{cells}</tr>" for cells in lines)
     return (

@@ -182,7 +182,6 @@ def _provenance(body: "rom.body.FlexibleBody") -> list[str]:
 
 
 def _stages(stages: dict[str, dict[str, float]]) -> list[str]:
-    """Where the time of the reduction went."""
     pieces = [watch.FACTORISATION_PIECE, watch.SOLUTION_PIECE, watch.SEARCH_PIECE, watch.REST_PIECE]
     notes = (watch.FLOPS_NOTE, watch.MISS_NOTE, watch.RESIDUAL_NOTE)
     rows = []
@@ -200,7 +199,6 @@ def _stages(stages: dict[str, dict[str, float]]) -> list[str]:
 
 
 def _piece(stage: dict[str, float], name: str) -> str:
-    """Seconds of a piece and its number."""
     if name not in stage:
         return ""
     number = stage.get(f"number of {name}")
@@ -252,7 +250,6 @@ def of_mechanism(
 
 
 def _motion(moved: Run, look: Told) -> list[str]:
-    """The motion that was computed for the report, and whether it is to be believed."""
     solution, how = moved.solution, look | {"magnify": moved.file.values["output"]["magnify"]}
     title = f"Motion of {moved.file.name}"
     words = "Instants at which the bodies are farthest from each other."
@@ -335,7 +332,6 @@ def _record(folder: Path) -> Told:
 
 
 def _energy(folder: Path, record: Told) -> list[str]:
-    """Energies over time from the table of the motion."""
     path = folder / "motion.csv"
     if not path.is_file():
         kept = record["files"][0] if record["files"] else "no file"

@@ -64,27 +64,26 @@ def _shown(numbers: tuple[float, float, float]) -> list[str]:
 def _form() -> str:
     E, nu, rho = _shown(SOLIDS[USUAL])
     chosen = (f"<option{' selected' * (name == USUAL)}>{name}</option>" for name in SOLIDS)
+    fields = (
+        f"<label>{html.escape(words)} <input name='{name}' value='{value}' inputmode='decimal' "
+        "size='8'></label>"
+        for name, words, value in (
+            ("E", "E [GPa]", E),
+            ("nu", "Poisson's ratio", nu),
+            ("rho", "Density [kg/m³]", rho),
+            ("size", "Element size [mm], or none for the usual one", ""),
+        )
+    )
     head = "".join(f"<th>{html.escape(name)}</th>" for name in COLUMNS)
     return (
         f"<form id='choice' autocomplete='off'><table id='chosen'><thead><tr>{head}</tr></thead>"
         "<tbody></tbody></table><p id='none'>No face is chosen yet.</p><div class='controls'>"
         f"<label>Material <select name='material'>{''.join(chosen)}"
         "<option value=''>other</option></select></label>"
-        + _fields(
-            {"E": ("E [GPa]", E), "nu": ("Poisson's ratio", nu), "rho": ("Density [kg/m³]", rho)}
-        )
-        + _fields({"size": ("Element size [mm], or none for the usual one", "")})
-        + "</div><div class='controls'><button type='button' name='swing'>Mesh, reduce and swing"
-        "</button><button type='button' name='stop' hidden>Stop</button>"
+        f"{''.join(fields)}</div><div class='controls'>"
+        "<button type='button' name='swing'>Mesh, reduce and swing</button>"
+        "<button type='button' name='stop' hidden>Stop</button>"
         "<button type='button' name='save'>Save as a file</button></div></form>"
-    )
-
-
-def _fields(fields: Mapping[str, tuple[str, str]]) -> str:
-    return "".join(
-        f"<label>{html.escape(words)} <input name='{name}' value='{value}' inputmode='decimal' "
-        "size='8'></label>"
-        for name, (words, value) in fields.items()
     )
 
 

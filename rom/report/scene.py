@@ -224,7 +224,6 @@ def _colours(mechanism: "rom.mbs.Mechanism") -> list[str]:
 
 
 def _bars(mechanism: "rom.mbs.Mechanism", name: str) -> Mesh:
-    """What stands for a body without a surface."""
     return bars(mechanism.parts[name], ends_of(mechanism, name))
 
 

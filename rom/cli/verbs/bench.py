@@ -42,7 +42,6 @@ def run(args: argparse.Namespace) -> Answer:
 
 
 def _of_the_source() -> ModuleType:
-    """The module of all benchmarks, which stand beside the package and are not installed."""
     if not all((FOLDER_ABOVE / file).is_file() for file in SOURCE_FILES):
         raise ConfigError(
             "Benchmarks come with the source of rom, not with the installed package.",

@@ -81,7 +81,6 @@ def run(args: argparse.Namespace) -> Answer:
 
 
 def _solid(args: argparse.Namespace) -> rom.Material | None:
-    """The material of a deck; None for the mesh alone."""
     given = [f"--{name}" for name in ("E", "nu", "rho") if getattr(args, name) is not None]
     if not given:
         return None
@@ -109,7 +108,6 @@ def _save(mesh: "SolidMesh", path: Path, solid: "Solid | dict[str, Solid] | None
 
 
 def _draw(mesh: "SolidMesh", path: Path) -> None:
-    """Listed faces by their numbers, interfaces by their names."""
     from rom.fe.mesh.summary import surface_triangles
     from rom.view.scenes.faces import faces
 
@@ -169,7 +167,6 @@ def _row(face: Data, size: float) -> tuple[str, ...]:
 
 
 def _numbered(face: Data) -> str:
-    """Name of a face without another one."""
     return f"{FACE_WORD} {face['number']}"
 
 

@@ -69,7 +69,6 @@ def run(args: argparse.Namespace) -> Answer:
 def _checked(
     args: argparse.Namespace, output: Any, name: str, inputs: "Iterable[Path]" = ()
 ) -> Path:
-    """The file to write, before anything is computed for it."""
     check_name(name, "a body")
     return checked(args, output or Path(f"{name}.rom.npz"), "npz", inputs=inputs)
 

@@ -172,7 +172,6 @@ def _answer(
 
 
 def _occurred(name: str, times: list[float]) -> str:
-    """A line about an event: how often it happened, and when."""
     if not times:
         return f"Event {name!r} did not happen.\n"
     first = ", ".join(f"{t:.9g}" for t in times[:MOST_TIMES])

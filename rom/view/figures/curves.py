@@ -380,7 +380,6 @@ def near_ticks(axis: "Axis") -> None:
 
 
 def _round(low: float, high: float) -> Array:
-    """1, 2 and 5 times powers of ten from low to high."""
     powers = 10.0 ** np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)) + 1)
     ticks = np.outer(powers, (1.0, 2.0, 5.0)).ravel()
     return ticks[(ticks >= low) & (ticks <= high)]

@@ -148,7 +148,6 @@ def _filled(scene: Scene) -> float:
 
 
 def _legend_height(row: Sequence[Panel | Scene]) -> int:
-    """Of the highest legend in a row [pixel]."""
     rows = [
         page.legend_shape(legend_names(panel), width)[0] if isinstance(panel, Panel) else 0
         for panel, (_, width) in zip(row, _columns(row), strict=True)
@@ -157,7 +156,6 @@ def _legend_height(row: Sequence[Panel | Scene]) -> int:
 
 
 def _draw(axes: "Axes", panel: Panel, numbers: Mapping[str, int]) -> None:
-    """A diagram with the looks of its named curves."""
     curves, points = _lines(panel)
     for name, line in curves.items():
         guide = name not in numbers and (len(curves) > 1 or bool(points))

@@ -298,7 +298,6 @@ def _edges(name: str, thing: Thing, points: Array, cells: Index) -> list[Actor]:
 
 
 def _require(holds: bool, name: str, what: str) -> None:
-    """Refuse a thing by its name."""
     if not holds:
         raise ConfigError(f"{name!r}: {what}.")
 

@@ -14,7 +14,7 @@ from rom.view.canvas import page
 from rom.view.canvas.films import Film, wanted
 from rom.view.canvas.scales import clock_texts, prefixed
 from rom.view.canvas.scene import Actor, sharp_edges
-from rom.view.canvas.solids import Mesh
+from rom.view.canvas.solids import Mesh, joined
 from rom.view.canvas.symbols import polyline
 from rom.view.figures.things import (
     COLOURS,
@@ -272,9 +272,7 @@ def together(actors: list[Actor]) -> list[Actor]:
             look = actor.colour, actor.width, actor.opacity
             plain.setdefault((*look, actor.cells.shape[1], len(actor.points)), []).append(actor)
     for alike in plain.values():
-        first = np.cumsum([0, *(actor.points.shape[1] for actor in alike)])
-        cells = np.vstack([a.cells + n for a, n in zip(alike, first[:-1], strict=True)])
-        points = np.concatenate([actor.points for actor in alike], axis=1)
+        points, cells = joined([(actor.points, actor.cells) for actor in alike])
         kept.append(replace(alike[0], points=points, cells=cells))
     return kept
 
