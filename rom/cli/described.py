@@ -1,7 +1,7 @@
 """Components and mechanisms described by files: what a command line says goes before the file."""
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
 import rom
@@ -102,17 +102,8 @@ def changes(
     return found
 
 
-def _parameters(pairs: list[tuple[str, str]]) -> Changes:
-    values = unique([number_or_text(pair) for pair in pairs], "-p")
-    return {("geometry", "parameters", name): value for name, value in values.items()}
-
-
-def _interfaces(pairs: list[tuple[str, str]]) -> Changes:
-    return {("interfaces", name): kind for name, kind in unique(pairs, "-i").items()}
-
-
-def _faces(pairs: list[tuple[str, str]]) -> Changes:
-    return {("geometry", "faces", name): text for name, text in faces(pairs).items()}
+def _each(option: str, pairs: Iterable[tuple[str, object]], *section: str) -> Changes:
+    return {(*section, name): value for name, value in unique(list(pairs), option).items()}
 
 
 def rayleigh(text: str) -> dict[str, float]:
@@ -127,9 +118,9 @@ def rayleigh(text: str) -> dict[str, float]:
 
 
 SPECIAL_KEYS: dict[str, Callable[[Any], Changes]] = {
-    "parameter": _parameters,
-    "interface": _interfaces,
-    "face": _faces,
+    "parameter": lambda pairs: _each("-p", map(number_or_text, pairs), "geometry", "parameters"),
+    "interface": lambda pairs: _each("-i", pairs, "interfaces"),
+    "face": lambda pairs: _each("--face", faces(pairs).items(), "geometry", "faces"),
     "unite": lambda _: {("geometry", "parameters", "unite"): 1},
     "rayleigh": lambda text: {("damping",): rayleigh(text)},
     "no_certificate": lambda _: {("reduction", "certificate"): False},

@@ -5,7 +5,6 @@ import os
 import sys
 import traceback
 from contextlib import ExitStack
-from functools import partial
 
 import rom
 from rom.cli.described import TOML_SUFFIX
@@ -49,8 +48,13 @@ def _run(argv: list[str], options: OutputOptions) -> int:
     except BaseException as raised:
         if options.debug:
             traceback.print_exception(raised)
-        error = translated(raised)
-        complain = partial(_print_once, raised, error, options)
+        error, ended = translated(raised), isinstance(raised, Terminated)
+
+        def complain() -> None:  # mpirun ends other ranks because of what one has printed
+            rank = ranks()[0]
+            if rank == 0 or not ended:
+                print_error(error, options, rank)
+
         if ranks()[1] == 1:
             complain()
         else:  # once, and every rank ends with the same exit code; MPI is loaded under mpirun only
@@ -58,13 +62,6 @@ def _run(argv: list[str], options: OutputOptions) -> int:
 
             stop_all_ranks(error.exit_code, complain)
         return error.exit_code
-
-
-def _print_once(raised: BaseException, error: RomError, options: OutputOptions) -> None:
-    """Print the error, unless mpirun ends this rank because of one that another has printed."""
-    rank = ranks()[0]
-    if rank == 0 or not isinstance(raised, Terminated):
-        print_error(error, options, rank)
 
 
 def run(argv: list[str], options: OutputOptions) -> int:

@@ -195,10 +195,7 @@ def machine() -> list[Finding]:
 
 
 def caches(forms: Answer, *, fix: bool) -> list[Finding]:
-    """State of the cache of compiled forms, by what the probe says, and of Numba's.
-
-    To fix is to remove damaged files; the probe has removed those of forms.
-    """
+    """State of the cache of forms, by what the probe says and removed, and of that of Numba."""
     found = [_form_cache(forms, fix)] if "path" in forms else []
     own = os.environ.get("NUMBA_CACHE_DIR")  # where Numba may keep what it compiled for rom
     folders = [Path(own), PACKAGE] if own else [PACKAGE]

@@ -49,10 +49,8 @@ def checks(report: Report, caption: str) -> str:
     lines = []
     for row in report.rows:
         verdict = "ok" if row.ok else "failed"
-        cells = f"<td>{html.escape(row.quantity)}</td><td>{_cell(row.value)}</td>"
-        lines.append(
-            f"{cells}<td>{html.escape(row.limit)}</td><td class='{verdict}'>{verdict}</td>"
-        )
+        cells = (f"<td>{_cell(value)}</td>" for value in (row.quantity, row.value, row.limit))
+        lines.append(f"{''.join(cells)}<td class='{verdict}'>{verdict}</td>")
     return _table(("quantity", "value", "limit", ""), lines, caption)
 
 

@@ -50,10 +50,9 @@ def describe(
 ) -> tuple[str, Sections]:
     """Title and sections of a report, for `rom.report.html.write_report`.
 
-    The source is a body file, a component or mechanism file, or the folder of a run; what is drawn
-    of it but cannot be is said in the report. Command and version are for the record. The mechanism
-    of a file is moved if asked for, with progress on stderr. ``meshing`` holds ``trust``,
-    ``time_limit`` and ``memory_limit`` of `rom.read_component`.
+    The source is a body file, a component or mechanism file, or the folder of a run. Command and
+    version are for the record; ``move`` moves the mechanism of a file, with progress on stderr;
+    ``meshing`` holds ``trust``, ``time_limit`` and ``memory_limit`` of `rom.read_component`.
     """
     made = {"rom": version} | versions()
     described = source.suffix.lower() == ".toml" and not source.is_dir()

@@ -27,10 +27,7 @@ Face = dict[str, object]
 def part_page(
     points: Array, patches: Mapping[str, Index], faces: Mapping[str, Face], title: str
 ) -> str:
-    """The page of a part, from points (n, 3) [m], {label: (t, 3) triangles} and its `known_faces`.
-
-    The label "" stands for the rest of the surface, which nobody can choose.
-    """
+    """The page of a part, of points and patches as for `faces_scene`, and its `known_faces`."""
     scene = faces_scene(points, patches, title=title)
     known = {"faces": faces, "materials": {name: _shown(one) for name, one in SOLIDS.items()}}
     data = json.dumps(known).replace("<", "\\u003c")
@@ -43,10 +40,7 @@ def part_page(
 
 
 def known_faces(labels: Iterable[str], listed: Iterable[dict[str, Any]]) -> dict[str, Face]:
-    """{label: what it is, its name, and whether that is the geometry's own} of all faces.
-
-    Those that the CAD lists, by their records, have a name that may be changed.
-    """
+    """{label: what it is, its name, and whether that must stay} of faces of mesh and CAD."""
     found: dict[str, Face] = {name: {"about": "", "name": name, "fixed": True} for name in labels}
     for face in listed:
         radius = f", radius {1e3 * face['radius']:.5g} mm" if face["radius"] else ""

@@ -79,10 +79,7 @@ class Run:
     version: str = ""  # of rom
 
     def write(self, folder: Path) -> None:
-        """Write them; the folder is made if it is missing.
-
-        Pictures come last, so that the motion is there whatever becomes of them.
-        """
+        """Write its files, pictures last, so that the motion is there whatever becomes of them."""
         from rom.report.scene import motion_scene
         from rom.report.scene_file import write_scene
 
@@ -177,8 +174,7 @@ def run(
 ) -> Run:
     """Move the mechanism of a file; command and version are for the record, progress on stderr.
 
-    ``keep`` is a folder that is written while the run lasts, see `made_from`. An unknown column to
-    plot is refused before the run.
+    ``keep`` is a folder that is written while the run lasts, see `made_from`.
     """
     made = file.mechanism()
     if file.values["output"]["plot"]:
@@ -188,10 +184,7 @@ def run(
 
 
 def made_from(file: MechanismFile) -> dict[str, str]:
-    """What the motion of a file depends on, by name: its entries, and the files of its bodies.
-
-    Not its end, which may be another one when an interrupted run goes on.
-    """
+    """What a motion depends on, but for its end, by name: entries, and the files of bodies."""
     found: dict[str, str] = {}
     for section, entries in file.document.data.items():
         if section in ("name", "output", "simulation"):

@@ -27,7 +27,7 @@ from rom.view.figures.things import COLOURS
 from rom.view.scenes.film import METAL_COLOURS, shades_of
 from rom.view.scenes.mode_shapes import AMPLITUDE_RATIO, displacement
 from rom.view.scenes.places import evenly, placed
-from rom.view.scenes.rigid import bars, check_bodies, ends_of
+from rom.view.scenes.rigid import Form, check_bodies, form_of
 
 SCHEMA_NAME, SCHEMA_VERSION = "rom-scene", [1, 0]
 SHAPE_BYTES = 1_300_000  # of all shapes and stresses of a scene
@@ -67,10 +67,7 @@ class Thing:
 
 
 def modes_scene(body: "rom.body.FlexibleBody", *, size: int = SHAPE_BYTES) -> Scene:
-    """The modes of a body in each support of its comparison, and its elastic coordinates.
-
-    A surface whose shapes take more bytes than ``size`` is made coarser.
-    """
+    """The modes of a body by support, and its elastic coordinates, in about ``size`` bytes."""
     body = body.in_units("SI")
     surface, stress, found = _surface(body), _stress(body), list(_modes(body))
     if surface is None:
@@ -110,11 +107,13 @@ def motion_scene(
     given = _meshes(shapes or {}, mechanism)
     positive("magnify", magnify)
     steps = _steps(solution)
-    things = []
-    for (name, part), colour in zip(mechanism.parts.items(), _colours(mechanism), strict=True):
+    things, shades, elastic = [], shades_of(mechanism), cycle(ELASTIC_COLOURS)
+    for name, part in mechanism.parts.items():
         pose = solution.position(name)[steps], solution.orientation(name)[steps]
+        form = form_of(mechanism, name, given)
+        colour = METAL_COLOURS[shades[name]] if form.surface is None else next(elastic)
         q = solution.elastic(name)[steps] if part.r else None
-        things.append(_of_part(part, colour, given.get(name) or _bars(mechanism, name), pose, q))
+        things.append(_of_part(part, colour, form, pose, q))
     limits, t = [_limits(thing) for thing in things], solution.t[steps]
     keys = "displacement", "stress"
     largest = {key: max((one[key] for one in limits), default=0.0) for key in keys}
@@ -132,7 +131,7 @@ def start_scene(
 ) -> Scene:
     """A mechanism as its bodies are placed; arguments as of `rom.view.mechanism`."""
     things = [
-        _of_part(part, colour, _bars(mechanism, name), (part.at[None], part.p[None]), None)
+        _of_part(part, colour, form_of(mechanism, name, {}), (part.at[None], part.p[None]), None)
         for (name, part), colour in zip(mechanism.parts.items(), cycle(COLOURS), strict=False)
     ]
     look = {"view": view, "up": up, "gravity": mechanism.gravity}
@@ -199,10 +198,7 @@ def _modes(body: "rom.body.FlexibleBody") -> Iterator[Scene]:
 
 
 def _felt(shapes: Array, stress: Array | None, Q: Array, far: Array) -> Index:
-    """Numbers of the elastic coordinates that are seen in any of the states Q (m, r).
-
-    By shapes (3 s, r) and stress (6 s, r), against the largest displacements (m,) of the states.
-    """
+    """Elastic coordinates that are seen in a state of Q (m, r) whose displacement is far (m,)."""
     seen = np.abs(Q) * np.abs(shapes).max(axis=0) > SMALLEST_SHARE * far[:, None]
     if stress is not None:
         parts = np.abs(Q) * np.abs(stress).max(axis=0)
@@ -217,25 +213,11 @@ def _steps(solution: "rom.mbs.Solution") -> Index:
     return np.unique(evenly(len(solution.t), n))
 
 
-def _colours(mechanism: "rom.mbs.Mechanism") -> list[str]:
-    shades, elastic = shades_of(mechanism), cycle(ELASTIC_COLOURS)
-    bare = {name for name, part in mechanism.parts.items() if _surface(part.flexible) is None}
-    return [METAL_COLOURS[shades[n]] if n in bare else next(elastic) for n in mechanism.parts]
-
-
-def _bars(mechanism: "rom.mbs.Mechanism", name: str) -> Mesh:
-    return bars(mechanism.parts[name], ends_of(mechanism, name))
-
-
 def _of_part(
-    part: "rom.mbs.Part", colour: str, shape: Mesh, pose: tuple[Array, Array], q: Array | None
+    part: "rom.mbs.Part", colour: str, form: Form, pose: tuple[Array, Array], q: Array | None
 ) -> Thing:
-    """A body of a mechanism, by its surface, or else a shape."""
-    surface = _surface(part.flexible)
-    if surface is None:
-        return Thing(part.name, colour, *shape, *pose)
-    mesh = surface.points, surface.triangles
-    if q is None or not part.r:
+    mesh, surface = (form.points, form.triangles), form.surface
+    if surface is None or q is None:
         return Thing(part.name, colour, *mesh, *pose)
     stress = _stress(part.flexible)
     far = np.array([max(_chunked(lambda u: np.abs(u).max(), surface.shape, q))])

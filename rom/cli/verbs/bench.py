@@ -38,7 +38,13 @@ def run(args: argparse.Namespace) -> Answer:
     if args.list:
         about = {name: (f.__doc__ or "").split("\n")[0] for name, f in known.BENCHMARKS.items()}
         return Answer({"benchmarks": about}, table(("benchmark", ""), about.items()))
-    return _answer(list(_told(known.run(tuple(args.names)))))
+    figures = list(_told(known.run(tuple(args.names))))
+    rows = [
+        (f"{f.benchmark}, {f.case}: {f.quantity}", f"{f.value:.4g} {f.unit}".strip(), f.aim)
+        for f in figures
+    ]
+    data: Data = {"figures": [asdict(f) for f in figures]}
+    return Answer(data, table(("figure", "value", "aim"), rows))
 
 
 def _of_the_source() -> ModuleType:
@@ -56,12 +62,3 @@ def _told(figures: "Iterator[Figure]") -> "Iterator[Figure]":
     for figure in figures:
         log.info("%s: %s %.4g %s", figure.case, figure.quantity, figure.value, figure.unit)
         yield figure
-
-
-def _answer(figures: "list[Figure]") -> Answer:
-    rows = [
-        (f"{f.benchmark}, {f.case}: {f.quantity}", f"{f.value:.4g} {f.unit}".strip(), f.aim)
-        for f in figures
-    ]
-    data: Data = {"figures": [asdict(f) for f in figures]}
-    return Answer(data, table(("figure", "value", "aim"), rows))

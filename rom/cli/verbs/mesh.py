@@ -125,17 +125,11 @@ def _text(data: Data) -> str:
         for name, value in data["quality"].items()
     )
     regions = [(name, str(r["cells"]), f"{r['volume']:.6g}") for name, r in data["regions"].items()]
-    faces = [
-        (
-            name,
-            str(f["facets"]),
-            str(f["nodes"]),
-            _words(f["middle"], size),
-            _words(f.get("axis", ())),
-        )
-        for name, f in data["interfaces"].items()
-        if name not in numbered
-    ]
+    faces = []
+    for name, f in data["interfaces"].items():
+        if name not in numbered:
+            places = _words(f["middle"], size), _words(f.get("axis", ()))
+            faces.append((name, str(f["facets"]), str(f["nodes"]), *places))
     box = " x ".join(f"{high - low:.4g}" for low, high in data["box"])
     parts = [
         f"{data['file']}: {data['cells']} cells {data['cell_type']}, {data['nodes']} nodes",

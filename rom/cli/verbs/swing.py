@@ -259,10 +259,7 @@ def pendulum(
 
 
 def magnification(body: "rom.FlexibleBody", q: Array) -> float:
-    """1, 2 or 5 times a power of ten, at least 1, with which the largest deformation is seen.
-
-    Of a body with its surface, over elastic coordinates q (n_t, r).
-    """
+    """A round factor, at least 1, with which the largest deformation by q (n_t, r) is seen."""
     shape = body.surface.shape
     largest = max(float(np.linalg.norm((shape @ x).reshape(-1, 3), axis=1).max()) for x in q)
     wanted = DRAWN_DEFORMATION_RATIO * body.size / max(largest, 1e-12 * body.size)

@@ -128,7 +128,9 @@ def _histories(
             values = np.full_like(t, given)
             look |= LEVEL_STYLE
         elif given.dtype.kind == "U":
-            values = _rows(axes, given)
+            words = list(dict.fromkeys(given))
+            axes.set_yticks(range(len(words)), words)
+            values = [words.index(word) for word in given]
         x, y = (np.asarray(v, dtype=float) for v in (where, values))
         one_each(f"values of {name!r}", y.shape, "times", x.shape)
         lines.append((x, y))
@@ -145,18 +147,8 @@ def line_look(k: int) -> page.Style:
     return {"color": LINES[colour], "ls": DASHES[dash], "lw": 1.4, "zorder": 2.0 + 0.1 * dash}
 
 
-def _rows(axes: "Axes", words: Iterable[str]) -> Array:
-    """(n,) numbers of words in the order in which they come, named at the axis."""
-    names = list(dict.fromkeys(words))
-    axes.set_yticks(range(len(names)), names)
-    return np.array([names.index(word) for word in words], dtype=float)
-
-
 def _complete(areas: Sequence["Axes"], xlabel: str, ax: object) -> None:
-    """Names of axes; on a page one horizontal axis for all, and legends above, equal ones once.
-
-    Axes of a caller keep their own, with what is named.
-    """
+    """Names of axes; on a page, not in axes of a caller, one horizontal axis and legends above."""
     for axes in areas:
         axes.set_xlabel(xlabel)
     one_scale(areas)

@@ -112,10 +112,7 @@ def panels(
 
 
 def _columns(row: Sequence[Panel | Scene]) -> list[tuple[float, float]]:
-    """Left end and width of each diagram [pixel]; names of bars stand left of them.
-
-    A scene is no wider than it fills, if there is something else.
-    """
+    """Left end and width of each diagram [pixel]; a scene beside others is as wide as it fills."""
     whole = PAGE_WIDTH - 2 * RIGHT_MARGIN
     widths = [min(_filled(x), whole / len(row)) if isinstance(x, Scene) else 0.0 for x in row]
     others = widths.count(0.0)

@@ -96,10 +96,7 @@ def support(
 
 
 def wall(scenery: Scenery, point: Array, normal: Array, foot: float = 0.0) -> Iterator[Actor]:
-    """Hatched ground whose surface is at a point (3,) and faces along a normal (3,).
-
-    The foot is the width of what stands on it [m].
-    """
+    """Hatched ground at a point (3,) that faces along a normal (3,), about a foot so wide [m]."""
     axes = np.roll(upright(normal, scenery.up), -1, axis=1)  # the normal last
     size = max(5.0 * scenery.size, WALL_RATIO * foot)
     plate = symbols.ground_plate(size, size, 0.16 * size)
@@ -107,10 +104,7 @@ def wall(scenery: Scenery, point: Array, normal: Array, foot: float = 0.0) -> It
 
 
 def guide(scenery: Scenery, first: Marker, second: Marker, axis: Array) -> Iterator[Actor]:
-    """What a marker slides along: a line on a body that moves, a hatched rail on the ground.
-
-    The first marker carries the axis (3,), which is in the frame of its body; the second slides.
-    """
+    """A line, or on the ground a rail, of the second marker along an axis (3,) of the first one."""
     places, size = scenery.places, scenery.size
     way = scenery.seen_from(first, [second]) @ axis
     solid_ends = max(scenery.beyond(second, axis), scenery.beyond(second, -axis))

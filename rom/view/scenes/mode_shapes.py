@@ -81,10 +81,9 @@ def displacement(body: AnyBody, motion: Array) -> Array:
 def modes_page(
     surface: Any, shapes: Mapping[str, Array], title: str, words: str, *, what: str, **look: Any
 ) -> "Figure":
-    """A page of modes, {name: (s, 3) displacements of a surface}, all seen from the same place.
+    """A page of modes, {name: (s, 3) displacements of a surface}, seen as a `Scene` is.
 
-    To the caption the meaning of displacements and grey lines is added; ``what`` is that whose size
-    displacements are compared with, the look from where it is seen, as a `Scene` wants it.
+    Displacements are compared with the size of ``what``, which the caption adds to the words.
     """
     X, size = surface.points, np.ptp(surface.points, axis=0).max()
     lengths = np.array([np.linalg.norm(u, axis=1) for u in shapes.values()])

@@ -86,10 +86,7 @@ def placed(X: Array, pose: Pose) -> Array:
 
 
 def different(solution: "rom.mbs.Solution", n: int) -> Array:
-    """(n,) instants [s] at which a mechanism differs most: each the farthest from those before.
-
-    The first one is the start. Fewer where the motion has no more places.
-    """
+    """(n,) instants [s] that differ most, the start and each the farthest from those before."""
     steps = np.unique(evenly(solution.t.size, MAX_CANDIDATES))
     places, parts = moving(solution.mechanism, solution, steps, 1.0), solution.mechanism.parts
     points = [r for r, _ in places.poses.values()]

@@ -37,7 +37,7 @@ def form_of(mechanism: "rom.mbs.Mechanism", name: str, shapes: Mapping[str, Mesh
     """The surface of a flexible body; of others a given shape, or else tubes to their markers."""
     part = mechanism.parts[name]
     surface = getattr(part.flexible, "surface", None)
-    if surface is not None:
+    if surface is not None and len(surface.triangles):
         return Form(surface.points, surface.triangles, surface)
     if name in shapes:
         points, triangles = shapes[name]

@@ -17,8 +17,8 @@ from rom.arguments import AnyBody, AnyMechanism, typed, whole
 from rom.errors import ConfigError
 from rom.model import FEModel
 from rom.process.child import scratch
-from rom.view.canvas import offscreen
-from rom.view.canvas.draw import Plotter, add, aim, read
+from rom.view.canvas import draw, offscreen
+from rom.view.canvas.draw import Plotter, aim, read
 from rom.view.canvas.offscreen import require, write_scene
 from rom.view.canvas.scene import UNDEFORMED_COLOUR, sharp_edges
 from rom.view.figures.things import NO_LINES, Scene, Thing, seen
@@ -87,8 +87,7 @@ def plotter(thing: AnyBody | FEModel | AnyMechanism, *, n: int = 1) -> Any:
     with scratch("view") as folder:
         _leave(folder, shown)
         scene, arrays = read(folder)
-    for k in range(len(scene["actors"])):
-        add(made, scene, arrays, k, 0)
+    draw.show(made, scene, arrays)
     aim(made, scene, arrays)
     made.add_axes()
     return made
@@ -144,8 +143,7 @@ class Window:
         self.at, self.frame = (self.at + step) % len(self.titles), 0
         self.scene, self.arrays = read(self.folder / str(self.at))
         self.plotter.clear_actors()
-        for k in range(len(self.scene["actors"])):
-            add(self.plotter, self.scene, self.arrays, k, 0)
+        draw.show(self.plotter, self.scene, self.arrays)
         text = self.titles[self.at] + f"\n{KEYS_HELP}" * (len(self.titles) > 1)
         self.plotter.add_text(text, font_size=10, color="#20242a", name="title", render=False)
         if not step:
@@ -154,10 +152,7 @@ class Window:
     def tick(self, *_: object) -> None:
         """Show the next frame of what moves."""
         self.frame += 1
-        for k in range(len(self.scene["actors"])):
-            n = len(self.arrays[f"points {k}"])
-            if n > 1:
-                add(self.plotter, self.scene, self.arrays, k, self.frame % n)
+        draw.show(self.plotter, self.scene, self.arrays, self.frame)
         self.plotter.render()
 
     def open(self) -> None:
