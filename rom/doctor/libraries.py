@@ -97,9 +97,8 @@ def _launcher(library: str) -> Finding:
     """The program that starts ranks; whether it is of the MPI that Python loads, by its words."""
     program = mpirun.found()
     if not program:
-        state = "missing" if library else "ok"
-        advice = command(*LAUNCHERS) if library else ""
-        return Finding("FEniCSx", mpirun.PROGRAM_NAME, "not installed", state, advice)
+        told = ("missing", command(*LAUNCHERS)) if library else ()
+        return Finding("FEniCSx", mpirun.PROGRAM_NAME, "not installed", *told)
     launcher = mpirun.version(program)
     value = f"{program}, {launcher or 'of which MPI is not known'}"
     kinds = [kind for kind in mpirun.KINDS if library.startswith(kind)]
@@ -196,7 +195,13 @@ def machine() -> list[Finding]:
 
 def caches(forms: Answer, *, fix: bool) -> list[Finding]:
     """State of the cache of forms, by what the probe says and removed, and of that of Numba."""
-    found = [_form_cache(forms, fix)] if "path" in forms else []
+    found = []
+    if "path" in forms and forms["writable"]:
+        found = [_cache("compiled forms", forms["path"], forms["stale"], fix)]
+    elif "path" in forms:
+        value = f"{forms['path']} cannot be written; forms are compiled in every run"
+        advice = f"chown it: {forms['path']}"
+        found = [Finding("caches", "compiled forms", value, "note", advice)]
     own = os.environ.get("NUMBA_CACHE_DIR")  # where Numba may keep what it compiled for rom
     folders = [Path(own), PACKAGE] if own else [PACKAGE]
     damaged = [path for folder in folders for path in damaged_files(folder)]
@@ -204,13 +209,6 @@ def caches(forms: Answer, *, fix: bool) -> list[Finding]:
         for path in damaged:
             path.unlink(missing_ok=True)
     return [*found, _cache("compiled by Numba", "", damaged, fix)]
-
-
-def _form_cache(forms: Answer, fix: bool) -> Finding:
-    if not forms["writable"]:
-        value = f"{forms['path']} cannot be written; forms are compiled in every run"
-        return Finding("caches", "compiled forms", value, "note", f"chown it: {forms['path']}")
-    return _cache("compiled forms", forms["path"], forms["stale"], fix)
 
 
 def _cache(name: str, where: str, damaged: Sequence[object], fix: bool) -> Finding:

@@ -169,7 +169,6 @@ def _meshes(shapes: dict[str, Mesh], mechanism: "rom.mbs.Mechanism") -> dict[str
 
 
 def _surface(body: object) -> Surface | None:
-    """The surface of a body, if it is flexible and has one to draw."""
     surface: Surface | None = getattr(body, "surface", None)
     return surface if surface is not None and len(surface.triangles) else None
 

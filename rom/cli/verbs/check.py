@@ -8,7 +8,7 @@ import argparse
 from pathlib import Path
 
 import rom
-from rom.cli.answer import Answer, Data, failures, report_data
+from rom.cli.answer import Answer, failures, report_data
 from rom.cli.described import described
 from rom.errors import FileFormatError
 
@@ -43,20 +43,17 @@ def run(args: argparse.Namespace) -> Answer:
     """Load and check."""
     from rom.io.native import load
 
-    data: Data = {"file": str(args.file)}
     ending = args.file.suffix.lower()
     known = next((told for endings, told in OTHERS.items() if ending in endings.split()), None)
     if known or described(args):
         return _told(args.file, *known) if known else _description(args.file)
     if ending == ".sid_fem":
         record = rom.read_sid(args.file, ge="as_written")
-        report = rom.io.check_sid(record)
-        data |= {"name": record.name, "dialect": record.dialect}
+        report, told = rom.io.check_sid(record), {"name": record.name, "dialect": record.dialect}
     else:
         body = load(args.file)
-        report = rom.check(body)
-        data |= {"name": body.name}
-    data |= {"report": report_data(report)}
+        report, told = rom.check(body), {"name": body.name}
+    data = {"file": str(args.file), **told, "report": report_data(report)}
     return Answer(data, f"{args.file}\n{report}", failed=failures(report))
 
 

@@ -64,13 +64,13 @@ def run(args: argparse.Namespace) -> Answer:
         path = check_ending(args.save, "a mesh", ".png", ".vtu", DECK_SUFFIX)
         ending = path.suffix.lower()
         checked(args, path, "deck" if ending == DECK_SUFFIX else ending[1:], inputs=[file])
-    if args.faces and FACE_WORD in how["faces"]:
-        raise ConfigError(
-            f"--faces lists the faces as {FACE_WORD} 1, {FACE_WORD} 2, ..., so none can be called "
-            f"{FACE_WORD!r}.",
-            hint="Give it another name, or leave --faces out.",
-        )
     if args.faces:
+        if FACE_WORD in how["faces"]:
+            raise ConfigError(
+                f"--faces lists the faces as {FACE_WORD} 1, {FACE_WORD} 2, ..., so none can be "
+                f"called {FACE_WORD!r}.",
+                hint="Give it another name, or leave --faces out.",
+            )
         how["faces"] = how["faces"] | {FACE_WORD: EVERY_FACE}
     mesh = read_mesh(file, **how)
     data = summary(mesh)

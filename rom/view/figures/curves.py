@@ -84,8 +84,7 @@ def history(  # noqa: PLR0913  keywords of one picture
     numbers = numbered([list(curves) for _, curves in shown])
     for axes, (label, curves), looks in zip(areas, shown, numbers, strict=True):
         _histories(axes, times, curves, looks)
-        axes.set_ylabel(label)
-        axes.set_xlim(times[0], times[-1])
+        axes.set(ylabel=label, xlim=(times[0], times[-1]))
     _complete(areas, over or "time [s]", ax)
     return figure
 
@@ -298,8 +297,7 @@ def campbell(  # noqa: PLR0913  keywords of one picture
     for axes, (label, values) in zip(areas, panels.items(), strict=True):
         for k, name in enumerate(labels):
             axes.plot(turns, values[:, k], label=name, **line_look(k))
-        axes.set_ylabel(label)
-        axes.set_xlim(turns[0], turns[-1])
+        axes.set(ylabel=label, xlim=(turns[0], turns[-1]))
     _multiples(areas[0], diagram, turns, orders)
     for axes in areas:
         for name, speed in (marks or {}).items():
@@ -421,8 +419,7 @@ def finish(
     if not axes.images:
         axes.grid(color="#dfe3e8", lw=0.6)
     axes.set_axisbelow(True)
-    for side in ("top", "right"):
-        axes.spines[side].set_visible(False)
+    axes.spines[["top", "right"]].set_visible(False)
     if legend and axes.get_legend_handles_labels()[1]:
         axes.legend(fontsize=page.SMALL_SIZE, framealpha=0.9, edgecolor="none")
 
@@ -492,6 +489,5 @@ def _same_scale(axes: "Axes") -> None:
     shape = axes.get_window_extent().size
     limits = np.array([axes.get_xlim(), axes.get_ylim()])
     half = 0.5 * (np.ptp(limits, axis=1) / shape).max() * shape
-    x, y = limits.mean(axis=1)
-    axes.set_xlim(x - half[0], x + half[0])
-    axes.set_ylim(y - half[1], y + half[1])
+    x, y = limits.mean(axis=1, keepdims=True) + np.outer(half, (-1, 1))
+    axes.set(xlim=x, ylim=y)

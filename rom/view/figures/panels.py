@@ -169,8 +169,7 @@ def _draw(axes: "Axes", panel: Panel, numbers: Mapping[str, int]) -> None:
         look["bbox"] = {"fc": "white", "ec": "none", "alpha": 0.8, "pad": 0.8}
         axes.annotate(words, place, (6, 0), textcoords="offset points", **look)
     axes.set_title(panel.title, size=page.BODY_SIZE, loc="left")
-    axes.set_xlabel(panel.xlabel)
-    axes.set_ylabel(panel.ylabel)
+    axes.set(xlabel=panel.xlabel, ylabel=panel.ylabel)
     if panel.log:
         axes.loglog()
         near_ticks(axes.xaxis)

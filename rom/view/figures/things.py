@@ -357,8 +357,7 @@ def corner(figure: "Figure", camera: Camera, left: float, right: float, top: flo
     bar = page.area(figure, x, top + 52, wide, 10)
     bar.set_axis_off()
     bar.plot([0, 0, 0, 1, 1, 1], [0, 1, 0.5, 0.5, 1, 0], color=TEXT_COLOUR, lw=1.4, clip_on=False)
-    bar.set_xlim(0, 1)
-    bar.set_ylim(0, 1)
+    bar.set(xlim=(0, 1), ylim=(0, 1))
     words, middle = written(length, "m"), right - BAR_SIZE / 2
     page.words(figure, words, middle, top + 24, size=page.SMALL_SIZE, ha="center")
 
@@ -372,8 +371,7 @@ def scale(camera: Camera) -> tuple[float, float]:
 def triad(axes: "Axes", camera: Camera) -> None:
     """The axes of the world as the camera sees them, the nearest one last."""
     axes.set_axis_off()
-    axes.set_xlim(-1.45, 1.45)
-    axes.set_ylim(-1.45, 1.45)
+    axes.set(xlim=(-1.45, 1.45), ylim=(-1.45, 1.45))
     seen = camera.axes
     for k in np.argsort(seen[:, 2]):
         x, y = seen[k, :2]

@@ -43,10 +43,7 @@ class Scenery:
         """(k, 3) places of other markers in all instants, from one in the frame of its body [m]."""
         r, A = self.places.point(marker), self.places.pose(marker.body)[1]
         apart = [self.places.point(other) - r for other in others[:MAX_TOUCHING]]
-        turned = (np.broadcast_to(A, (len(d), 3, 3)) for d in apart)
-        return np.vstack(
-            [np.einsum("fba,fb->fa", B, d) for B, d in zip(turned, apart, strict=True)]
-        )
+        return np.vstack([(d[:, None] @ A)[:, 0] for d in apart])
 
 
 def symbol_size(places: Places, drawn: dict[str, Array]) -> float:
