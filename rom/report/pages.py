@@ -154,7 +154,6 @@ def _interface_table(body: "rom.body.FlexibleBody") -> str:
 
 
 def _mode_figure(body: "rom.body.FlexibleBody", size: int = SHAPE_BYTES) -> list[str]:
-    """Modes that swing and turn; and the picture of some of them, for those who see no such."""
     still = drawn(lambda path: mode_shapes(body, path), "Its lowest elastic modes.")
     return turning(lambda: modes_scene(body, size=size), still, modes_words(body.name))
 

@@ -206,7 +206,6 @@ def _felt(shapes: Array, stress: Array | None, Q: Array, far: Array) -> Index:
 
 
 def _steps(solution: "rom.mbs.Solution") -> Index:
-    """Numbers of the instants that are kept, evenly over the saved ones."""
     per_frame = 4 * sum(7 + part.r for part in solution.mechanism.parts.values())
     n = int(np.clip(MOTION_BYTES // max(per_frame, 1), 2, N_FRAMES))
     return np.unique(evenly(len(solution.t), n))

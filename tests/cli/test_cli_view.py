@@ -8,6 +8,7 @@ import pytest
 import rom
 from cases.command import python
 from cases.files.toml_files import CRANK
+from cases.refusals import refuses
 from cases.solid import block, reduced
 from rom.cli.main import main
 from rom.view.scenes import window
@@ -99,5 +100,4 @@ def test_keys_and_time_change_what_the_window_shows_which_may_not_open(bar, tmp_
     done = python("-c", CODE, tmp_path, timeout=600)
     assert done.stdout.split() == ["True", "True", "True", "0"], done.stderr
     monkeypatch.setattr(sys, "executable", "/bin/false")
-    with pytest.raises(rom.errors.ConfigError, match="the process that draws ended with code 1"):
-        window.show(window.mode_scenes(bar, 1))
+    refuses(rom.ConfigError, "draws ended with code 1", window.show, window.mode_scenes(bar, 1))

@@ -60,7 +60,6 @@ def _diagnosed(fix: bool) -> "list[Finding]":
 
 
 def _compiled(what: str) -> "list[Finding]":
-    """Findings of all cases, each said as soon as it is done: some take a minute."""
     from rom.doctor import first_use
     from rom.doctor.probes import compiled
 

@@ -152,7 +152,6 @@ def _text(data: Data) -> str:
 
 
 def _row(face: Data, size: float) -> tuple[str, ...]:
-    """One line of the list of faces; the name only where somebody gave one."""
     radius = "" if face["radius"] is None else f"{face['radius']:.6g}"
     direction = _words(face["axis"] or face["normal"] or ())
     name = "" if face["name"] == _numbered(face) else face["name"]

@@ -10,11 +10,11 @@ there are the single verbs: mesh, reduce, check, simulate, view, report.
 import argparse
 import logging
 import os
+import shlex
 import sys
 from dataclasses import dataclass, replace
 from math import pi, sqrt
 from pathlib import Path
-from shlex import quote
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -125,9 +125,7 @@ def _faces(args: argparse.Namespace) -> Answer:
     found = mesh.run(argparse.Namespace(**vars(args) | asked))
     bores = [face["number"] for face in found.data.get("faces", ()) if face["kind"] == "cylinder"]
     hinge = str((*bores, 1)[0]) if is_step else next(iter(found.data["interfaces"]), "FACE")
-    command = " ".join(
-        map(quote, ("rom", "swing", str(args.file), "--hinge", hinge, "-o", str(args.output)))
-    )
+    command = shlex.join(["rom", "swing", str(args.file), "--hinge", hinge, "-o", str(args.output)])
     text = f"{found.text}\n\n{drawn} shows them. Choose one for --hinge, for example\n  {command}"
     data = {"files": [str(drawn)], "faces": found.data.get("faces", []), "next": [command]}
     return replace(found, data=data, text=text)
