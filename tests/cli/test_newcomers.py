@@ -97,8 +97,7 @@ def test_quantities_of_other_dimensions_are_refused_by_name(pendulum, mass, word
     refuses(ConfigError, f"add_rigid 'b': mass.*{words}", pendulum.add_rigid, "b", **solid)
 
 
-def test_solids_have_names_and_their_numbers_are_judged_like_others():
-    assert rom.Material.steel == rom.Material(E=210e9, nu=0.3, rho=7850.0)
+def test_numbers_of_solids_are_judged_like_others():
     refuses(MaterialError, "E = -1e", rom.Material, E="-1 GPa", nu=0.3, rho=1.0)
     refuses(ConfigError, "rho: '1 m' is a length", rom.Material, E=1.0, nu=0.3, rho="1 m")
 

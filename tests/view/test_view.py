@@ -63,24 +63,6 @@ def test_a_scene_is_drawn_to_scale_and_a_box_has_twelve_edges():
     np.testing.assert_allclose(lengths, [1] * 4 + [2] * 4 + [3] * 4)
 
 
-def test_an_update_is_drawn_with_its_changes(tmp_path):
-    f = np.linspace(1.0, 9.0, 50)
-    points = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 0, 1]])
-    beams = np.array([[0, 1], [1, 2], [0, 3]])
-    more = {
-        "changes": {"stiffness": (0.4, 0.38, 0.02), "mass": (-0.1, -0.1, 0.01)},
-        "structure": (points, beams, points, points[:1]),
-        "label": "displacement per force [m/N]", "title": "update", "caption": "words",
-    }  # fmt: skip
-    curves = {"test": 1 / (30 - f**2 + 0.1j), "before": 1 / (20 - f**2 + 0.1j)}
-    image = pixels(view.updating(f, curves, path=tmp_path / "u.png", **more))
-    assert colourful(image).sum() > 1000
-    bars = (image == (213, 218, 225)).all(axis=2).sum(axis=1)
-    middle = int(np.flatnonzero(bars > 20).mean())
-    assert bars[:middle].max() == pytest.approx(4 * bars[middle:].max(), rel=0.03)
-    refuses(ConfigError, "7 values of 'test' for 50", view.updating, f, {"test": f[:7]}, **more)
-
-
 def test_a_plane_body_is_drawn_beside_its_curves_and_its_film_keeps_frame_and_colours(tmp_path):
     more = {"limit": ("exact", 1.0), "xlabel": "size", "ylabel": "answer", "title": "t"}
     curves = {"coarse": ([1, 2, 4], [0.2, 0.7, 0.9])}
@@ -96,14 +78,6 @@ def test_a_plane_body_is_drawn_beside_its_curves_and_its_film_keeps_frame_and_co
     assert sizes[0] > sizes[1] > sizes[2]  # the area is 1 - amount^2
     assert sizes[2] == pytest.approx(0.75 * sizes[0], rel=0.1)
     refuses(ConfigError, "2 times for 3", view.flow, np.zeros(2), shapes)
-
-
-def test_mode_shapes_fill_one_panel_each(bar, tmp_path):
-    view.mode_shapes(bar, tmp_path / "modes.png", n=4)
-    image = pixels(tmp_path / "modes.png")
-    h, w = image.shape[:2]
-    for half in (image[: h // 2, : w // 2], image[: h // 2, w // 2 :]):
-        assert colourful(half).mean() > 0.01
 
 
 @pytest.mark.long
