@@ -153,15 +153,12 @@ def pictures(found: dict[str, Answer], ending: str) -> list[Finding]:
         value = "not installed" if state == "missing" else ending
         return [Finding("pictures", "pyvista", value, state, advice), matplotlib]
     versions = [Finding("pictures", name, found[name]["version"]) for name in ("pyvista", "vtk")]
-    return [*versions, matplotlib, _display(found.get("picture"), ending)]
-
-
-def _display(picture: Answer | None, ending: str) -> Finding:
-    name, window = "drawing off-screen", picture["window"] if picture else ""
+    name, picture = "drawing off-screen", found.get("picture")
+    value = f"{picture['window']} draws blank" if picture else ending or "no answer"
+    display = Finding("pictures", name, value, "broken", SYSTEM_COMMAND)
     if picture and picture["contrast"] >= MIN_CONTRAST:
-        return Finding("pictures", name, f"{window}, {picture['seconds']} s")
-    value = f"{window} draws blank" if picture else ending or "no answer"
-    return Finding("pictures", name, value, "broken", SYSTEM_COMMAND)
+        display = Finding("pictures", name, f"{picture['window']}, {picture['seconds']} s")
+    return [*versions, matplotlib, display]
 
 
 def blas(mapped: list[str]) -> list[Finding]:

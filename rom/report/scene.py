@@ -88,8 +88,7 @@ def modes_scene(body: "rom.body.FlexibleBody", *, size: int = SHAPE_BYTES) -> Sc
         {"group": "Elastic coordinates", "label": f"q{k + 1}: {f:.5g} Hz", "coordinate": k}
         for k, f in enumerate(body.omega[:N_COORDINATES] / (2 * np.pi))
     ]
-    title = f"Mode shapes of {body.name}"
-    scene = _scene(title, [thing], size, {"magnify": AMPLITUDE_RATIO})
+    scene = _scene(f"Mode shapes of {body.name}", [thing], size, {"magnify": AMPLITUDE_RATIO})
     return scene | {"modes": found + coordinates}
 
 
@@ -145,12 +144,11 @@ def faces_scene(points: Array, patches: Mapping[str, Index], *, title: str) -> S
     """
     things = []
     for name, triangles in patches.items():
-        used, corner = np.unique(triangles, return_inverse=True)
-        mesh = points[used], corner.reshape(-1, 3)
-        things.append(Thing(name, FACE_COLOUR, *mesh, np.zeros((1, 3)), NO_TURN))
-    return _scene(title, [one for one in things if len(one.points)], SHAPE_BYTES, {}) | {
-        "pick": True
-    }
+        if len(triangles):
+            used, corner = np.unique(triangles, return_inverse=True)
+            mesh = points[used], corner.reshape(-1, 3)
+            things.append(Thing(name, FACE_COLOUR, *mesh, np.zeros((1, 3)), NO_TURN))
+    return _scene(title, things, SHAPE_BYTES, {}) | {"pick": True}
 
 
 def _meshes(shapes: dict[str, Mesh], mechanism: "rom.mbs.Mechanism") -> dict[str, Mesh]:

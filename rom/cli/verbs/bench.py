@@ -9,7 +9,7 @@ from dataclasses import asdict
 from types import ModuleType
 from typing import TYPE_CHECKING
 
-from rom.cli.answer import Answer, Data, table
+from rom.cli.answer import Answer, table
 from rom.cli.options import option
 from rom.errors import ConfigError
 from rom.places import FOLDER_ABOVE
@@ -43,7 +43,7 @@ def run(args: argparse.Namespace) -> Answer:
         (f"{f.benchmark}, {f.case}: {f.quantity}", f"{f.value:.4g} {f.unit}".strip(), f.aim)
         for f in figures
     ]
-    data: Data = {"figures": [asdict(f) for f in figures]}
+    data = {"figures": [asdict(f) for f in figures]}
     return Answer(data, table(("figure", "value", "aim"), rows))
 
 

@@ -13,6 +13,7 @@ import os
 import shlex
 import sys
 from dataclasses import dataclass, replace
+from functools import partial
 from math import pi, sqrt
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -94,9 +95,9 @@ def run(args: argparse.Namespace) -> Answer:
         import numba
 
         numba.config.DISABLE_JIT = True  # compiling takes longer than one swing in Python
-    mechanism = pendulum(body, hinge, axis=swing.axis, gravity=swing.gravity)
+    hung = pendulum(body, hinge, axis=swing.axis, gravity=swing.gravity)
     dt = swing.t_end / N_STEPS
-    solution = rom.simulate(mechanism, t_end=swing.t_end, dt=dt, rho_inf=0.5)
+    solution = rom.simulate(hung, t_end=swing.t_end, dt=dt, rho_inf=0.5)
     magnify = args.magnify or magnification(body, solution.elastic(body.name))
     certificate = body.certificate
     data = {
@@ -110,10 +111,8 @@ def run(args: argparse.Namespace) -> Answer:
         "certificate": report_data(certificate),
     }
     failed = tuple(text for text in failures(certificate) if not text.startswith("free:"))
-    motion = mechanism, solution
-    text = _text(body, hinge, data)
-    command = typed_command(args)
-    return Answer(data, text, lambda: _write(files, body, motion, magnify, command), failed)
+    write = partial(_write, files, body, solution, magnify, typed_command(args))
+    return Answer(data, _text(body, hinge, data), write, failed)
 
 
 def _faces(args: argparse.Namespace) -> Answer:
@@ -267,7 +266,7 @@ def magnification(body: "rom.FlexibleBody", q: Array) -> float:
 def _write(
     files: dict[str, Path],
     body: "rom.FlexibleBody",
-    motion: "tuple[rom.Mechanism, rom.mbs.Solution]",
+    solution: "rom.mbs.Solution",
     magnify: float,
     command: str,
 ) -> None:
@@ -277,17 +276,17 @@ def _write(
     from rom.report.scene_file import write_scene
 
     rom.save(body, files[".rom.npz"])
-    rom.write_history(motion[1], files[TABLE_FILE])
-    times = np.linspace(0, 0.5 * motion[1].t[-1], N_INSTANTS)
-    up = -np.asarray(motion[0].gravity, dtype=float)
-    rom.view.instants(*motion, files[".png"], times=times, magnify=magnify, up=up)
+    rom.write_history(solution, files[TABLE_FILE])
+    mechanism, times = solution.mechanism, np.linspace(0, 0.5 * solution.t[-1], N_INSTANTS)
+    up = -np.asarray(mechanism.gravity, dtype=float)
+    rom.view.instants(mechanism, solution, files[".png"], times=times, magnify=magnify, up=up)
     for path in (files[kind] for kind in (".gif", ".mp4") if kind in files):
-        rom.view.animate(*motion, path, magnify=magnify, up=up, frames=40)
-    scene = motion_scene(motion[1], title=f"{body.name} swings", magnify=magnify, up=up)
+        rom.view.animate(mechanism, solution, path, magnify=magnify, up=up, frames=40)
+    scene = motion_scene(solution, title=f"{body.name} swings", magnify=magnify, up=up)
     write_scene(scene, files[SCENE_FILE])
     record = Record(body.name, command, rom.__version__)
     written = [path for path in files.values() if path.suffix != ".html"]
-    record.write(written, motion[1], rom.audit(motion[1]))
+    record.write(written, solution, rom.audit(solution))
     title, sections = of_run(files[RECORD_FILE].parent)
     sections |= {f"The body: {name.lower()}": told for name, told in of_body(body, [])[1].items()}
     rom.write_report(sections, files[".html"], title=title)

@@ -309,8 +309,7 @@ def campbell(  # noqa: PLR0913  keywords of one picture
 
 def _multiples(axes: "Axes", diagram: "Campbell", turns: Array, orders: Sequence[float]) -> None:
     """Rays of the orders, and rings where modes meet them."""
-    top = 1.06 * diagram.frequencies.max()
-    axes.set_ylim(0.0, top)
+    axes.set_ylim(0.0, 1.06 * diagram.frequencies.max())
     for k, order in enumerate(orders):
         axes.plot(turns, order * turns / 60, color=GREY, lw=0.9, label=None if k else RAYS_LABEL)
         at = 30 * np.array([speed for _, speed in diagram.crossings(order)]) / np.pi

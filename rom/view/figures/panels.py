@@ -180,10 +180,14 @@ def _draw(axes: "Axes", panel: Panel, numbers: Mapping[str, int]) -> None:
 
 def _lines(panel: Panel) -> tuple[dict[str, Line], dict[str, Line]]:
     """Curves and points; along linear axes without round-off."""
-    lines = [_paired(*one) for some in (panel.curves, panel.points) for one in some.items()]
+    lines: list[Line] = []
+    for name, line in (*panel.curves.items(), *panel.points.items()):
+        x, y = (np.atleast_1d(np.asarray(values, dtype=float)) for values in line)
+        one_each(f"values of {name!r}", y.shape, "places", x.shape)
+        lines.append((x, y))
     if not panel.log and lines:
-        x, y = (without_round_off(list(values)) for values in zip(*lines, strict=True))
-        lines = list(zip(x, y, strict=True))
+        flat = (without_round_off(list(values)) for values in zip(*lines, strict=True))
+        lines = list(zip(*flat, strict=True))
     n = len(panel.curves)
     curves = dict(zip(panel.curves, lines[:n], strict=True))
     return curves, dict(zip(panel.points, lines[n:], strict=True))
@@ -202,9 +206,3 @@ def _draw_bars(axes: "Axes", panel: Panel) -> None:
     axes.use_sticky_edges = False
     axes.margins(x=0.06)
     axes.invert_yaxis()
-
-
-def _paired(name: str, line: Line) -> Line:
-    x, y = (np.atleast_1d(np.asarray(values, dtype=float)) for values in line)
-    one_each(f"values of {name!r}", y.shape, "places", x.shape)
-    return x, y

@@ -174,9 +174,9 @@ class Stage:
 
     actors: list[Actor]  # bodies, their edges and the symbols between them
     limits: tuple[float, float]  # deformation at the ends of the colours, in the unit
-    unit: str  # of the colours
+    unit: str  # of the colours, in which the largest deformation is between 1 and 1000
     name: str  # names of the flexible bodies
-    grey: str = "rigid bodies"  # what has no colours
+    grey: str  # what has no colours
 
     def scene(
         self, title: str, view: Direction, up: Direction, frames: slice = slice(None)
@@ -194,12 +194,17 @@ def _stage(
     check_bodies(mechanism, "traces", look.traces)
     places = moving(mechanism, solution, steps, look.magnify)
     drawn = {name: _body(places, name, look) for name in mechanism.parts}
-    stage = _scaled({name: actors[:2] for name, actors in drawn.items()})
+    sizes = {name: v for name, (surface, *_) in drawn.items() if (v := surface.values) is not None}
+    largest = max((float(v.max()) for v in sizes.values()), default=0.0)
+    factor, unit = prefixed(largest, "m")
+    bodies = [actor for actors in drawn.values() for actor in actors[:2]]
+    scaled = [a if a.values is None else replace(a, values=a.values * factor) for a in bodies]
     more = [actor for actors in drawn.values() for actor in actors[2:]]
     more += symbols_of(places, look) if look.symbols else []
     more += [_trace(solution.position(name)) for name in look.traces]
-    grey = "rigid bodies and rods" if mechanism.nonlinear else stage.grey
-    return replace(stage, actors=[*stage.actors, *together(more)], grey=grey)
+    limits = 0.0, max(largest * factor, 1e-12)
+    grey = "rigid bodies and rods" if mechanism.nonlinear else "rigid bodies"
+    return Stage([*together(scaled), *together(more)], limits, unit, " and ".join(sizes), grey)
 
 
 def _body(places: Places, name: str, look: Look) -> list[Actor]:
@@ -248,19 +253,6 @@ def shades_of(mechanism: "rom.mbs.Mechanism") -> dict[str, int]:
     rigid = dict.fromkeys(owner[n] for n, part in mechanism.parts.items() if part.flexible is None)
     number = {name: k % len(METAL_COLOURS) for k, name in enumerate(rigid)}
     return {name: number.get(thing, 0) for name, thing in owner.items()}
-
-
-def _scaled(bodies: dict[str, list[Actor]]) -> Stage:
-    """Colours in a unit in which the largest deformation is between 1 and 1000."""
-    actors = [actor for surface_and_edges in bodies.values() for actor in surface_and_edges]
-    sizes = {name: v for name, (surface, _) in bodies.items() if (v := surface.values) is not None}
-    if not sizes:
-        return Stage(together(actors), (0.0, 1.0), "m", "")
-    largest = max(float(v.max()) for v in sizes.values())
-    factor, unit = prefixed(largest, "m")
-    scaled = [a if a.values is None else replace(a, values=a.values * factor) for a in actors]
-    limits = 0.0, max(largest * factor, 1e-12)
-    return Stage(together(scaled), limits, unit, " and ".join(sizes))
 
 
 def together(actors: list[Actor]) -> list[Actor]:
