@@ -9,7 +9,6 @@ from rom.arguments import Quantity, Whole
 from rom.cli.options import count, faces, meshing, names, number_or_text, numbers_of, option, unique
 from rom.config.component_keys import TABLE
 from rom.config.keys import Text, Words
-from rom.errors import ConfigError
 
 if TYPE_CHECKING:
     from rom.config.component import Component
@@ -98,7 +97,7 @@ def changes(
             found |= SPECIAL_KEYS[name](value)
         else:
             text = f"--{name.replace('_', '-')} does not go with a {TOML_SUFFIX} file"
-            raise ConfigError(f"{text}; write it there.")
+            raise rom.ConfigError(f"{text}; write it there.")
     return found
 
 
@@ -111,7 +110,7 @@ def rayleigh(text: str) -> dict[str, float]:
     try:
         alpha, beta = map(float, text.split(","))
     except ValueError:
-        raise ConfigError(
+        raise rom.ConfigError(
             f"--rayleigh {text} is not two numbers; write them as 0.1,1e-6, only with a comma."
         ) from None
     return {"alpha": alpha, "beta": beta}

@@ -55,7 +55,7 @@ class Thing:
     position: Array  # (f, 3) origin of its frame [m]
     orientation: Array  # (f, 4) quaternion of its frame
     shapes: Array = field(default_factory=lambda: np.zeros((0, 0)))  # (3 s, r) displacements
-    stress: Array | None = None  # (6 s, r) on the points per unit of each coordinate [Pa]
+    stress: Array = field(default_factory=lambda: np.zeros((0, 0)))  # (6 s, r) per unit of q [Pa]
     q: Array = field(default_factory=lambda: np.zeros((1, 0)))  # (f, r) elastic coordinates
 
     def corners(self) -> Array:
@@ -80,10 +80,9 @@ def modes_scene(body: "rom.body.FlexibleBody", *, size: int = SHAPE_BYTES) -> Sc
     for mode, unit in zip(found, far, strict=True):
         mode["rigid"] = [float(f"{x / unit:.7g}") for x in mode["rigid"]]
         mode["q"] = [float(f"{x / unit:.7g}") for x in mode["q"][kept]]
-    stress = None if stress is None else stress[:, kept]
     mesh, still = (surface.points, surface.triangles), (np.zeros((1, 3)), NO_TURN)
     shapes, q = surface.shape[:, kept], np.zeros((1, len(kept)))
-    thing = Thing(body.name, ELASTIC_COLOURS[0], *mesh, *still, shapes, stress, q)
+    thing = Thing(body.name, ELASTIC_COLOURS[0], *mesh, *still, shapes, stress[:, kept], q)
     coordinates = [
         {"group": "Elastic coordinates", "label": f"q{k + 1}: {f:.5g} Hz", "coordinate": k}
         for k, f in enumerate(body.omega[:N_COORDINATES] / (2 * np.pi))
@@ -171,12 +170,13 @@ def _surface(body: object) -> Surface | None:
     return surface if surface is not None and len(surface.triangles) else None
 
 
-def _stress(body: "rom.body.FlexibleBody") -> Array | None:
-    """(6 s, r) stress on the points of the surface, where the body has it and it is linear."""
+def _stress(body: "rom.body.FlexibleBody") -> Array:
+    """(6 s or 0, r) stress on the points of the surface, where the body has it and it is linear."""
     surface, recovery = _surface(body), body.stress
-    if surface is None or not isinstance(recovery, StressRecovery):
-        return None
-    return recovery.operator if recovery.points.shape == surface.points.shape else None
+    if surface is not None and isinstance(recovery, StressRecovery):
+        if recovery.points.shape == surface.points.shape:
+            return recovery.operator
+    return np.zeros((0, body.n_modes))
 
 
 def _modes(body: "rom.body.FlexibleBody") -> Iterator[Scene]:
@@ -194,10 +194,10 @@ def _modes(body: "rom.body.FlexibleBody") -> Iterator[Scene]:
             yield {"group": group, "label": label, "rigid": V[:6, k], "q": V[6:, k]}
 
 
-def _felt(shapes: Array, stress: Array | None, Q: Array, far: Array) -> Index:
+def _felt(shapes: Array, stress: Array, Q: Array, far: Array) -> Index:
     """Elastic coordinates that are seen in a state of Q (m, r) whose displacement is far (m,)."""
     seen = np.abs(Q) * np.abs(shapes).max(axis=0) > SMALLEST_SHARE * far[:, None]
-    if stress is not None:
+    if stress.size:
         parts = np.abs(Q) * np.abs(stress).max(axis=0)
         seen |= parts > SMALLEST_SHARE * parts.max(axis=1, initial=0.0)[:, None]
     return np.flatnonzero(seen.any(axis=0))
@@ -218,24 +218,21 @@ def _of_part(
     stress = _stress(part.flexible)
     far = np.array([max(_chunked(lambda u: np.abs(u).max(), surface.shape, q))])
     kept = _felt(surface.shape, stress, np.abs(q).max(axis=0)[None], far)
-    chosen = None if stress is None else stress[:, kept]
-    return Thing(part.name, colour, *mesh, *pose, surface.shape[:, kept], chosen, q[:, kept])
+    chosen = surface.shape[:, kept], stress[:, kept], q[:, kept]
+    return Thing(part.name, colour, *mesh, *pose, *chosen)
 
 
 def _chunked(of: Callable[[Array], float], columns: Array, q: Array) -> Iterator[float]:
-    """A number of the field (f, n) of columns (n, r), some instants at a time."""
-    for k in range(0, len(q), FRAMES_AT_ONCE):
+    """A number of the field (f, n) of columns (n, r), if any, some instants at a time."""
+    for k in range(0, len(q) if columns.size else 0, FRAMES_AT_ONCE):
         yield float(of(q[k : k + FRAMES_AT_ONCE] @ columns.T))
 
 
 def _limits(thing: Thing) -> dict[str, float]:
     """Largest displacement relative to the frame [m] and equivalent stress [Pa] of a motion."""
     far = _chunked(lambda u: np.linalg.norm(u.reshape(-1, 3), axis=1).max(), thing.shapes, thing.q)
-    high: Iterator[float] = iter(())
-    if thing.stress is not None and thing.stress.size:
-        high = _chunked(lambda s: von_mises(s.reshape(-1, 6)).max(), thing.stress, thing.q)
-    displacement = max(far, default=0.0) if thing.shapes.size else 0.0
-    return {"displacement": displacement, "stress": max(high, default=0.0)}
+    high = _chunked(lambda s: von_mises(s.reshape(-1, 6)).max(), thing.stress, thing.q)
+    return {"displacement": max(far, default=0.0), "stress": max(high, default=0.0)}
 
 
 def _scene(title: str, things: Sequence[Thing], size: int, look: dict[str, Any]) -> Scene:
@@ -276,16 +273,14 @@ def _view(seen: Array, look: dict[str, Any]) -> tuple[Scene, Array]:
 def _encoded(thing: Thing, centre: Array, size: int) -> Scene:
     """A body as numbers for the page, its surface as coarse as its share of the bytes asks."""
     r = thing.shapes.shape[1]
-    per_point = 2 * 3 * r * (1 if thing.stress is None else 3)
+    per_point = 2 * 3 * r * (3 if thing.stress.size else 1)
     n_max = int(np.clip(size // max(per_point, 1), MIN_POINTS, MAX_POINTS))
     kept, triangles = coarsened(thing.points, thing.triangles, n_max)
     X = thing.points[kept]
 
-    def columns(A: Array | None, width: int) -> list[dict[str, object]]:
-        if A is None or not A.size:
-            return []
+    def columns(A: Array, width: int) -> list[dict[str, object]]:
         rows = (width * kept[:, None] + np.arange(width)).ravel()
-        return [quantised_column(column) for column in A[rows].T]
+        return [quantised_column(column) for column in A[rows].T] if A.size else []
 
     return {
         "name": thing.name,

@@ -10,7 +10,6 @@ from pathlib import Path
 import rom
 from rom.cli.answer import Answer, failures, report_data
 from rom.cli.described import described
-from rom.errors import FileFormatError
 
 SUMMARY = "check a body file and print its certificate"
 EXAMPLES = """\
@@ -61,7 +60,7 @@ def _told(file: Path, what: str, *commands: str) -> Answer:
     from rom.io.files import check_readable
 
     if not check_readable(file).stat().st_size:
-        raise FileFormatError("the file is empty.", where=str(file))
+        raise rom.FileFormatError("the file is empty.", where=str(file))
     then = [command.format(file) for command in commands]
     text = "\n".join([f"{file} is {what}. Next, for example", *(f"  {x}" for x in then)])
     return Answer({"file": str(file), "kind": what, "next": then}, text)

@@ -13,7 +13,6 @@ from rom.cli.answer import Answer
 from rom.cli.described import described, mechanism
 from rom.cli.options import DURATION, add_meshing, names, option
 from rom.cli.output import add_force, checked, files_in
-from rom.errors import ConfigError
 
 SUMMARY = "write a body or a mechanism for another program"
 MECHANISM_OPTIONS = ("inputs", "outputs", "dt")
@@ -56,7 +55,7 @@ def run(args: argparse.Namespace) -> Answer:
         write = partial(rom.write_mechanism_fmu, file, args.output, **ends)
     else:
         if wrong := [option for option in MECHANISM_OPTIONS if getattr(args, option)]:
-            raise ConfigError(f"--{wrong[0]} needs the .toml file of a mechanism.")
+            raise rom.ConfigError(f"--{wrong[0]} needs the .toml file of a mechanism.")
         kind = format_of(args.output, args.to)
         checked(args, args.output, kind)
         body = read_body(args.file)

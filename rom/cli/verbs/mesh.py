@@ -11,7 +11,6 @@ from rom.cli.answer import Answer, Data, table
 from rom.cli.described import component, described
 from rom.cli.options import add_geometry, add_solid, material, option, reading
 from rom.cli.output import add_force, checked
-from rom.errors import ConfigError
 from rom.names import check_ending
 
 if TYPE_CHECKING:
@@ -66,7 +65,7 @@ def run(args: argparse.Namespace) -> Answer:
         checked(args, path, "deck" if ending == DECK_SUFFIX else ending[1:], inputs=[file])
     if args.faces:
         if FACE_WORD in how["faces"]:
-            raise ConfigError(
+            raise rom.ConfigError(
                 f"--faces lists the faces as {FACE_WORD} 1, {FACE_WORD} 2, ..., so none can be "
                 f"called {FACE_WORD!r}.",
                 hint="Give it another name, or leave --faces out.",
@@ -85,9 +84,9 @@ def _solid(args: argparse.Namespace) -> rom.Material | None:
     if not given:
         return None
     if args.save is None or args.save.suffix.lower() != DECK_SUFFIX:
-        raise ConfigError(f"{given[0]} needs --save FILE.inp.")
+        raise rom.ConfigError(f"{given[0]} needs --save FILE.inp.")
     if len(given) < 3:
-        raise ConfigError(f"a material needs --E, --nu and --rho, got {', '.join(given)}.")
+        raise rom.ConfigError(f"a material needs --E, --nu and --rho, got {', '.join(given)}.")
     return material(args)
 
 

@@ -5,9 +5,10 @@ then 5.
 """
 
 import argparse
+from collections.abc import Iterable
 from math import pi
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import rom
 from rom.cli.answer import Answer, Data, failures, report_data
@@ -18,9 +19,6 @@ from rom.cli.output import add_force, checked, files_in
 from rom.config.methods import SETTINGS, chosen
 from rom.errors import ConfigError
 from rom.names import check_name
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
 
 SUMMARY = "reduce a model to a flexible body, with its certificate"
 EXAMPLES = """\
@@ -66,9 +64,7 @@ def run(args: argparse.Namespace) -> Answer:
     return Answer(_data(body, output), _text(body, output), lambda: rom.save(body, output), failed)
 
 
-def _checked(
-    args: argparse.Namespace, output: Any, name: str, inputs: "Iterable[Path]" = ()
-) -> Path:
+def _checked(args: argparse.Namespace, output: Any, name: str, inputs: Iterable[Path] = ()) -> Path:
     check_name(name, "a body")
     return checked(args, output or Path(f"{name}.rom.npz"), "npz", inputs=inputs)
 

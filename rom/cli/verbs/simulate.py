@@ -17,7 +17,6 @@ from rom.cli.described import described, mechanism
 from rom.cli.options import ACCELERATION, DURATION, add_meshing, option, require, vector
 from rom.cli.output import add_force, check_encoder, checked, claim, files_in, typed_command, usual
 from rom.cli.verbs.swing import pendulum
-from rom.errors import ConfigError, ResourceError, RomError
 from rom.names import inside
 from rom.process.launcher import ranks
 
@@ -99,7 +98,7 @@ def _keeping(args: argparse.Namespace, made_from: dict[str, str]) -> "rom.mbs.Ke
     keep = rom.mbs.Keeping(args.output / PARTS_FOLDER, args.resume, made_from)
     if args.resume and not keep.state.exists() and (args.output / "run.json").exists():
         text = f"there is nothing to resume: the run in {args.output} came to its end"
-        raise ConfigError(f"{text}; leave out --resume to run it anew.")
+        raise rom.ConfigError(f"{text}; leave out --resume to run it anew.")
     keep.check()
     return keep if ranks()[0] == 0 else None
 
@@ -124,9 +123,9 @@ def _rescuing(
             log.info(words, solution.t[-1])
         try:
             place = f"is in {write(solution, rom.audit(solution))}"
-        except ResourceError as full:
+        except rom.ResourceError as full:
             place = f"could not be written: {full.message.rstrip('.')}"
-        if isinstance(error, RomError):
+        if isinstance(error, rom.RomError):
             own = error.told_hint.replace(KEPT_HINT, "").strip()
             hints = (own, f"The motion up to there {place}.", _to_go_on(args, keep))
             error.hint = " ".join(hint for hint in hints if hint)
@@ -145,7 +144,7 @@ def _finishing(args: argparse.Namespace, keep: "rom.mbs.Keeping | None") -> Iter
     """Write results inside; what was kept of the motion goes with that, and stays if it fails."""
     try:
         yield
-    except ResourceError as error:
+    except rom.ResourceError as error:
         if hint := _to_go_on(args, keep):
             error.hint = f"The motion is kept in {args.output / PARTS_FOLDER}. Make room. {hint}"
         raise
@@ -188,9 +187,9 @@ def _pendulum(args: argparse.Namespace) -> Answer:
 
     require({"--hinge": args.hinge, "--t-end": args.t_end, "--dt": args.dt})
     if args.dt > args.t_end:
-        raise ConfigError(f"--dt {args.dt:g} must be at most --t-end {args.t_end:g}.")
+        raise rom.ConfigError(f"--dt {args.dt:g} must be at most --t-end {args.t_end:g}.")
     if not any(args.axis):
-        raise ConfigError("--axis 0,0,0 has no direction; give one, such as --axis 0,0,1.")
+        raise rom.ConfigError("--axis 0,0,0 has no direction; give one, such as --axis 0,0,1.")
     folder = claim(args)
     body = load(args.file)
     body.marker(args.hinge)

@@ -38,7 +38,6 @@ from rom.cli.options import (
     unique,
 )
 from rom.cli.output import add_force, check_encoder, checked, claim, typed_command, usual
-from rom.errors import ConfigError
 from rom.model import Array
 from rom.names import inside
 from rom.view.canvas.scales import round_length
@@ -211,7 +210,7 @@ def planned(
     gyration = sqrt(0.5 * np.trace(rigid.inertia) / rigid.mass)
     if lever < LEAST_LEVER * gyration:
         turning = "" if axis is None else f", which turns about {np.round(axis, 6).tolist()}"
-        raise ConfigError(
+        raise rom.ConfigError(
             f"gravity {g.tolist()} passes {lever:.2g} m beside the hinge{turning}: nothing would "
             "swing.",
             hint="Choose another --hinge, or --gravity across the part and across its axis.",
