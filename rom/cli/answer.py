@@ -60,5 +60,4 @@ def _strict(value: object) -> object:
 
 
 def _plain(value: object) -> object:
-    """NumPy scalars and arrays, paths."""
     return _strict(value.tolist()) if hasattr(value, "tolist") else str(value)

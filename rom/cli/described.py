@@ -1,14 +1,14 @@
 """Components and mechanisms described by files: what a command line says goes before the file."""
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
+import rom
 from rom.arguments import Quantity, Whole
 from rom.cli.options import count, faces, meshing, names, number_or_text, numbers_of, option, unique
 from rom.config.component_keys import TABLE
 from rom.config.keys import Text, Words
-from rom.errors import ConfigError
 
 if TYPE_CHECKING:
     from rom.config.component import Component
@@ -74,16 +74,12 @@ def described(args: argparse.Namespace) -> bool:
 
 def component(args: argparse.Namespace, *extra: str) -> "Component":
     """The component of the file, with what the command line changes but for extra options."""
-    from rom.config.component import read_component
-
-    return read_component(args.file, changes(args.given, PLACES, extra), **meshing(args))
+    return rom.read_component(args.file, changes(args.given, PLACES, extra), **meshing(args))
 
 
 def mechanism(args: argparse.Namespace, *extra: str) -> "MechanismFile":
     """The mechanism of the file, with what the command line changes but for extra options."""
-    from rom.config.mechanism import read_mechanism
-
-    return read_mechanism(args.file, changes(args.given, MOTION_KEYS, extra), **meshing(args))
+    return rom.read_mechanism(args.file, changes(args.given, MOTION_KEYS, extra), **meshing(args))
 
 
 def changes(
@@ -101,21 +97,12 @@ def changes(
             found |= SPECIAL_KEYS[name](value)
         else:
             text = f"--{name.replace('_', '-')} does not go with a {TOML_SUFFIX} file"
-            raise ConfigError(f"{text}; write it there.")
+            raise rom.ConfigError(f"{text}; write it there.")
     return found
 
 
-def _parameters(pairs: list[tuple[str, str]]) -> Changes:
-    values = unique([number_or_text(pair) for pair in pairs], "-p")
-    return {("geometry", "parameters", name): value for name, value in values.items()}
-
-
-def _interfaces(pairs: list[tuple[str, str]]) -> Changes:
-    return {("interfaces", name): kind for name, kind in unique(pairs, "-i").items()}
-
-
-def _faces(pairs: list[tuple[str, str]]) -> Changes:
-    return {("geometry", "faces", name): text for name, text in faces(pairs).items()}
+def _each(option: str, pairs: Iterable[tuple[str, object]], *section: str) -> Changes:
+    return {(*section, name): value for name, value in unique(list(pairs), option).items()}
 
 
 def rayleigh(text: str) -> dict[str, float]:
@@ -123,16 +110,16 @@ def rayleigh(text: str) -> dict[str, float]:
     try:
         alpha, beta = map(float, text.split(","))
     except ValueError:
-        raise ConfigError(
+        raise rom.ConfigError(
             f"--rayleigh {text} is not two numbers; write them as 0.1,1e-6, only with a comma."
         ) from None
     return {"alpha": alpha, "beta": beta}
 
 
 SPECIAL_KEYS: dict[str, Callable[[Any], Changes]] = {
-    "parameter": _parameters,
-    "interface": _interfaces,
-    "face": _faces,
+    "parameter": lambda pairs: _each("-p", map(number_or_text, pairs), "geometry", "parameters"),
+    "interface": lambda pairs: _each("-i", pairs, "interfaces"),
+    "face": lambda pairs: _each("--face", faces(pairs).items(), "geometry", "faces"),
     "unite": lambda _: {("geometry", "parameters", "unite"): 1},
     "rayleigh": lambda text: {("damping",): rayleigh(text)},
     "no_certificate": lambda _: {("reduction", "certificate"): False},

@@ -5,25 +5,17 @@ import os
 import sys
 import traceback
 from contextlib import ExitStack
-from functools import partial
 
+import rom
 from rom.cli.described import TOML_SUFFIX
 from rom.cli.parser import build_parser, given
 from rom.cli.speech import OutputOptions, output_options, present, print_error, say, speaking
-from rom.errors import (
-    ConfigError,
-    FileFormatError,
-    InterruptedRun,
-    QualityGateError,
-    ResourceError,
-    RomError,
-)
 from rom.process.interruption import Terminated, terminable
 from rom.process.launcher import ranks
 from rom.process.memory import free_bytes
 
 
-class InternalError(RomError):
+class InternalError(rom.RomError):
     """An exception nobody foresaw."""
 
     exit_code = 1
@@ -48,8 +40,13 @@ def _run(argv: list[str], options: OutputOptions) -> int:
     except BaseException as raised:
         if options.debug:
             traceback.print_exception(raised)
-        error = translated(raised)
-        complain = partial(_print_once, raised, error, options)
+        error, ended = translated(raised), isinstance(raised, Terminated)
+
+        def complain() -> None:  # mpirun ends other ranks because of what one has printed
+            rank = ranks()[0]
+            if rank == 0 or not ended:
+                print_error(error, options, rank)
+
         if ranks()[1] == 1:
             complain()
         else:  # once, and every rank ends with the same exit code; MPI is loaded under mpirun only
@@ -59,13 +56,6 @@ def _run(argv: list[str], options: OutputOptions) -> int:
         return error.exit_code
 
 
-def _print_once(raised: BaseException, error: RomError, options: OutputOptions) -> None:
-    """Print the error, unless mpirun ends this rank because of one that another has printed."""
-    rank = ranks()[0]
-    if rank == 0 or not isinstance(raised, Terminated):
-        print_error(error, options, rank)
-
-
 def run(argv: list[str], options: OutputOptions) -> int:
     """Parse, run the verb, write its files, print its answer."""
     args = build_parser().parse_args(argv)
@@ -73,12 +63,10 @@ def run(argv: list[str], options: OutputOptions) -> int:
         args.given = given(argv)
     args.argv = argv
     if args.version:
-        from rom import __version__
-
-        say(f"rom {__version__}")
+        say(f"rom {rom.__version__}")
         return 0
     if args.verb is None:
-        raise ConfigError("no verb was given.", hint="rom --help lists the verbs.")
+        raise rom.ConfigError("no verb was given.", hint="rom --help lists the verbs.")
     first = ranks()[0] == 0
     with speaking(options, verbose=first) as remarks, ExitStack() as args.claims:
         answer = args.run(args)
@@ -86,42 +74,39 @@ def run(argv: list[str], options: OutputOptions) -> int:
             answer.write()
     if first:
         present(answer, remarks, options)
-    return QualityGateError.exit_code if answer.failed else 0
+    return rom.QualityGateError.exit_code if answer.failed else 0
 
 
-def translated(error: BaseException) -> RomError:
+def translated(error: BaseException) -> rom.RomError:
     """Any exception as an error a user can act on."""
-    if isinstance(error, RomError):
+    if isinstance(error, rom.RomError):
         return error
     if isinstance(error, KeyboardInterrupt):
-        return InterruptedRun("interrupted.", hint="No file was left half written.")
+        return rom.InterruptedRun("interrupted.", hint="No file was left half written.")
     if isinstance(error, MemoryError):
         return _out_of_memory(error)
     if isinstance(error, ModuleNotFoundError) and not str(error.name).startswith("rom"):
-        return ResourceError(
+        return rom.ResourceError(
             f"{error.name} is not installed.", hint="rom doctor says what to type."
         )
     if isinstance(error, OSError) and error.filename is not None:
-        return FileFormatError(f"{error.strerror}.", where=str(error.filename))
+        return rom.FileFormatError(f"{error.strerror}.", where=str(error.filename))
+    last = traceback.extract_tb(error.__traceback__)[-1]
+    place = f"{os.path.basename(last.filename)}, line {last.lineno}"
     return InternalError(
-        f"{type(error).__name__}: {error} ({_place(error)})",
+        f"{type(error).__name__}: {error} ({place})",
         hint="This is a mistake of ours: please report it with what --debug prints.",
     )
 
 
-def _out_of_memory(error: MemoryError) -> ResourceError:
+def _out_of_memory(error: MemoryError) -> rom.ResourceError:
     """What was asked for, as far as NumPy tells, and what there is."""
     shape, dtype = getattr(error, "shape", None), getattr(error, "dtype", None)
     asked = ""
     if shape is not None and dtype is not None:
         size = math.prod(shape) * dtype.itemsize / 2**30
         asked = f" for {size:.3g} GiB, {' x '.join(map(str, shape))} numbers"
-    return ResourceError(
+    return rom.ResourceError(
         f"the memory ran out{asked}; this process may take {free_bytes() / 2**30:.3g} GiB more.",
         hint="Use larger elements or fewer modes.",
     )
-
-
-def _place(error: BaseException) -> str:
-    frames = traceback.extract_tb(error.__traceback__)
-    return f"{os.path.basename(frames[-1].filename)}, line {frames[-1].lineno}"

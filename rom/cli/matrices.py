@@ -2,8 +2,8 @@
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+import rom
 from rom.cli.options import (
     assignment,
     material,
@@ -15,10 +15,8 @@ from rom.cli.options import (
     verb_parsers,
 )
 from rom.errors import ConfigError
+from rom.model import FEModel, Index
 from rom.names import is_whole, named
-
-if TYPE_CHECKING:
-    from rom.model import FEModel, Index
 
 GEOMETRY_OPTIONS = (
     "E nu rho degree solver parameter face scale order trust time_limit memory_limit".split()
@@ -39,7 +37,7 @@ def add_matrices(parser: argparse.ArgumentParser) -> None:
     option(group, "--set NAME=LABELS", about, assignment)
 
 
-def read_model(args: argparse.Namespace) -> "FEModel":
+def read_model(args: argparse.Namespace) -> FEModel:
     """The model that options ask for, of a geometry or of matrices."""
     if args.mass is not None:
         return read_matrices(args)
@@ -55,10 +53,9 @@ def read_model(args: argparse.Namespace) -> "FEModel":
     return model(args.file, **how)
 
 
-def read_matrices(args: argparse.Namespace) -> "FEModel":
+def read_matrices(args: argparse.Namespace) -> FEModel:
     """The model of the matrices the options name."""
     from rom.config.component import source
-    from rom.io.matrices.read_model import read_model
 
     parser = verb_parsers(args.parser)[args.verb]
     odd = [name for name in GEOMETRY_OPTIONS if getattr(args, name) != parser.get_default(name)]
@@ -69,7 +66,7 @@ def read_matrices(args: argparse.Namespace) -> "FEModel":
         raise ConfigError("--mass needs --nodes, the file with the places of the nodes.")
     held = [word.partition(":")[0] for word in getattr(args, "fixed", ())]
     names = [*unique(args.interface, "-i"), *held]
-    return read_model(
+    return rom.read_model(
         source(str(args.file)),
         source(args.mass),
         nodes=args.nodes,
@@ -78,10 +75,7 @@ def read_matrices(args: argparse.Namespace) -> "FEModel":
     )
 
 
-def _sets(args: argparse.Namespace, names: list[str]) -> "dict[str, list[int] | Index]":
-    """Labels of the nodes of each interface."""
-    from rom.io.matrices.node_files import read_node_sets
-
+def _sets(args: argparse.Namespace, names: list[str]) -> dict[str, list[int] | Index]:
     found = unique([(name, labels(text)) for name, text in args.set], "--set")
     if unused := sorted(set(found) - set(names)):
         raise ConfigError(f"--set {', '.join(unused)} is no interface; name it by -i or --fixed.")
@@ -89,7 +83,7 @@ def _sets(args: argparse.Namespace, names: list[str]) -> "dict[str, list[int] | 
     if remaining and args.nodes.suffix.lower() != ".inp":
         what = f"which nodes are the interface {named(remaining)}? {args.nodes} has no node sets"
         raise ConfigError(f"{what}; for example --set {remaining[0]}=11-14,20.")
-    return found | (read_node_sets(args.nodes, remaining) if remaining else {})
+    return found | (rom.io.read_node_sets(args.nodes, remaining) if remaining else {})
 
 
 def labels(text: str) -> list[int]:

@@ -4,18 +4,16 @@ import argparse
 from collections.abc import Callable, Mapping
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
 from rom.arguments import NotNegative, Number, Positive, Quantity
 from rom.errors import ConfigError
 from rom.material import SOLIDS
+from rom.model import Material
 from rom.names import check_once, is_whole
 from rom.units import SYSTEMS, in_si
-
-if TYPE_CHECKING:
-    from rom.model import Material
 
 T = TypeVar("T")
 Kind = Callable[[str], object]  # what reads the value of an option
@@ -247,10 +245,8 @@ def solid_options(args: argparse.Namespace) -> dict[str, float | None]:
     return {} if needless or getattr(args, "mass", None) is not None else found
 
 
-def material(args: argparse.Namespace, usual: str = "") -> "Material | None":
+def material(args: argparse.Namespace, usual: str = "") -> Material | None:
     """The material the options ask for, if need be of a usual one; None for that of a deck."""
-    from rom.model import Material
-
     given = args.E, args.nu, args.rho
     pairs = zip(given, SOLIDS.get(usual, given), strict=True)
     return Material(*(y if x is None else x for x, y in pairs)) if solid_options(args) else None

@@ -2,9 +2,9 @@
 
 import argparse
 import os
+import shlex
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from shlex import quote
 from typing import TypeVar
 
 from rom.cli.options import option
@@ -61,7 +61,7 @@ def usual(args: argparse.Namespace, ending: str) -> Path:
 
 def typed_command(args: argparse.Namespace) -> str:
     """What was typed, as a shell takes it."""
-    return f"rom {' '.join(map(quote, args.argv))}"
+    return f"rom {shlex.join(args.argv)}"
 
 
 def claim(args: argparse.Namespace) -> Path:

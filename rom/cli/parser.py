@@ -91,15 +91,12 @@ def given(argv: list[str]) -> dict[str, object]:
 
 def verb_modules() -> dict[str, ModuleType]:
     """{verb: its module}, those of fields too, which take none of the program."""
-    first, last = (
-        {name: fields.follow(f"rom.cli.verbs.{name}") for name in some}
-        for some in (VERBS, LAST_VERBS)
-    )
+    own = {name: fields.follow(f"rom.cli.verbs.{name}") for name in (*VERBS, *LAST_VERBS)}
     given = {}
     for name in fields.names("verbs"):
         with suppress(UnknownNameError):
             given[name] = fields.find("verbs", name)
-    return first | given | first | last
+    return {name: own[name] for name in VERBS} | given | own
 
 
 def build_parser() -> Parser:

@@ -4,7 +4,7 @@ They are the contract: a key may be added, none removed or given another meaning
 version. Numbers that are not finite are null.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from rom.fields import find
@@ -31,7 +31,7 @@ def by_name(item: Schema, about: str) -> Schema:
     return {"type": "object", "additionalProperties": item, "description": about}
 
 
-def record(about: str, optional: tuple[str, ...] = (), **keys: Schema) -> Schema:
+def record(about: str, optional: Sequence[str] = (), **keys: Schema) -> Schema:
     """An object with these keys and no other."""
     return {
         "type": "object",
@@ -77,6 +77,7 @@ FACES = rows(
     name=text("interface it belongs to; may be empty"),
 )
 NEXT = each(text("command"), "what to type next")
+FILES = each(text("file"), "files written")
 REPORT = record(
     "outcome of checks",
     title=text("what was checked"),
@@ -187,26 +188,13 @@ VERBS: dict[str, Schema] = {
         title=text("its heading"),
         sections=each(text("heading"), "its parts"),
     ),
-    "open": record(
-        "what was made while a part was open",
-        files=each(text("file"), "files written"),
-    ),
+    "open": record("what was made while a part was open", files=FILES),
     "swing": record(
         "a part on its hinge; without one, its faces",
-        optional=(
-            "mass",
-            "gravity",
-            "axis",
-            "t_end",
-            "magnify",
-            "frequencies",
-            "certificate",
-            "faces",
-            "next",
-        ),
+        optional="mass gravity axis t_end magnify frequencies certificate faces next".split(),
         faces=FACES,
         next=NEXT,
-        files=each(text("file"), "files written"),
+        files=FILES,
         mass=number("[kg]"),
         gravity=each(number("[m/s^2]"), "gravity [m/s^2]"),
         axis=direction("about which it turns"),

@@ -60,10 +60,7 @@ def print_error(error: RomError, options: OutputOptions, rank: int = 0) -> None:
 
 @contextmanager
 def speaking(options: OutputOptions, *, verbose: bool) -> Iterator[list[str]]:
-    """Progress and warnings on stderr, but for silent ranks; gives the list that collects warnings.
-
-    With ``--strict`` the first of them is an error.
-    """
+    """Progress and warnings on stderr, but for silent ranks; gives the list of the warnings."""
     remarks: list[str] = []
 
     def show(message: object, category: type, *_: object, **__: object) -> None:

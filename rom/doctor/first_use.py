@@ -9,40 +9,30 @@ from collections.abc import Callable
 from functools import partial
 from itertools import combinations
 from time import process_time
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy.sparse import csr_matrix, identity
 
+import rom
 from rom.doctor.probes import Answer, say
 from rom.fields import families, find, names
-from rom.model import FEModel, Interface
-from rom.reduction.bases.method import CraigBampton
-from rom.workflow import reduce
-
-if TYPE_CHECKING:
-    from rom.body.flexible import FlexibleBody
-    from rom.mbs.mechanism import Mechanism
-    from rom.mbs.results.solution import Solution
-    from rom.mbs.results.state import State
 
 MODULE_NAME = "rom.doctor.first_use"  # also where it is run as a program
 ORIGIN, Z_AXIS = (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 STEPS = {"t_end": 2e-4, "dt": 1e-4}
 
 
-def pendulum() -> "Mechanism":
+def pendulum() -> "rom.Mechanism":
     """A rigid bob on a hinge, hanging down."""
-    from rom.mbs.mechanism import Mechanism
-
-    mech = Mechanism(gravity=(0.0, -9.81, 0.0))
+    mech = rom.Mechanism(gravity=(0.0, -9.81, 0.0))
     bob = mech.add_rigid("bob", mass=1.0, inertia=(1e-2,) * 3, at=(0.0, -0.3, 0.0))
     pin = bob.marker((0.0, 0.3, 0.0))
     mech.revolute("hinge", mech.ground.marker(ORIGIN), pin, axis=Z_AXIS)
     return mech
 
 
-def _lattice() -> "FlexibleBody":
+def _lattice() -> "rom.FlexibleBody":
     """A reduced bar of springs between points of a grid, 160 mm long along x."""
     grid = np.meshgrid(np.linspace(0.0, 0.16, 5), (-0.01, 0.01), (-0.01, 0.01), indexing="ij")
     x = np.array(grid).reshape(3, -1).T
@@ -53,35 +43,28 @@ def _lattice() -> "FlexibleBody":
             row = np.kron(np.eye(len(x))[j] - np.eye(len(x))[i], d / np.linalg.norm(d))
             K += 1e8 * np.outer(row, row)
     ends = {
-        name: Interface(name, nodes, x[nodes], identity(4, format="csr"), x[nodes].mean(axis=0))
+        name: rom.Interface(name, nodes, x[nodes], identity(4, format="csr"), x[nodes].mean(axis=0))
         for name, nodes in (("root", np.arange(4)), ("tip", np.arange(len(x))[-4:]))
     }
-    model = FEModel(csr_matrix(K), 0.01 * identity(x.size, format="csr"), x, ends)
-    method, kinds = CraigBampton(4), dict.fromkeys(ends, "rbe2")
-    return reduce(model, method=method, interfaces=kinds, reference="root", certify=False)
+    model = rom.FEModel(csr_matrix(K), 0.01 * identity(x.size, format="csr"), x, ends)
+    method, kinds = rom.CraigBampton(4), dict.fromkeys(ends, "rbe2")
+    return rom.reduce(model, method=method, interfaces=kinds, reference="root", certify=False)
 
 
-def _move(mechanism: "Mechanism", **how: Any) -> "Solution":
-    from rom.mbs.integrate.simulation import simulate
-
-    return simulate(mechanism, **(STEPS | how))
+def _move(mechanism: "rom.Mechanism", **how: Any) -> "rom.mbs.Solution":
+    return rom.simulate(mechanism, **(STEPS | how))
 
 
 def _first_motion() -> None:
     """As in the first page of the manual: a motion, its table and its audit."""
-    from rom.mbs.results.audit import audit
-
     moved = _move(pendulum())
     moved.reaction("hinge")
-    audit(moved)
+    rom.audit(moved)
 
 
 def _slider_crank() -> None:
     """What the main job asks for: a flexible rod, reactions, and a motion that goes on."""
-    from rom.mbs.mechanism import Mechanism
-    from rom.mbs.results.audit import audit
-
-    mech, radius, speed = Mechanism(gravity=(0.0, -9.81, 0.0)), 0.04, 300.0
+    mech, radius, speed = rom.Mechanism(gravity=(0.0, -9.81, 0.0)), 0.04, 300.0
     turning, swinging = (0.0, 0.0, speed), (0.0, 0.0, -speed * radius / 0.16)
     crank = mech.add_rigid("crank", mass=1.0, inertia=(1e-3,) * 3, at=ORIGIN, omega=turning)
     begin = {"at": (radius, 0, 0), "velocity": (0, speed * radius, 0), "omega": swinging}
@@ -96,15 +79,13 @@ def _slider_crank() -> None:
     mech.drive("motor", "main", lambda t: speed * t)
     moved = _move(mech)
     moved.reaction("crank pin")
-    audit(moved)
+    rom.audit(moved)
     _move(mech, t_end=4e-4, state=moved.final)
 
 
 def _chain() -> None:
     """Enough hinges that equations are eliminated part by part."""
-    from rom.mbs.mechanism import Mechanism
-
-    mech = Mechanism(gravity=(0.0, -9.81, 0.0))
+    mech = rom.Mechanism(gravity=(0.0, -9.81, 0.0))
     before = mech.ground.marker(ORIGIN)
     for k in range(12):
         link = mech.add_rigid(f"link {k}", mass=1.0, inertia=(1e-2,) * 3, at=(k + 0.5, 0.0, 0.0))
@@ -115,7 +96,6 @@ def _chain() -> None:
 
 def _elements() -> None:
     """All stages, the kernels of all families of elements, a law of a user, and bars that touch."""
-    from rom.mbs.elements.contact.impact import Impact
     from rom.mbs.kernels.stages import STAGE_KERNELS
 
     for stage in STAGE_KERNELS.values():
@@ -127,7 +107,7 @@ def _elements() -> None:
     mech.law("law", lambda t, parameters, motion, memory, out: None, mech.ground.marker(ORIGIN))
     mech.rotational_spring("turn", "hinge", stiffness=1.0)
     ends = mech.ground.marker((0.0, 0.0, 9.0)), mech.part("bob").marker(ORIGIN)
-    mech.capsule_on_capsule("bars", *ends, Impact(1e3), radius1=0.1, radius2=0.1)
+    mech.capsule_on_capsule("bars", *ends, rom.mbs.Impact(1e3), radius1=0.1, radius2=0.1)
     _move(mech).element("turn")
 
 
@@ -146,24 +126,11 @@ def _formulas() -> None:
     twice.rate(0.0)
 
 
-def _equilibrium() -> tuple["Mechanism", "State"]:
-    from rom.mbs.analysis.equilibrium import equilibrium
-
-    mech = pendulum()
-    return mech, equilibrium(mech)
-
-
-def _linearize() -> None:
-    from rom.mbs.analysis.linearize import linearize
-
-    linearize(*_equilibrium())
-
-
 CASES: dict[str, Callable[[], object]] = {
     "pendulum": _first_motion,
     "slider-crank": _slider_crank,
-    "equilibrium": _equilibrium,
-    "linearisation": _linearize,
+    "equilibrium": lambda: rom.equilibrium(pendulum()),
+    "linearisation": lambda: rom.linearize(mech := pendulum(), rom.equilibrium(mech)),
     "variable steps": lambda: _move(pendulum(), dt=None),
     "bdf": lambda: _move(pendulum(), method="bdf"),
     "bdf of order 4": lambda: _move(pendulum(), method="bdf", order=4, t_end=6e-4),

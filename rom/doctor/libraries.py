@@ -9,6 +9,7 @@ import re
 import shutil
 import sys
 import time
+import timeit
 from collections.abc import Iterator, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -51,12 +52,16 @@ def light() -> list[Finding]:
     """Python and the libraries everything needs; without them nothing of rom starts."""
     kind = "environment" if sys.prefix != sys.base_prefix else "system"
     found = [Finding("Python", "python", f"{platform.python_version()} ({kind}, {sys.prefix})")]
-    for name in ("numpy", "scipy", "numba"):
-        try:
-            found.append(Finding("Python", name, version(name)))
-        except PackageNotFoundError:
-            found.append(Finding("Python", name, "", "broken", f"pip install {name}"))
-    return found
+    needed = ("numpy", "scipy", "numba")
+    return found + [_package("Python", name, "broken", f"pip install {name}") for name in needed]
+
+
+def _package(topic: str, name: str, otherwise: str, advice: str) -> Finding:
+    """A package by its version, or the state of what lacks it."""
+    try:
+        return Finding(topic, name, version(name))
+    except PackageNotFoundError:
+        return Finding(topic, name, "not installed", otherwise, advice)
 
 
 def fenicsx(found: dict[str, Answer], ending: str) -> list[Finding]:
@@ -92,9 +97,8 @@ def _launcher(library: str) -> Finding:
     """The program that starts ranks; whether it is of the MPI that Python loads, by its words."""
     program = mpirun.found()
     if not program:
-        state = "missing" if library else "ok"
-        advice = command(*LAUNCHERS) if library else ""
-        return Finding("FEniCSx", mpirun.PROGRAM_NAME, "not installed", state, advice)
+        told = ("missing", command(*LAUNCHERS)) if library else ()
+        return Finding("FEniCSx", mpirun.PROGRAM_NAME, "not installed", *told)
     launcher = mpirun.version(program)
     value = f"{program}, {launcher or 'of which MPI is not known'}"
     kinds = [kind for kind in mpirun.KINDS if library.startswith(kind)]
@@ -117,13 +121,9 @@ def command(debian: str, pip: str) -> str:
 
 def sees_debian() -> bool:
     """Whether this Python looks where Debian installs its packages."""
-    return not _closed() and Path(sys.base_prefix).samefile("/usr")
-
-
-def _closed() -> bool:
     config = Path(sys.prefix, "pyvenv.cfg")
-    text = config.read_text() if config.is_file() else ""
-    return "include-system-site-packages = false" in text
+    closed = config.is_file() and "include-system-site-packages = false" in config.read_text()
+    return not closed and Path(sys.base_prefix).samefile("/usr")
 
 
 def _other_ways() -> list[Finding]:
@@ -146,58 +146,36 @@ def _other_ways() -> list[Finding]:
 
 def pictures(found: dict[str, Answer], ending: str) -> list[Finding]:
     """Versions, and whether a sphere could be drawn off-screen."""
+    advice = INSTALL_COMMAND + (BESIDE_DEBIAN if sees_debian() else "")
+    matplotlib = _package("pictures", "matplotlib", "missing", advice)
     if "pyvista" not in found:
         state = "missing" if "No module named" in ending else "broken"
         value = "not installed" if state == "missing" else ending
-        return [Finding("pictures", "pyvista", value, state, _for_pictures()), _matplotlib()]
+        return [Finding("pictures", "pyvista", value, state, advice), matplotlib]
     versions = [Finding("pictures", name, found[name]["version"]) for name in ("pyvista", "vtk")]
-    return [*versions, _matplotlib(), _display(found.get("picture"), ending)]
-
-
-def _matplotlib() -> Finding:
-    try:
-        return Finding("pictures", "matplotlib", version("matplotlib"))
-    except PackageNotFoundError:
-        return Finding("pictures", "matplotlib", "not installed", "missing", _for_pictures())
-
-
-def _for_pictures() -> str:
-    return INSTALL_COMMAND + (BESIDE_DEBIAN if sees_debian() else "")
-
-
-def _display(picture: Answer | None, ending: str) -> Finding:
-    name = "drawing off-screen"
-    if picture is None:
-        return Finding("pictures", name, ending or "no answer", "broken", SYSTEM_COMMAND)
-    if picture["contrast"] < MIN_CONTRAST:
-        return Finding(
-            "pictures", name, f"{picture['window']} draws blank", "broken", SYSTEM_COMMAND
-        )
-    return Finding("pictures", name, f"{picture['window']}, {picture['seconds']} s")
+    name, picture = "drawing off-screen", found.get("picture")
+    value = f"{picture['window']} draws blank" if picture else ending or "no answer"
+    display = Finding("pictures", name, value, "broken", SYSTEM_COMMAND)
+    if picture and picture["contrast"] >= MIN_CONTRAST:
+        display = Finding("pictures", name, f"{picture['window']}, {picture['seconds']} s")
+    return [*versions, matplotlib, display]
 
 
 def blas(mapped: list[str]) -> list[Finding]:
     """Which BLAS of the files a process with PETSc has mapped, or this one, and how fast it is."""
-    speed = _gigaflops()
     files = sorted({f for f in mapped or mapped_files() if BLAS_FILE.search(f)})
     slow = [f for f in files if not FAST_BLAS.search(f)]
-    named = ", ".join(slow or files) or "not found in the memory map"
-    found = [Finding("BLAS", "library", named)]
+    found = [Finding("BLAS", "library", ", ".join(files) or "not found in the memory map")]
     if slow:
-        found = [Finding("BLAS", "library", f"reference, {named}", "note", SLOW_ADVICE)]
+        named = f"reference, {', '.join(slow)}"
+        found = [Finding("BLAS", "library", named, "note", SLOW_ADVICE)]
     wanted = better(taken_for(), abilities())
     if wanted:
         advice = f"several times faster: export OPENBLAS_CORETYPE={wanted}"
         found.append(Finding("BLAS", "processor", f"taken for a {taken_for()}", "note", advice))
-    return [*found, Finding("BLAS", "matrix product", f"{speed:.1f} GFlop/s")]
-
-
-def _gigaflops(n: int = 400) -> float:
-    A = np.ones((n, n))
-    A @ A
-    began = time.perf_counter()
-    A @ A
-    return 2e-9 * n**3 / (time.perf_counter() - began)
+    A = np.ones((400, 400))
+    seconds = timeit.repeat(lambda: A @ A, number=1, repeat=2)[1]  # the first one wakes it up
+    return [*found, Finding("BLAS", "matrix product", f"{2e-9 * 400**3 / seconds:.1f} GFlop/s")]
 
 
 def machine() -> list[Finding]:
@@ -213,11 +191,14 @@ def machine() -> list[Finding]:
 
 
 def caches(forms: Answer, *, fix: bool) -> list[Finding]:
-    """State of the cache of compiled forms, by what the probe says, and of Numba's.
-
-    To fix is to remove damaged files; the probe has removed those of forms.
-    """
-    found = [_form_cache(forms, fix)] if "path" in forms else []
+    """State of the cache of forms, by what the probe says and removed, and of that of Numba."""
+    found = []
+    if "path" in forms and forms["writable"]:
+        found = [_cache("compiled forms", forms["path"], forms["stale"], fix)]
+    elif "path" in forms:
+        value = f"{forms['path']} cannot be written; forms are compiled in every run"
+        advice = f"chown it: {forms['path']}"
+        found = [Finding("caches", "compiled forms", value, "note", advice)]
     own = os.environ.get("NUMBA_CACHE_DIR")  # where Numba may keep what it compiled for rom
     folders = [Path(own), PACKAGE] if own else [PACKAGE]
     damaged = [path for folder in folders for path in damaged_files(folder)]
@@ -225,13 +206,6 @@ def caches(forms: Answer, *, fix: bool) -> list[Finding]:
         for path in damaged:
             path.unlink(missing_ok=True)
     return [*found, _cache("compiled by Numba", "", damaged, fix)]
-
-
-def _form_cache(forms: Answer, fix: bool) -> Finding:
-    if not forms["writable"]:
-        value = f"{forms['path']} cannot be written; forms are compiled in every run"
-        return Finding("caches", "compiled forms", value, "note", f"chown it: {forms['path']}")
-    return _cache("compiled forms", forms["path"], forms["stale"], fix)
 
 
 def _cache(name: str, where: str, damaged: Sequence[object], fix: bool) -> Finding:

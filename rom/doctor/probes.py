@@ -61,10 +61,7 @@ def say(name: str, **found: object) -> None:
 
 
 def compiled(module: str, cases: Sequence[str]) -> Iterator[Finding]:
-    """Let a module do its cases, each in a process of its own, as many at once as there are cores.
-
-    It writes a JSON line with functions and seconds; one finding comes as soon as a case has ended.
-    """
+    """Findings of the cases of a module as they end, on as many processes as there are cores."""
     cores, waiting = len(os.sched_getaffinity(0)), list(cases)
     running: dict[str, subprocess.Popen[bytes]] = {}  # noqa: TID251  a type
     while waiting or running:

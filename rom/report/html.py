@@ -49,15 +49,12 @@ def checks(report: Report, caption: str) -> str:
     lines = []
     for row in report.rows:
         verdict = "ok" if row.ok else "failed"
-        cells = f"<td>{html.escape(row.quantity)}</td><td>{_cell(row.value)}</td>"
-        lines.append(
-            f"{cells}<td>{html.escape(row.limit)}</td><td class='{verdict}'>{verdict}</td>"
-        )
+        cells = (f"<td>{_cell(value)}</td>" for value in (row.quantity, row.value, row.limit))
+        lines.append(f"{''.join(cells)}<td class='{verdict}'>{verdict}</td>")
     return _table(("quantity", "value", "limit", ""), lines, caption)
 
 
 def _table(header: Sequence[str], lines: Iterable[str], caption: str) -> str:
-    """A table of lines of cells."""
     head = "".join(f"<th>{html.escape(name)}</th>" for name in header)
     rows = "".join(f"<tr>{cells}</tr>" for cells in lines)
     return (

@@ -5,11 +5,19 @@ import json
 import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import numpy as np
+
+import rom.body
+from rom.checks.gates import check
+from rom.config.component import read_component
 from rom.config.document import read_document
+from rom.config.mechanism import MechanismFile, read_mechanism
+from rom.config.mechanism_keys import sections as sections_of_files
 from rom.errors import ConfigError, FileFormatError, RomError
 from rom.io.files import WRONG_JSON, damaged, need
+from rom.io.native import load
 from rom.model import Report, Row
 from rom.process import stopwatch as watch
 from rom.process.child import scratch
@@ -18,10 +26,9 @@ from rom.report.run import RECORD_FILE, SCENE_FILE, Run, look_of, run, versions
 from rom.report.scene import SHAPE_BYTES, Scene, modes_scene, motion_scene, start_scene
 from rom.report.scene_file import read_scene
 from rom.report.viewer import MOTION_WORDS, START_WORDS, figure, modes_words
-
-if TYPE_CHECKING:
-    from rom.body.flexible import FlexibleBody
-    from rom.config.mechanism import MechanismFile
+from rom.view.figures.curves import frequencies, history
+from rom.view.scenes.film import instants, start
+from rom.view.scenes.mode_shapes import mode_shapes
 
 Sections = dict[str, Sequence[str]]
 Told = dict[str, Any]  # of JSON, or of the provenance of a body
@@ -43,16 +50,13 @@ def describe(
 ) -> tuple[str, Sections]:
     """Title and sections of a report, for `rom.report.html.write_report`.
 
-    The source is a body file, a component or mechanism file, or the folder of a run; what is drawn
-    of it but cannot be is said in the report. Command and version are for the record. The mechanism
-    of a file is moved if asked for, with progress on stderr. ``meshing`` holds ``trust``,
-    ``time_limit`` and ``memory_limit`` of `rom.read_component`.
+    The source is a body file, a component or mechanism file, or the folder of a run. Command and
+    version are for the record; ``move`` moves the mechanism of a file, with progress on stderr;
+    ``meshing`` holds ``trust``, ``time_limit`` and ``memory_limit`` of `rom.read_component`.
     """
     made = {"rom": version} | versions()
     described = source.suffix.lower() == ".toml" and not source.is_dir()
     if described and "bodies" in read_document(source).data:
-        from rom.config.mechanism import read_mechanism
-
         file = read_mechanism(source, **meshing)
         moved = run(file, progress=progress) if move else None
         return of_mechanism(file, how(command, made), moved)
@@ -61,14 +65,10 @@ def describe(
     if source.is_dir():
         return of_run(source)
     if described:
-        from rom.config.component import read_component
-
         component = read_component(source, **meshing)
         written = html.source(source.read_text(encoding="utf-8"))
         title, sections = of_body(component.body(), how(command, made))
         return title, sections | {"The file": [written]}
-    from rom.io.native import load
-
     return of_body(load(source), how(command, made))
 
 
@@ -78,10 +78,8 @@ def how(command: str, made: dict[str, str]) -> list[str]:
     return [html.source(command), versions]
 
 
-def of_body(body: "FlexibleBody", made: list[str]) -> tuple[str, Sections]:
+def of_body(body: "rom.body.FlexibleBody", made: list[str]) -> tuple[str, Sections]:
     """A flexible body: what it is, mass, frequencies, interfaces, checks, pictures."""
-    from rom.checks.gates import check
-
     sections: Sections = {
         "What it is": [html.paragraph(_sentence(body)), *_mode_figure(body)],
         "Mass properties": [_mass_table(body)],
@@ -93,7 +91,7 @@ def of_body(body: "FlexibleBody", made: list[str]) -> tuple[str, Sections]:
     return f"Flexible body {body.name}", sections
 
 
-def _sentence(body: "FlexibleBody") -> str:
+def _sentence(body: "rom.body.FlexibleBody") -> str:
     reduction = body.provenance.get("reduction", {})
     full = f" from {reduction['full dofs']} dofs" if "full dofs" in reduction else ""
     method = f" by {_method_words(reduction)}" if "method" in reduction else ""
@@ -116,9 +114,7 @@ def _method_words(reduction: Told) -> str:
     return f"{label}: {modes} modes" if modes else label
 
 
-def _mass_table(body: "FlexibleBody") -> str:
-    import numpy as np
-
+def _mass_table(body: "rom.body.FlexibleBody") -> str:
     c = body.first_moment / body.mass
     central = body.inertia - body.mass * (c @ c * np.eye(3) - np.outer(c, c))
     rows: list[tuple[object, ...]] = [("mass [kg]", body.mass, "", "")]
@@ -127,7 +123,7 @@ def _mass_table(body: "FlexibleBody") -> str:
     return html.table(("", "x", "y", "z"), rows, "Inertia about the mass centre, body axes.")
 
 
-def _frequency_blocks(body: "FlexibleBody") -> list[str]:
+def _frequency_blocks(body: "rom.body.FlexibleBody") -> list[str]:
     every = body.provenance.get("comparison", {})
     comparison = {support: found for support, found in every.items() if found.get("full")}
     if not comparison:
@@ -144,24 +140,20 @@ def _frequency_blocks(body: "FlexibleBody") -> list[str]:
             table.append((support, k + 1, float(f), float(g), f"{g / f - 1:.1e}", likeness))
     caption = "Natural frequencies of the full model and of the body, rigid motions left out."
 
-    def draw(path: Path) -> None:
-        from rom.view.figures.curves import frequencies
+    still = drawn(
+        lambda path: frequencies(comparison, path, title=f"Reduced against full {body.name}"),
+        "Errors of the frequencies.",
+    )
+    return [html.table(header, table, caption), *still]
 
-        frequencies(comparison, path, title=f"Reduced against full {body.name}")
 
-    return [html.table(header, table, caption), *drawn(draw, "Errors of the frequencies.")]
-
-
-def _interface_table(body: "FlexibleBody") -> str:
+def _interface_table(body: "rom.body.FlexibleBody") -> str:
     rows = [(m.name, m.kind, *map(float, m.point)) for m in body.markers.values()]
     header = ("interface", "kind", "x [m]", "y [m]", "z [m]")
     return html.table(header, rows, "Where joints and forces act, in the axes of the geometry.")
 
 
-def _mode_figure(body: "FlexibleBody", size: int = SHAPE_BYTES) -> list[str]:
-    """Modes that swing and turn; and the picture of some of them, for those who see no such."""
-    from rom.view.scenes.mode_shapes import mode_shapes
-
+def _mode_figure(body: "rom.body.FlexibleBody", size: int = SHAPE_BYTES) -> list[str]:
     still = drawn(lambda path: mode_shapes(body, path), "Its lowest elastic modes.")
     return turning(lambda: modes_scene(body, size=size), still, modes_words(body.name))
 
@@ -174,7 +166,7 @@ def turning(make: Callable[[], Scene], still: list[str], caption: str) -> list[s
         return [*still, html.paragraph(f"Nothing to turn around here: {error.message}")]
 
 
-def _provenance(body: "FlexibleBody") -> list[str]:
+def _provenance(body: "rom.body.FlexibleBody") -> list[str]:
     said = body.provenance
     known = {key: said[key] for key in SHOWN_KEYS if key in said}
     versions = dict(said.get("versions", {})).items()
@@ -188,7 +180,6 @@ def _provenance(body: "FlexibleBody") -> list[str]:
 
 
 def _stages(stages: dict[str, dict[str, float]]) -> list[str]:
-    """Where the time of the reduction went."""
     pieces = [watch.FACTORISATION_PIECE, watch.SOLUTION_PIECE, watch.SEARCH_PIECE, watch.REST_PIECE]
     notes = (watch.FLOPS_NOTE, watch.MISS_NOTE, watch.RESIDUAL_NOTE)
     rows = []
@@ -206,7 +197,6 @@ def _stages(stages: dict[str, dict[str, float]]) -> list[str]:
 
 
 def _piece(stage: dict[str, float], name: str) -> str:
-    """Seconds of a piece and its number."""
     if name not in stage:
         return ""
     number = stage.get(f"number of {name}")
@@ -224,7 +214,7 @@ def _plain(value: object) -> str:
 
 
 def of_mechanism(
-    file: "MechanismFile", made: list[str], moved: Run | None = None
+    file: MechanismFile, made: list[str], moved: Run | None = None
 ) -> tuple[str, Sections]:
     """A mechanism as it starts, and how it moves if it has been moved."""
     mechanism = file.mechanism() if moved is None else moved.solution.mechanism
@@ -238,9 +228,6 @@ def of_mechanism(
         f"{file.name} has {len(bodies)} bodies of together {total:.5g} kg and "
         f"{len(mechanism.joints)} joints; gravity is {file.values['gravity']} m/s^2."
     )
-
-    from rom.view.scenes.film import start
-
     look, title = look_of(file), f"Mechanism {file.name}"
     placed = "As its bodies are placed."
     still = drawn(lambda path: start(mechanism, path, title=title, **look), placed)
@@ -261,11 +248,7 @@ def of_mechanism(
 
 
 def _motion(moved: Run, look: Told) -> list[str]:
-    """The motion that was computed for the report, and whether it is to be believed."""
     solution, how = moved.solution, look | {"magnify": moved.file.values["output"]["magnify"]}
-
-    from rom.view.scenes.film import instants
-
     title = f"Motion of {moved.file.name}"
     words = "Instants at which the bodies are farthest from each other."
     still = drawn(lambda path: instants(solution.mechanism, solution, path, **how), words)
@@ -274,11 +257,9 @@ def _motion(moved: Run, look: Told) -> list[str]:
     return [html.paragraph(solution.status), *turns, checks]
 
 
-def _connection_table(file: "MechanismFile") -> str:
-    from rom.config.mechanism_keys import sections
-
+def _connection_table(file: MechanismFile) -> str:
     rows = []
-    for section in sections():
+    for section in sections_of_files():
         for name, values in file.values[section].items():
             ends = list(values.get("between") or values.get("markers") or [])
             ends += [values["marker"]] if "marker" in values else []
@@ -349,30 +330,23 @@ def _record(folder: Path) -> Told:
 
 
 def _energy(folder: Path, record: Told) -> list[str]:
-    """Energies over time from the table of the motion."""
     path = folder / "motion.csv"
     if not path.is_file():
         kept = record["files"][0] if record["files"] else "no file"
         return [html.paragraph(f"The motion is kept in {kept}, without energies over time.")]
-    import numpy as np
-
     with path.open(newline="", encoding="utf-8") as file:
         head = next(csv.reader(file))
         numbers = np.loadtxt(file, delimiter=",", ndmin=2)
     curves = {name: numbers[:, head.index(f"{name} [J]")] for name in ENERGIES}
     kinds = {f"{name} [J]": (y[0], y.min(), y.max(), y[-1]) for name, y in curves.items()}
     rows = [(name, *map(float, found)) for name, found in kinds.items()]
-
-    from rom.view.figures.curves import history
-
     words = f"Energies of {record['name']}: motion, deformation, height, and their sum."
     header = ("energy", "start", "lowest", "highest", "end")
-
-    def draw(path: Path) -> None:
-        panels = [("energy [J]", curves)]
-        history(numbers[:, 0], panels, path, title="Energy", caption=words)
-
-    return [*drawn(draw, "Energies over time."), html.table(header, rows, "Energies.")]
+    t, panels = numbers[:, 0], [("energy [J]", curves)]
+    still = drawn(
+        lambda path: history(t, panels, path, title="Energy", caption=words), "Energies over time."
+    )
+    return [*still, html.table(header, rows, "Energies.")]
 
 
 def drawn(draw: Callable[[Path], object], caption: str) -> list[str]:

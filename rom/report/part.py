@@ -27,10 +27,7 @@ Face = dict[str, object]
 def part_page(
     points: Array, patches: Mapping[str, Index], faces: Mapping[str, Face], title: str
 ) -> str:
-    """The page of a part, from points (n, 3) [m], {label: (t, 3) triangles} and its `known_faces`.
-
-    The label "" stands for the rest of the surface, which nobody can choose.
-    """
+    """The page of a part, of points and patches as for `faces_scene`, and its `known_faces`."""
     scene = faces_scene(points, patches, title=title)
     known = {"faces": faces, "materials": {name: _shown(one) for name, one in SOLIDS.items()}}
     data = json.dumps(known).replace("<", "\\u003c")
@@ -43,10 +40,7 @@ def part_page(
 
 
 def known_faces(labels: Iterable[str], listed: Iterable[dict[str, Any]]) -> dict[str, Face]:
-    """{label: what it is, its name, and whether that is the geometry's own} of all faces.
-
-    Those that the CAD lists, by their records, have a name that may be changed.
-    """
+    """{label: what it is, its name, and whether that must stay} of faces of mesh and CAD."""
     found: dict[str, Face] = {name: {"about": "", "name": name, "fixed": True} for name in labels}
     for face in listed:
         radius = f", radius {1e3 * face['radius']:.5g} mm" if face["radius"] else ""
@@ -64,27 +58,26 @@ def _shown(numbers: tuple[float, float, float]) -> list[str]:
 def _form() -> str:
     E, nu, rho = _shown(SOLIDS[USUAL])
     chosen = (f"<option{' selected' * (name == USUAL)}>{name}</option>" for name in SOLIDS)
+    fields = (
+        f"<label>{html.escape(words)} <input name='{name}' value='{value}' inputmode='decimal' "
+        "size='8'></label>"
+        for name, words, value in (
+            ("E", "E [GPa]", E),
+            ("nu", "Poisson's ratio", nu),
+            ("rho", "Density [kg/m³]", rho),
+            ("size", "Element size [mm], or none for the usual one", ""),
+        )
+    )
     head = "".join(f"<th>{html.escape(name)}</th>" for name in COLUMNS)
     return (
         f"<form id='choice' autocomplete='off'><table id='chosen'><thead><tr>{head}</tr></thead>"
         "<tbody></tbody></table><p id='none'>No face is chosen yet.</p><div class='controls'>"
         f"<label>Material <select name='material'>{''.join(chosen)}"
         "<option value=''>other</option></select></label>"
-        + _fields(
-            {"E": ("E [GPa]", E), "nu": ("Poisson's ratio", nu), "rho": ("Density [kg/m³]", rho)}
-        )
-        + _fields({"size": ("Element size [mm], or none for the usual one", "")})
-        + "</div><div class='controls'><button type='button' name='swing'>Mesh, reduce and swing"
-        "</button><button type='button' name='stop' hidden>Stop</button>"
+        f"{''.join(fields)}</div><div class='controls'>"
+        "<button type='button' name='swing'>Mesh, reduce and swing</button>"
+        "<button type='button' name='stop' hidden>Stop</button>"
         "<button type='button' name='save'>Save as a file</button></div></form>"
-    )
-
-
-def _fields(fields: Mapping[str, tuple[str, str]]) -> str:
-    return "".join(
-        f"<label>{html.escape(words)} <input name='{name}' value='{value}' inputmode='decimal' "
-        "size='8'></label>"
-        for name, (words, value) in fields.items()
     )
 
 

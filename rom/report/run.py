@@ -6,17 +6,21 @@ import platform
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+import scipy
+
+import rom.mbs
+import rom.view
 from rom.config.keys import Place, nearest
 from rom.config.mechanism import MechanismFile
 from rom.config.python_files import python_entries
-
-if TYPE_CHECKING:
-    from rom.mbs.integrate.keeping import Keeping
-    from rom.mbs.mechanism import Mechanism
-    from rom.mbs.results.solution import Solution
-    from rom.model import Report
+from rom.io.files import check_readable, write_whole
+from rom.io.history import channels, write_history
+from rom.model import Report
+from rom.view.canvas.films import ENDINGS
 
 RECORD_FILE, SCENE_FILE = "run.json", "scene.json"
 
@@ -30,15 +34,15 @@ class Record:
     version: str  # of rom
     source: str = ""  # the file that describes it; empty without one
 
-    def write(self, paths: list[Path], solution: "Solution", audit: "Report") -> None:
+    def write(self, paths: list[Path], solution: "rom.mbs.Solution", audit: Report) -> None:
         """Write it as the last of the files of a run."""
-        from rom.io.files import write_whole
-
         files = [path.name for path in paths]
         text = json.dumps(self._data(files, solution, audit), indent=2)
         write_whole(paths[-1], text.encode())
 
-    def _data(self, files: list[str], solution: "Solution", audit: "Report") -> dict[str, Any]:
+    def _data(
+        self, files: list[str], solution: "rom.mbs.Solution", audit: Report
+    ) -> dict[str, Any]:
         parts, joints = solution.mechanism.parts.items(), solution.mechanism.joints.items()
         return {
             "schema": "rom-run",
@@ -69,65 +73,38 @@ class Run:
     """A motion and what is to be kept of it."""
 
     file: MechanismFile
-    solution: "Solution"
-    audit: "Report"  # whether it is to be believed
+    solution: "rom.mbs.Solution"
+    audit: Report  # whether it is to be believed
     command: str = ""  # what was typed
     version: str = ""  # of rom
 
-    def paths(self, folder: Path) -> list[Path]:
-        """The files to be written, the table of the motion first."""
-        return paths_of(self.file, folder)
-
     def write(self, folder: Path) -> None:
-        """Write them; the folder is made if it is missing.
+        """Write its files, pictures last, so that the motion is there whatever becomes of them."""
+        from rom.report.scene import motion_scene
+        from rom.report.scene_file import write_scene
 
-        Pictures come last, so that the motion is there whatever becomes of them.
-        """
-        paths = self.paths(folder)
+        paths = paths_of(self.file, folder)
         self.write_motion(paths)
-        self._draw(paths)
-        self._scene(paths[-2])
+        how = look_of(self.file) | {"magnify": self.file.values["output"]["magnify"]}
+        for path in paths[1:-2]:  # between the table of the motion and its scene
+            if path.name == "curves.png":
+                self._curves(path)
+            elif path.name == "instants.png":
+                rom.view.instants(self.solution.mechanism, self.solution, path, **how)
+            else:
+                write_film(self.solution, path, **how)
+        title = f"Motion of {self.file.name}"
+        write_scene(motion_scene(self.solution, title=title, **how), paths[-2])
 
     def write_motion(self, paths: list[Path]) -> None:
         """Write the table of the motion, then the record, the last of the paths."""
-        from rom.io.history import write_history
-
         paths[0].parent.mkdir(exist_ok=True)
         write_history(self.solution, paths[0])
         source = self.file.document.path.read_text(encoding="utf-8")
         record = Record(self.file.name, self.command, self.version, source)
         record.write(paths, self.solution, self.audit)
 
-    def _draw(self, paths: list[Path]) -> None:
-        out, solution = self.file.values["output"], self.solution
-        how = look_of(self.file) | {"magnify": out["magnify"]}
-        for path in paths:
-            if path.name == "curves.png":
-                self._curves(path)
-            elif path.name == "instants.png":
-                from rom.view.scenes.film import instants
-
-                instants(solution.mechanism, solution, path, **how)
-            elif path.suffix in (".gif", ".mp4"):
-                from rom.view.scenes.film import animate
-
-                animate(solution.mechanism, solution, path, **how)
-            elif path.suffix in (".glb", ".vtkhdf"):
-                from rom.view.scenes.animation_files import write_animation
-
-                write_animation(solution, path, magnify=out["magnify"], up=out.get("up"))
-
-    def _scene(self, path: Path) -> None:
-        from rom.report.scene import motion_scene
-        from rom.report.scene_file import write_scene
-
-        title, magnify = f"Motion of {self.file.name}", self.file.values["output"]["magnify"]
-        look = look_of(self.file)
-        write_scene(motion_scene(self.solution, title=title, magnify=magnify, **look), path)
-
     def _curves(self, path: Path) -> None:
-        from rom.view.figures.curves import history
-
         panels: dict[str, dict[str, Any]] = {}
         found = columns(self.solution)
         for name in self.file.values["output"]["plot"]:
@@ -138,7 +115,24 @@ class Run:
             f"Histories of {self.file.name} over {self.solution.t[-1]:g} s, one panel for each "
             "unit; names as in the table of the motion."
         )
-        history(self.solution.t, groups, path, title=title, caption=caption)
+        rom.view.history(self.solution.t, groups, path, title=title, caption=caption)
+
+
+def write_film(
+    solution: "rom.mbs.Solution",
+    path: Path,
+    *,
+    magnify: float = 1.0,
+    view: npt.ArrayLike | None = None,
+    up: npt.ArrayLike | None = None,
+) -> None:
+    """Write a motion as a film of pictures or, by the ending, as one in space."""
+    if path.suffix in ENDINGS:
+        rom.view.animate(solution.mechanism, solution, path, magnify=magnify, view=view, up=up)
+    else:
+        from rom.view.scenes.animation_files import write_animation
+
+        write_animation(solution, path, magnify=magnify, up=up)
 
 
 def paths_of(file: MechanismFile, folder: Path) -> list[Path]:
@@ -156,15 +150,13 @@ def look_of(file: MechanismFile) -> dict[str, Any]:
     return {key: x for key, x in file.values["output"].items() if key in ("view", "up")}
 
 
-def happened(solution: "Solution") -> dict[str, list[float]]:
+def happened(solution: "rom.mbs.Solution") -> dict[str, list[float]]:
     """When each event happened [s], by name."""
     return {name: [float(t) for t in found.t] for name, found in solution.events.items()}
 
 
-def columns(solution: "Solution") -> dict[str, tuple[str, Any]]:
+def columns(solution: "rom.mbs.Solution") -> dict[str, tuple[str, Any]]:
     """Unit and values (n_t,) of every column of the table of a motion, by name."""
-    from rom.io.history import channels
-
     return {
         name: (c.unit, c.values.reshape(len(solution.t), -1)[:, k])
         for c in channels(solution)
@@ -178,27 +170,21 @@ def run(
     command: str = "",
     version: str = "",
     progress: bool = False,
-    keep: "Keeping | None" = None,
+    keep: "rom.mbs.Keeping | None" = None,
 ) -> Run:
     """Move the mechanism of a file; command and version are for the record, progress on stderr.
 
-    ``keep`` is a folder that is written while the run lasts, see `made_from`. An unknown column to
-    plot is refused before the run.
+    ``keep`` is a folder that is written while the run lasts, see `made_from`.
     """
-    from rom.mbs.results.audit import audit
-
     made = file.mechanism()
     if file.values["output"]["plot"]:
         _check_plot(file, made)
     solution = file.simulate(made, progress=progress, keep=keep)
-    return Run(file, solution, audit(solution), command, version)
+    return Run(file, solution, rom.mbs.audit(solution), command, version)
 
 
 def made_from(file: MechanismFile) -> dict[str, str]:
-    """What the motion of a file depends on, by name: its entries, and the files of its bodies.
-
-    Not its end, which may be another one when an interrupted run goes on.
-    """
+    """What a motion depends on, but for its end, by name: entries, and the files of bodies."""
     found: dict[str, str] = {}
     for section, entries in file.document.data.items():
         if section in ("name", "output", "simulation"):
@@ -215,17 +201,13 @@ def made_from(file: MechanismFile) -> dict[str, str]:
 
 def file_digest(path: Path) -> str:
     """SHA-256 of the content of a file."""
-    from rom.io.files import check_readable
-
     return hashlib.sha256(check_readable(path).read_bytes()).hexdigest()
 
 
-def _check_plot(file: MechanismFile, made: "Mechanism") -> None:
+def _check_plot(file: MechanismFile, made: "rom.mbs.Mechanism") -> None:
     """One short step tells the names of the columns, before the whole run is spent."""
-    from rom.mbs.integrate.simulation import simulate
-
     t = 1e-6 * file.values["simulation"]["t_end"]
-    known = columns(simulate(made, t_end=t, dt=t))
+    known = columns(rom.mbs.simulate(made, t_end=t, dt=t))
     for name in file.values["output"]["plot"]:
         if name not in known:
             place = Place(file.document, ("output", "plot"))
@@ -234,9 +216,6 @@ def _check_plot(file: MechanismFile, made: "Mechanism") -> None:
 
 def versions() -> dict[str, str]:
     """Of what a result depends on, beside rom itself."""
-    import numpy as np
-    import scipy
-
     return {
         "python": platform.python_version(),
         "numpy": np.__version__,

@@ -7,11 +7,13 @@ coordinates: the page computes the place of a point from x = r + A (X + S q), as
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import cycle
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+import rom.body
+import rom.mbs
 from rom.arguments import finite, positive
 from rom.body.records import Surface
 from rom.body.recovery import StressRecovery, von_mises
@@ -25,13 +27,7 @@ from rom.view.figures.things import COLOURS
 from rom.view.scenes.film import METAL_COLOURS, shades_of
 from rom.view.scenes.mode_shapes import AMPLITUDE_RATIO, displacement
 from rom.view.scenes.places import evenly, placed
-from rom.view.scenes.rigid import bars, check_bodies, ends_of
-
-if TYPE_CHECKING:
-    from rom.body.flexible import FlexibleBody
-    from rom.mbs.mechanism import Mechanism
-    from rom.mbs.parts.bodies import Part
-    from rom.mbs.results.solution import Solution
+from rom.view.scenes.rigid import Form, check_bodies, form_of
 
 SCHEMA_NAME, SCHEMA_VERSION = "rom-scene", [1, 0]
 SHAPE_BYTES = 1_300_000  # of all shapes and stresses of a scene
@@ -59,7 +55,7 @@ class Thing:
     position: Array  # (f, 3) origin of its frame [m]
     orientation: Array  # (f, 4) quaternion of its frame
     shapes: Array = field(default_factory=lambda: np.zeros((0, 0)))  # (3 s, r) displacements
-    stress: Array | None = None  # (6 s, r) on the points per unit of each coordinate [Pa]
+    stress: Array = field(default_factory=lambda: np.zeros((0, 0)))  # (6 s, r) per unit of q [Pa]
     q: Array = field(default_factory=lambda: np.zeros((1, 0)))  # (f, r) elastic coordinates
 
     def corners(self) -> Array:
@@ -70,11 +66,8 @@ class Thing:
         return placed(box[None], (self.position, turned)).reshape(-1, 3)
 
 
-def modes_scene(body: "FlexibleBody", *, size: int = SHAPE_BYTES) -> Scene:
-    """The modes of a body in each support of its comparison, and its elastic coordinates.
-
-    A surface whose shapes take more bytes than ``size`` is made coarser.
-    """
+def modes_scene(body: "rom.body.FlexibleBody", *, size: int = SHAPE_BYTES) -> Scene:
+    """The modes of a body by support, and its elastic coordinates, in about ``size`` bytes."""
     body = body.in_units("SI")
     surface, stress, found = _surface(body), _stress(body), list(_modes(body))
     if surface is None:
@@ -87,21 +80,19 @@ def modes_scene(body: "FlexibleBody", *, size: int = SHAPE_BYTES) -> Scene:
     for mode, unit in zip(found, far, strict=True):
         mode["rigid"] = [float(f"{x / unit:.7g}") for x in mode["rigid"]]
         mode["q"] = [float(f"{x / unit:.7g}") for x in mode["q"][kept]]
-    stress = None if stress is None else stress[:, kept]
     mesh, still = (surface.points, surface.triangles), (np.zeros((1, 3)), NO_TURN)
     shapes, q = surface.shape[:, kept], np.zeros((1, len(kept)))
-    thing = Thing(body.name, ELASTIC_COLOURS[0], *mesh, *still, shapes, stress, q)
+    thing = Thing(body.name, ELASTIC_COLOURS[0], *mesh, *still, shapes, stress[:, kept], q)
     coordinates = [
         {"group": "Elastic coordinates", "label": f"q{k + 1}: {f:.5g} Hz", "coordinate": k}
         for k, f in enumerate(body.omega[:N_COORDINATES] / (2 * np.pi))
     ]
-    title = f"Mode shapes of {body.name}"
-    scene = _scene(title, [thing], size, {"magnify": AMPLITUDE_RATIO})
+    scene = _scene(f"Mode shapes of {body.name}", [thing], size, {"magnify": AMPLITUDE_RATIO})
     return scene | {"modes": found + coordinates}
 
 
 def motion_scene(
-    solution: "Solution",
+    solution: "rom.mbs.Solution",
     *,
     title: str = "Motion",
     shapes: dict[str, Mesh] | None = None,
@@ -114,11 +105,13 @@ def motion_scene(
     given = _meshes(shapes or {}, mechanism)
     positive("magnify", magnify)
     steps = _steps(solution)
-    things = []
-    for (name, part), colour in zip(mechanism.parts.items(), _colours(mechanism), strict=True):
+    things, shades, elastic = [], shades_of(mechanism), cycle(ELASTIC_COLOURS)
+    for name, part in mechanism.parts.items():
         pose = solution.position(name)[steps], solution.orientation(name)[steps]
+        form = form_of(mechanism, name, given)
+        colour = METAL_COLOURS[shades[name]] if form.surface is None else next(elastic)
         q = solution.elastic(name)[steps] if part.r else None
-        things.append(_of_part(part, colour, given.get(name) or _bars(mechanism, name), pose, q))
+        things.append(_of_part(part, colour, form, pose, q))
     limits, t = [_limits(thing) for thing in things], solution.t[steps]
     keys = "displacement", "stress"
     largest = {key: max((one[key] for one in limits), default=0.0) for key in keys}
@@ -128,7 +121,7 @@ def motion_scene(
 
 
 def start_scene(
-    mechanism: "Mechanism",
+    mechanism: "rom.mbs.Mechanism",
     *,
     title: str = "Mechanism at its start",
     view: npt.ArrayLike | None = None,
@@ -136,7 +129,7 @@ def start_scene(
 ) -> Scene:
     """A mechanism as its bodies are placed; arguments as of `rom.view.mechanism`."""
     things = [
-        _of_part(part, colour, _bars(mechanism, name), (part.at[None], part.p[None]), None)
+        _of_part(part, colour, form_of(mechanism, name, {}), (part.at[None], part.p[None]), None)
         for (name, part), colour in zip(mechanism.parts.items(), cycle(COLOURS), strict=False)
     ]
     look = {"view": view, "up": up, "gravity": mechanism.gravity}
@@ -150,15 +143,14 @@ def faces_scene(points: Array, patches: Mapping[str, Index], *, title: str) -> S
     """
     things = []
     for name, triangles in patches.items():
-        used, corner = np.unique(triangles, return_inverse=True)
-        mesh = points[used], corner.reshape(-1, 3)
-        things.append(Thing(name, FACE_COLOUR, *mesh, np.zeros((1, 3)), NO_TURN))
-    return _scene(title, [one for one in things if len(one.points)], SHAPE_BYTES, {}) | {
-        "pick": True
-    }
+        if len(triangles):
+            used, corner = np.unique(triangles, return_inverse=True)
+            mesh = points[used], corner.reshape(-1, 3)
+            things.append(Thing(name, FACE_COLOUR, *mesh, np.zeros((1, 3)), NO_TURN))
+    return _scene(title, things, SHAPE_BYTES, {}) | {"pick": True}
 
 
-def _meshes(shapes: dict[str, Mesh], mechanism: "Mechanism") -> dict[str, Mesh]:
+def _meshes(shapes: dict[str, Mesh], mechanism: "rom.mbs.Mechanism") -> dict[str, Mesh]:
     """The shapes of bodies, if the mechanism has these and the triangles have their corners."""
     check_bodies(mechanism, "shapes", shapes)
     found = {}
@@ -174,20 +166,20 @@ def _meshes(shapes: dict[str, Mesh], mechanism: "Mechanism") -> dict[str, Mesh]:
 
 
 def _surface(body: object) -> Surface | None:
-    """The surface of a body, if it is flexible and has one to draw."""
     surface: Surface | None = getattr(body, "surface", None)
     return surface if surface is not None and len(surface.triangles) else None
 
 
-def _stress(body: "FlexibleBody") -> Array | None:
-    """(6 s, r) stress on the points of the surface, where the body has it and it is linear."""
+def _stress(body: "rom.body.FlexibleBody") -> Array:
+    """(6 s or 0, r) stress on the points of the surface, where the body has it and it is linear."""
     surface, recovery = _surface(body), body.stress
-    if surface is None or not isinstance(recovery, StressRecovery):
-        return None
-    return recovery.operator if recovery.points.shape == surface.points.shape else None
+    if surface is not None and isinstance(recovery, StressRecovery):
+        if recovery.points.shape == surface.points.shape:
+            return recovery.operator
+    return np.zeros((0, body.n_modes))
 
 
-def _modes(body: "FlexibleBody") -> Iterator[Scene]:
+def _modes(body: "rom.body.FlexibleBody") -> Iterator[Scene]:
     """The modes whose frequencies a report lists, support by support."""
     compared = body.provenance.get("comparison", {})
     supports = {"free": ()} | {f"{name} held": (name,) for name in body.markers}
@@ -202,67 +194,45 @@ def _modes(body: "FlexibleBody") -> Iterator[Scene]:
             yield {"group": group, "label": label, "rigid": V[:6, k], "q": V[6:, k]}
 
 
-def _felt(shapes: Array, stress: Array | None, Q: Array, far: Array) -> Index:
-    """Numbers of the elastic coordinates that are seen in any of the states Q (m, r).
-
-    By shapes (3 s, r) and stress (6 s, r), against the largest displacements (m,) of the states.
-    """
+def _felt(shapes: Array, stress: Array, Q: Array, far: Array) -> Index:
+    """Elastic coordinates that are seen in a state of Q (m, r) whose displacement is far (m,)."""
     seen = np.abs(Q) * np.abs(shapes).max(axis=0) > SMALLEST_SHARE * far[:, None]
-    if stress is not None:
+    if stress.size:
         parts = np.abs(Q) * np.abs(stress).max(axis=0)
         seen |= parts > SMALLEST_SHARE * parts.max(axis=1, initial=0.0)[:, None]
     return np.flatnonzero(seen.any(axis=0))
 
 
-def _steps(solution: "Solution") -> Index:
-    """Numbers of the instants that are kept, evenly over the saved ones."""
+def _steps(solution: "rom.mbs.Solution") -> Index:
     per_frame = 4 * sum(7 + part.r for part in solution.mechanism.parts.values())
     n = int(np.clip(MOTION_BYTES // max(per_frame, 1), 2, N_FRAMES))
     return np.unique(evenly(len(solution.t), n))
 
 
-def _colours(mechanism: "Mechanism") -> list[str]:
-    shades, elastic = shades_of(mechanism), cycle(ELASTIC_COLOURS)
-    bare = {name for name, part in mechanism.parts.items() if _surface(part.flexible) is None}
-    return [METAL_COLOURS[shades[n]] if n in bare else next(elastic) for n in mechanism.parts]
-
-
-def _bars(mechanism: "Mechanism", name: str) -> Mesh:
-    """What stands for a body without a surface."""
-    return bars(mechanism.parts[name], ends_of(mechanism, name))
-
-
 def _of_part(
-    part: "Part", colour: str, shape: Mesh, pose: tuple[Array, Array], q: Array | None
+    part: "rom.mbs.Part", colour: str, form: Form, pose: tuple[Array, Array], q: Array | None
 ) -> Thing:
-    """A body of a mechanism, by its surface, or else a shape."""
-    surface = _surface(part.flexible)
-    if surface is None:
-        return Thing(part.name, colour, *shape, *pose)
-    mesh = surface.points, surface.triangles
-    if q is None or not part.r:
+    mesh, surface = (form.points, form.triangles), form.surface
+    if surface is None or q is None:
         return Thing(part.name, colour, *mesh, *pose)
     stress = _stress(part.flexible)
     far = np.array([max(_chunked(lambda u: np.abs(u).max(), surface.shape, q))])
     kept = _felt(surface.shape, stress, np.abs(q).max(axis=0)[None], far)
-    chosen = None if stress is None else stress[:, kept]
-    return Thing(part.name, colour, *mesh, *pose, surface.shape[:, kept], chosen, q[:, kept])
+    chosen = surface.shape[:, kept], stress[:, kept], q[:, kept]
+    return Thing(part.name, colour, *mesh, *pose, *chosen)
 
 
 def _chunked(of: Callable[[Array], float], columns: Array, q: Array) -> Iterator[float]:
-    """A number of the field (f, n) of columns (n, r), some instants at a time."""
-    for k in range(0, len(q), FRAMES_AT_ONCE):
+    """A number of the field (f, n) of columns (n, r), if any, some instants at a time."""
+    for k in range(0, len(q) if columns.size else 0, FRAMES_AT_ONCE):
         yield float(of(q[k : k + FRAMES_AT_ONCE] @ columns.T))
 
 
 def _limits(thing: Thing) -> dict[str, float]:
     """Largest displacement relative to the frame [m] and equivalent stress [Pa] of a motion."""
     far = _chunked(lambda u: np.linalg.norm(u.reshape(-1, 3), axis=1).max(), thing.shapes, thing.q)
-    high: Iterator[float] = iter(())
-    if thing.stress is not None and thing.stress.size:
-        high = _chunked(lambda s: von_mises(s.reshape(-1, 6)).max(), thing.stress, thing.q)
-    displacement = max(far, default=0.0) if thing.shapes.size else 0.0
-    return {"displacement": displacement, "stress": max(high, default=0.0)}
+    high = _chunked(lambda s: von_mises(s.reshape(-1, 6)).max(), thing.stress, thing.q)
+    return {"displacement": max(far, default=0.0), "stress": max(high, default=0.0)}
 
 
 def _scene(title: str, things: Sequence[Thing], size: int, look: dict[str, Any]) -> Scene:
@@ -303,16 +273,14 @@ def _view(seen: Array, look: dict[str, Any]) -> tuple[Scene, Array]:
 def _encoded(thing: Thing, centre: Array, size: int) -> Scene:
     """A body as numbers for the page, its surface as coarse as its share of the bytes asks."""
     r = thing.shapes.shape[1]
-    per_point = 2 * 3 * r * (1 if thing.stress is None else 3)
+    per_point = 2 * 3 * r * (3 if thing.stress.size else 1)
     n_max = int(np.clip(size // max(per_point, 1), MIN_POINTS, MAX_POINTS))
     kept, triangles = coarsened(thing.points, thing.triangles, n_max)
     X = thing.points[kept]
 
-    def columns(A: Array | None, width: int) -> list[dict[str, object]]:
-        if A is None or not A.size:
-            return []
+    def columns(A: Array, width: int) -> list[dict[str, object]]:
         rows = (width * kept[:, None] + np.arange(width)).ravel()
-        return [quantised_column(column) for column in A[rows].T]
+        return [quantised_column(column) for column in A[rows].T] if A.size else []
 
     return {
         "name": thing.name,

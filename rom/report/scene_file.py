@@ -57,7 +57,6 @@ def _check(scene: Scene) -> None:
 
 
 def _check_body(body: Scene, f: int) -> None:
-    """Whether the arrays of a body fit each other, and the number of instants."""
     name, points = body["name"], body["points"]
     named = isinstance(name, str) and isinstance(body["colour"], str)
     need(named, "a body has no name or colour")
@@ -76,7 +75,6 @@ def _check_body(body: Scene, f: int) -> None:
 
 
 def _numbers(array: dict[str, str]) -> Array:
-    """An array of a scene, finite."""
     values = np.frombuffer(b64decode(array["data"], validate=True), TYPES[array["type"]])
     _finite(values)
     return values

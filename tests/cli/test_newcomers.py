@@ -9,6 +9,7 @@ import pytest
 import rom
 from cases.command import rom as run_rom
 from cases.files.step_parts import step_box, step_part, step_plate
+from cases.refusals import refuses
 from cases.solid import block, reduced
 from rom.cli.main import main
 from rom.components import cosserat
@@ -54,12 +55,11 @@ def test_frames_of_rods_are_found_as_in_files():
 
 @pytest.mark.parametrize(
     ("place", "words"),
-    [("bob.pn", "m2 = 'bob.pn': body 'bob' has no marker 'pn'"), ("rob.pin", "no body 'rob'")],
+    [("bob.pn", "'bob.pn': body 'bob' has no marker 'pn'"), ("rob.pin", ".*no body 'rob'")],
 )
 def test_unknown_markers_are_told_with_the_argument(pendulum, place, words):
-    with pytest.raises(ConfigError, match=r"Mechanism.spherical 'again': m2") as caught:
-        pendulum.spherical("again", "ground", place)
-    assert words in str(caught.value)
+    said = f"Mechanism.spherical 'again': m2 = {words}"
+    refuses(ConfigError, said, pendulum.spherical, "again", "ground", place)
 
 
 # --- arguments ---
@@ -90,20 +90,16 @@ def test_quantities_with_units_are_numbers_in_si(pendulum):
 
 @pytest.mark.parametrize(
     ("mass", "words"),
-    [("2 s", "is a time; a mass"), ("2", "has no unit"), ("-2 kg", "mass = -2 must be positive")],
+    [("2 s", "is a time; a mass"), ("2", "has no unit"), ("-2 kg", " = -2 must be positive")],
 )
 def test_quantities_of_other_dimensions_are_refused_by_name(pendulum, mass, words):
-    with pytest.raises(ConfigError, match=r"add_rigid 'b': mass") as caught:
-        pendulum.add_rigid("b", mass=mass, inertia=(1, 1, 1), at=(0, 0, 0))
-    assert words in str(caught.value)
+    solid = {"mass": mass, "inertia": (1, 1, 1), "at": (0, 0, 0)}
+    refuses(ConfigError, f"add_rigid 'b': mass.*{words}", pendulum.add_rigid, "b", **solid)
 
 
-def test_solids_have_names_and_their_numbers_are_judged_like_others():
-    assert rom.Material.steel == rom.Material(E=210e9, nu=0.3, rho=7850.0)
-    with pytest.raises(MaterialError, match="E = -1e"):
-        rom.Material(E="-1 GPa", nu=0.3, rho=1.0)
-    with pytest.raises(ConfigError, match="rho: '1 m' is a length"):
-        rom.Material(E=1.0, nu=0.3, rho="1 m")
+def test_numbers_of_solids_are_judged_like_others():
+    refuses(MaterialError, "E = -1e", rom.Material, E="-1 GPa", nu=0.3, rho=1.0)
+    refuses(ConfigError, "rho: '1 m' is a length", rom.Material, E=1.0, nu=0.3, rho="1 m")
 
 
 def test_records_show_arrays_by_their_size(pendulum):
@@ -134,8 +130,7 @@ def test_curves_of_a_motion_are_asked_for_by_name(pendulum, asked, panels):
         np.testing.assert_allclose(
             figure.axes[0].lines[0].get_ydata(), solution.position("bob")[:, 0]
         )
-    with pytest.raises(ConfigError, match=r"no 'slider'.*bob position"):
-        rom.view.history(solution, "slider")
+    refuses(ConfigError, r"no 'slider'.*bob position", rom.view.history, solution, "slider")
 
 
 # --- the command line ---

@@ -104,7 +104,7 @@ def test_a_step_file_swings_on_the_face_chosen(tmp_path):
     assert found["frequencies"][0] == pytest.approx(thin, rel=0.02)
     assert found["gravity"] == [0, 0, -9.81]
     left = {path.name for path in (tmp_path / "out").iterdir()}
-    assert {"bar.rom.npz", "bar.png", "bar.html"} < left == {Path(f).name for f in found["files"]}
+    assert left == {Path(f).name for f in found["files"]}
 
 
 @pytest.mark.fenicsx
@@ -131,7 +131,6 @@ def test_a_step_file_swings_about_its_bore(tmp_path):
 
 
 RHO = 7850.0
-STEEL = ("--E", "210e9", "--nu", "0.3", "--rho", str(RHO))
 FACES = {  # number of faces; faces by number, point, radius and normal, and the kind of interface
     "bracket": (14, {"foot": ("10+11+12+13", "rbe2"), "bore": ("radius:0.0125", "rbe2")}),
     "crank": (9, {"bore": ("0.012,0,0.008", "rbe2"), "pin": ("radius:0.01", "rbe2")}),
@@ -166,8 +165,8 @@ def test_a_part_becomes_a_report_by_three_commands(folder, part):
     assert (folder / f"{part}.png").stat().st_size > 20_000
     picks = [f"--face={name}={face}" for name, (face, _) in chosen.items()]
     kinds = [f"-i={name}={kind}" for name, (_, kind) in chosen.items()]
-    reduced = done(folder, "reduce", f"{part}.step", *STEEL, *picks, *kinds, "--reference",
-                   next(iter(chosen)), "-o", f"{part}.rom.npz")  # fmt: skip
+    how = ("--material", "steel", "--reference", next(iter(chosen)), "-o", f"{part}.rom.npz")
+    reduced = done(folder, "reduce", f"{part}.step", *picks, *kinds, *how)
     assert reduced["certificate"]["ok"]
     assert reduced["mass"] == pytest.approx(RHO * volume, rel=2e-4)
     assert reduced["provenance"]["faces"] == PICKED.get(part, reduced["provenance"]["faces"])

@@ -19,6 +19,7 @@ from rom import report
 from rom.report import coarse, scene
 from rom.report.scene_file import read_scene, write_scene
 from rom.view.canvas.scene import sharp_edges
+from rom.view.canvas.solids import ellipsoid
 
 SUPPORTS = ("root held", "tip held")
 
@@ -135,19 +136,8 @@ def test_the_page_gets_what_can_be_seen_and_nothing_else(solution, monkeypatch):
 
 
 def sphere(n):
-    """A closed surface of (n - 1) m + 2 points on the unit sphere, m = 2 n."""
-    m = 2 * n
-    polar, around = np.pi * np.arange(1, n) / n, 2 * np.pi * np.arange(m) / m
-    rings = np.stack([np.outer(np.sin(polar), np.cos(around)),
-                      np.outer(np.sin(polar), np.sin(around)),
-                      np.outer(np.cos(polar), np.ones(m))], axis=-1).reshape(-1, 3)  # fmt: skip
-    i, j = np.arange(m), (np.arange(m) + 1) % m
-    strips = [np.c_[a + i, a + m + i, a + j] for a in m * np.arange(n - 2)]
-    strips += [np.c_[a + j, a + m + i, a + m + j] for a in m * np.arange(n - 2)]
-    last = m * (n - 2)
-    caps = [np.c_[np.full(m, len(rings)), i, j], np.c_[np.full(m, len(rings) + 1), last + j,
-                                                       last + i]]  # fmt: skip
-    return np.vstack([rings, [[0, 0, 1], [0, 0, -1]]]), np.vstack([*strips, *caps])
+    """A closed surface of 2 n (n - 1) + 2 points on the unit sphere."""
+    return ellipsoid((1.0, 1.0, 1.0), sides=2 * n)
 
 
 @pytest.mark.parametrize("n_max", few(1, [300, 1500]))

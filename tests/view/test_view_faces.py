@@ -6,6 +6,7 @@ import pytest
 pytest.importorskip("pyvista", reason="pictures need pyvista")
 pytest.importorskip("matplotlib", reason="pictures need matplotlib")
 
+from cases.refusals import refuses
 from rom import view
 from rom.errors import ConfigError
 from rom.view.canvas.scene import aimed
@@ -62,5 +63,4 @@ def test_what_is_hidden_is_named_below_and_without_faces_there_is_no_picture():
     words = scene._words(points, patches | {"": patches["x-"]}, [[(spot, (0, 0))], []])
     assert "300 mm x 200 mm x 100 mm" in words
     assert words.endswith("Not seen, or too small: x-, y+, y-, z+, z-.")
-    with pytest.raises(ConfigError, match="no face to draw"):
-        view.faces(np.zeros((3, 3)), {"a": np.zeros((0, 3), dtype=int)})
+    refuses(ConfigError, "no face to draw", view.faces, points, {"a": np.zeros((0, 3), dtype=int)})

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 import rom
 from benchmarks.units import as_mechanism
 from cases.gear_unit import rigid_unit
-from cases.refusals import refused
+from cases.refusals import refused, refuses
 from rom import view
 from rom.components.gear_mesh import GearPair
 from rom.components.gear_mesh.gears.meshes import middle_of_tooth
@@ -202,8 +202,7 @@ def test_walls_in_a_ring_stand_where_its_pinion_is_nearest():
     points = view.tooth_walls(sol, "mesh", scale=1e-12, direction=z)[0]
     assert (points[:, 0] > turned).all()
     assert_allclose(np.hypot(*points[:, :2].T), abs(pair.r[1]), atol=1.5 * pair.module)
-    with pytest.raises(rom.ConfigError, match="turns in no journal bearing"):
-        view.toothed_shaft(mech, "pinion")
+    refuses(rom.ConfigError, "turns in no journal bearing", view.toothed_shaft, mech, "pinion")
 
 
 def walls(name, direction):

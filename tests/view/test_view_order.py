@@ -54,7 +54,7 @@ PICTURES = {  # function -> what is drawn, words
     "history": lambda: ([X, [("angle [rad]", {"one": np.sin(X)})]], WORDS),
     "instants": lambda: ([*moved()], {"times": [0.05]}),
     "mesh": lambda: ([block()], {}),
-    "mode_shapes": lambda: ([lattice_bar()], {"n": 1}),
+    "mode_shapes": lambda: ([lattice_bar()], {"n": 4}),
     "panels": lambda: ([[[view.Panel("Path", "x [m]", "y [m]", {"one": (X, X)})]]], WORDS),
     "plane": lambda: (
         [[view.Drawing("stone", "x [m]", "y [m]", polygons=[POINTS[:3, :2]])]], WORDS),

@@ -176,24 +176,26 @@ def test_plates_are_their_outlines_made_thick_and_move_with_them():
     refuses(ConfigError, "at least one plate", view.plates, [[square], [square, other]], 0.5)
 
 
-@pytest.mark.long
-def test_what_is_left_of_an_update_has_a_scale_of_its_own():
+def test_changes_of_an_update_are_bars_and_what_is_left_has_a_scale_of_its_own():
     """Error bars are two standard deviations long, and fill their diagram."""
     points = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0]])
     structure = points, np.array([[0, 1], [1, 2]]), points, points[:1]
     changes = {"one": (0.4, 0.401, 0.0005), "two": (-0.3, -0.3, 0.0002)}
     fine = np.linspace(0.0, 1.0, 200)
-    figure = view.updating(
-        X, {"test": 1 / (3 - X), "before": (fine, 1 / (2 - fine))}, changes,
-        structure=structure, label="u [m]", title="T", caption="C")  # fmt: skip
+    curves, more = {"test": 1 / (3 - X)}, {"structure": structure, "label": "u [m]"}
+    both = curves | {"before": (fine, 1 / (2 - fine))}
+    figure = view.updating(X, both, changes, **more, title="T", caption="C")
     found = no_words_overlap_or_leave_the_page(figure)
     assert {"found", "true", "sensors", "exciters"} <= set(found)
+    (bars,) = [a for a in figure.axes if a.get_xlabel() == "change [%]"]
+    assert_allclose([bar.get_width() for bar in bars.patches], [40.0, -30.0])
     (errors,) = [a for a in figure.axes if a.get_xlabel() == "found - true [%]"]
     ends = [segment[:, 0] for segment in errors.collections[0].get_segments()]
     assert_allclose(ends, [(0.0, 0.2), (-0.04, 0.04)], atol=1e-12)
     assert np.ptp(errors.get_xlim()) < 0.3
     responses = figure.axes[0].lines
     assert [line.get_xdata().size for line in responses] == [X.size, fine.size]
+    refuses(ConfigError, "20 values of 'test' for 19", view.updating, X[1:], curves, {}, **more)
 
 
 @pytest.mark.long

@@ -9,7 +9,7 @@ from dataclasses import asdict
 from types import ModuleType
 from typing import TYPE_CHECKING
 
-from rom.cli.answer import Answer, Data, table
+from rom.cli.answer import Answer, table
 from rom.cli.options import option
 from rom.errors import ConfigError
 from rom.places import FOLDER_ABOVE
@@ -38,11 +38,16 @@ def run(args: argparse.Namespace) -> Answer:
     if args.list:
         about = {name: (f.__doc__ or "").split("\n")[0] for name, f in known.BENCHMARKS.items()}
         return Answer({"benchmarks": about}, table(("benchmark", ""), about.items()))
-    return _answer(list(_told(known.run(tuple(args.names)))))
+    figures = list(_told(known.run(tuple(args.names))))
+    rows = [
+        (f"{f.benchmark}, {f.case}: {f.quantity}", f"{f.value:.4g} {f.unit}".strip(), f.aim)
+        for f in figures
+    ]
+    data = {"figures": [asdict(f) for f in figures]}
+    return Answer(data, table(("figure", "value", "aim"), rows))
 
 
 def _of_the_source() -> ModuleType:
-    """The module of all benchmarks, which stand beside the package and are not installed."""
     if not all((FOLDER_ABOVE / file).is_file() for file in SOURCE_FILES):
         raise ConfigError(
             "Benchmarks come with the source of rom, not with the installed package.",
@@ -57,12 +62,3 @@ def _told(figures: "Iterator[Figure]") -> "Iterator[Figure]":
     for figure in figures:
         log.info("%s: %s %.4g %s", figure.case, figure.quantity, figure.value, figure.unit)
         yield figure
-
-
-def _answer(figures: "list[Figure]") -> Answer:
-    rows = [
-        (f"{f.benchmark}, {f.case}: {f.quantity}", f"{f.value:.4g} {f.unit}".strip(), f.aim)
-        for f in figures
-    ]
-    data: Data = {"figures": [asdict(f) for f in figures]}
-    return Answer(data, table(("figure", "value", "aim"), rows))

@@ -8,9 +8,9 @@ import argparse
 import re
 from pathlib import Path
 
-from rom.cli.answer import Answer, Data, failures, report_data
+import rom
+from rom.cli.answer import Answer, failures, report_data
 from rom.cli.described import TOML_SUFFIX, described
-from rom.errors import FileFormatError
 from rom.readable import check_readable
 
 SUMMARY = "check a body file and print its certificate"
@@ -51,33 +51,27 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> Answer:
     """Load and check."""
-    from rom.checks.gates import check
     from rom.io.native import load
 
-    data: Data = {"file": str(args.file)}
     ending = args.file.suffix.lower()
     if described(args):
         return _description(args.file)
     if ending not in BODIES:
         return _told(args.file, *_kind(args.file))
     if ending == ".sid_fem":
-        from rom.io.sid.dialect import check_sid, read_sid
-
-        record = read_sid(args.file, ge="as_written")
-        report = check_sid(record)
-        data |= {"name": record.name, "dialect": record.dialect}
+        record = rom.read_sid(args.file, ge="as_written")
+        report, told = rom.io.check_sid(record), {"name": record.name, "dialect": record.dialect}
     else:
         body = load(args.file)
-        report = check(body)
-        data |= {"name": body.name}
-    data |= {"report": report_data(report)}
+        report, told = rom.check(body), {"name": body.name}
+    data = {"file": str(args.file), **told, "report": report_data(report)}
     return Answer(data, f"{args.file}\n{report}", failed=failures(report))
 
 
 def _kind(file: Path) -> tuple[str, ...]:
     """What another file is, by its ending and what its lines begin with, and the next commands."""
     if not check_readable(file).stat().st_size:
-        raise FileFormatError("the file is empty.", where=str(file))
+        raise rom.FileFormatError("the file is empty.", where=str(file))
     ending, found = file.suffix.lower(), set[str]()
     rows = [row for row in OTHERS if ending in row[0].split()]
     if any(words for _, words, *_ in rows):
@@ -89,7 +83,9 @@ def _kind(file: Path) -> tuple[str, ...]:
     kinds = " ".join([*BODIES, TOML_SUFFIX, *(endings for endings, *_ in OTHERS)])
     wanted = " or ".join(words.replace(" ", ", ") for _, words, *_ in rows)
     text = f"is no {ending} file: no line begins with {wanted}" if rows else "is of no known kind"
-    raise FileFormatError(f"{text}.", where=str(file), hint="" if rows else f"Known are {kinds}.")
+    raise rom.FileFormatError(
+        f"{text}.", where=str(file), hint="" if rows else f"Known are {kinds}."
+    )
 
 
 def _told(file: Path, what: str, *commands: str) -> Answer:
@@ -99,12 +95,10 @@ def _told(file: Path, what: str, *commands: str) -> Answer:
 
 
 def _description(file: Path) -> Answer:
-    from rom.config.component import read_component
     from rom.config.document import read_document
-    from rom.config.mechanism import read_mechanism
 
     if "bodies" in read_document(file).data:
-        read_mechanism(file)
+        rom.read_mechanism(file)
         return _told(file, "a mechanism without mistakes", "rom simulate {}", "rom view {}")
-    read_component(file)
+    rom.read_component(file)
     return _told(file, "a component without mistakes", "rom reduce {}", "rom modes {}")

@@ -9,6 +9,7 @@ import logging
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
+import rom
 from rom.cli.answer import Answer
 from rom.cli.options import option
 
@@ -34,12 +35,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> Answer:
     """Examine and report."""
-    from rom import __version__
-
     found = _compiled(args.compile) if args.compile else _diagnosed(args.fix)
     broken = tuple(f"{f.name} is broken: {f.value}" for f in found if f.state == "broken")
-    data = {"rom": __version__, "findings": [asdict(f) for f in found]}
-    return Answer(data, f"rom {__version__}\n{_text(found)}", failed=broken)
+    data = {"rom": rom.__version__, "findings": [asdict(f) for f in found]}
+    return Answer(data, f"rom {rom.__version__}\n{_text(found)}", failed=broken)
 
 
 def _diagnosed(fix: bool) -> "list[Finding]":
@@ -61,7 +60,6 @@ def _diagnosed(fix: bool) -> "list[Finding]":
 
 
 def _compiled(what: str) -> "list[Finding]":
-    """Findings of all cases, each said as soon as it is done: some take a minute."""
     from rom.doctor import first_use
     from rom.doctor.probes import compiled
 

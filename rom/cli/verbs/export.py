@@ -4,13 +4,15 @@ A mechanism becomes a Functional Mock-up Unit, .fmu.
 """
 
 import argparse
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
+import rom
 from rom.cli.answer import Answer
 from rom.cli.described import described, mechanism
 from rom.cli.options import DURATION, add_meshing, names, option
 from rom.cli.output import add_force, checked, files_in
-from rom.errors import ConfigError
 
 SUMMARY = "write a body or a mechanism for another program"
 MECHANISM_OPTIONS = ("inputs", "outputs", "dt")
@@ -41,32 +43,23 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> Answer:
     """Load; the file is written at the end."""
-    return _mechanism(args) if described(args) else _body(args)
-
-
-def _mechanism(args: argparse.Namespace) -> Answer:
-    from rom.config.mechanism_fmu import write_mechanism_fmu
+    from rom.io.export import format_of, read_body
     from rom.io.files import check_writable
 
     check_writable(args.output)
-    file = mechanism(args, "inputs", "outputs")
-    checked(args, args.output, "fmu", inputs=files_in(file.values))
-    data = {"file": str(args.file), "output": str(args.output), "format": "fmu"}
-    text = f"{args.output}: mechanism {file.name} as fmu"
-    ends = {"inputs": args.inputs, "outputs": args.outputs}
-    return Answer(data, text, lambda: write_mechanism_fmu(file, args.output, **ends))
-
-
-def _body(args: argparse.Namespace) -> Answer:
-    from rom.io.export import export, format_of, read_body
-    from rom.io.files import check_writable
-
-    if wrong := [option for option in MECHANISM_OPTIONS if getattr(args, option)]:
-        raise ConfigError(f"--{wrong[0]} needs the .toml file of a mechanism.")
-    check_writable(args.output)
-    kind = format_of(args.output, args.to)
-    checked(args, args.output, kind)
-    body = read_body(args.file)
+    write: Callable[[], object]
+    if described(args):
+        file, kind = mechanism(args, "inputs", "outputs"), "fmu"
+        checked(args, args.output, kind, inputs=files_in(file.values))
+        what, ends = f"mechanism {file.name}", {"inputs": args.inputs, "outputs": args.outputs}
+        write = partial(rom.write_mechanism_fmu, file, args.output, **ends)
+    else:
+        if wrong := [option for option in MECHANISM_OPTIONS if getattr(args, option)]:
+            raise rom.ConfigError(f"--{wrong[0]} needs the .toml file of a mechanism.")
+        kind = format_of(args.output, args.to)
+        checked(args, args.output, kind)
+        body = read_body(args.file)
+        what = f"body {body.name}"
+        write = partial(rom.export, body, args.output, to=kind, held=args.held)
     data = {"file": str(args.file), "output": str(args.output), "format": kind}
-    text = f"{args.output}: body {body.name} as {kind}"
-    return Answer(data, text, lambda: export(body, args.output, to=kind, held=args.held))
+    return Answer(data, f"{args.output}: {what} as {kind}", write)

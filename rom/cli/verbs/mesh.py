@@ -6,17 +6,16 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import rom
 from rom.cli.answer import Answer, Data, table
 from rom.cli.described import component, described
 from rom.cli.options import add_geometry, add_solid, material, option, reading
 from rom.cli.output import add_force, checked
-from rom.errors import ConfigError
 from rom.names import check_ending
 
 if TYPE_CHECKING:
     from rom.config.component import Solid
     from rom.fe.mesh.solid import SolidMesh
-    from rom.model import Material
 
 DECK_SUFFIX = ".inp"
 CAD_RTOL = 1e-5  # of the size: error of middles of faces, which the CAD finds by integration
@@ -64,13 +63,13 @@ def run(args: argparse.Namespace) -> Answer:
         path = check_ending(args.save, "a mesh", ".png", ".vtu", DECK_SUFFIX)
         ending = path.suffix.lower()
         checked(args, path, "deck" if ending == DECK_SUFFIX else ending[1:], inputs=[file])
-    if args.faces and FACE_WORD in how["faces"]:
-        raise ConfigError(
-            f"--faces lists the faces as {FACE_WORD} 1, {FACE_WORD} 2, ..., so none can be called "
-            f"{FACE_WORD!r}.",
-            hint="Give it another name, or leave --faces out.",
-        )
     if args.faces:
+        if FACE_WORD in how["faces"]:
+            raise rom.ConfigError(
+                f"--faces lists the faces as {FACE_WORD} 1, {FACE_WORD} 2, ..., so none can be "
+                f"called {FACE_WORD!r}.",
+                hint="Give it another name, or leave --faces out.",
+            )
         how["faces"] = how["faces"] | {FACE_WORD: EVERY_FACE}
     mesh = read_mesh(file, **how)
     data = summary(mesh)
@@ -80,15 +79,14 @@ def run(args: argparse.Namespace) -> Answer:
     return Answer(data, _text(data), write=lambda: _save(mesh, args.save, solid))
 
 
-def _solid(args: argparse.Namespace) -> "Material | None":
-    """The material of a deck; None for the mesh alone."""
+def _solid(args: argparse.Namespace) -> rom.Material | None:
     given = [f"--{name}" for name in ("E", "nu", "rho") if getattr(args, name) is not None]
     if not given:
         return None
     if args.save is None or args.save.suffix.lower() != DECK_SUFFIX:
-        raise ConfigError(f"{given[0]} needs --save FILE.inp.")
+        raise rom.ConfigError(f"{given[0]} needs --save FILE.inp.")
     if len(given) < 3:
-        raise ConfigError(f"a material needs --E, --nu and --rho, got {', '.join(given)}.")
+        raise rom.ConfigError(f"a material needs --E, --nu and --rho, got {', '.join(given)}.")
     return material(args)
 
 
@@ -109,7 +107,6 @@ def _save(mesh: "SolidMesh", path: Path, solid: "Solid | dict[str, Solid] | None
 
 
 def _draw(mesh: "SolidMesh", path: Path) -> None:
-    """Listed faces by their numbers, interfaces by their names."""
     from rom.fe.mesh.summary import surface_triangles
     from rom.view.scenes.faces import faces
 
@@ -127,17 +124,11 @@ def _text(data: Data) -> str:
         for name, value in data["quality"].items()
     )
     regions = [(name, str(r["cells"]), f"{r['volume']:.6g}") for name, r in data["regions"].items()]
-    faces = [
-        (
-            name,
-            str(f["facets"]),
-            str(f["nodes"]),
-            _words(f["middle"], size),
-            _words(f.get("axis", ())),
-        )
-        for name, f in data["interfaces"].items()
-        if name not in numbered
-    ]
+    faces = []
+    for name, f in data["interfaces"].items():
+        if name not in numbered:
+            places = _words(f["middle"], size), _words(f.get("axis", ()))
+            faces.append((name, str(f["facets"]), str(f["nodes"]), *places))
     box = " x ".join(f"{high - low:.4g}" for low, high in data["box"])
     parts = [
         f"{data['file']}: {data['cells']} cells {data['cell_type']}, {data['nodes']} nodes",
@@ -160,7 +151,6 @@ def _text(data: Data) -> str:
 
 
 def _row(face: Data, size: float) -> tuple[str, ...]:
-    """One line of the list of faces; the name only where somebody gave one."""
     radius = "" if face["radius"] is None else f"{face['radius']:.6g}"
     direction = _words(face["axis"] or face["normal"] or ())
     name = "" if face["name"] == _numbered(face) else face["name"]
@@ -169,7 +159,6 @@ def _row(face: Data, size: float) -> tuple[str, ...]:
 
 
 def _numbered(face: Data) -> str:
-    """Name of a face without another one."""
     return f"{FACE_WORD} {face['number']}"
 
 

@@ -2,6 +2,7 @@
 
 import argparse
 
+import rom
 from rom.cli.answer import Answer, table
 from rom.cli.described import component, described, keyed
 from rom.cli.matrices import add_matrices, read_model
@@ -44,8 +45,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> Answer:
     """Assemble and solve."""
-    from rom.reduction.full_model import modes
-
     if described(args):
         part = component(args)
         kinds, model = part.kinds, part.model()
@@ -58,7 +57,7 @@ def run(args: argparse.Namespace) -> Answer:
         name: [typed_number("--spring", part) for part in text.split(",")]
         for name, text in unique(springs, "--spring").items()
     }
-    found = modes(model, n, fixed=fixed, springs=stiffness, interfaces=kinds or None)
+    found = rom.modes(model, n, fixed=fixed, springs=stiffness, interfaces=kinds or None)
     data = {
         "file": str(args.file),
         "n_dofs": model.n_dofs,

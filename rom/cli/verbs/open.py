@@ -8,13 +8,13 @@ ends, and with it whatever still runs. What is chosen is written as a component 
 import argparse
 import logging
 import os
+import shlex
 import threading
 import webbrowser
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from math import isfinite
 from pathlib import Path
-from shlex import quote
 from typing import Any
 
 from rom.cli.answer import Answer
@@ -123,10 +123,7 @@ class Chosen:
         text = component_text(geometry, parameters, faces, hinge, numbers)
         write_whole(self.file, text.encode())
         self._keep(self.file)
-        return {
-            "file": str(self.file),
-            "command": " ".join(map(quote, ("rom", *self._swing(hinge)))),
-        }
+        return {"file": str(self.file), "command": shlex.join(["rom", *self._swing(hinge)])}
 
     def swing(self, asked: dict[str, Any]) -> dict[str, str]:
         """Write the file and start its swing."""

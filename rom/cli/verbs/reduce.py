@@ -5,10 +5,12 @@ then 5.
 """
 
 import argparse
+from collections.abc import Iterable
 from math import pi
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import rom
 from rom.cli.answer import Answer, Data, failures, report_data
 from rom.cli.described import component, described, keyed, rayleigh
 from rom.cli.matrices import add_matrices, read_model
@@ -25,14 +27,6 @@ from rom.cli.output import add_force, checked, files_in
 from rom.config.methods import SETTINGS, chosen
 from rom.errors import ConfigError
 from rom.names import check_name
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from rom.body.damping import ModalDamping, Rayleigh
-    from rom.body.flexible import FlexibleBody
-    from rom.reduction.bases.method import Method
-    from rom.reduction.interfaces.characteristic import Characteristic
 
 SUMMARY = "reduce a model to a flexible body, with its certificate"
 EXAMPLES = """\
@@ -73,36 +67,29 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> Answer:
     """Assemble, reduce, compare; the file is written at the end."""
-    from rom.io.native import save
-
     body, output = _described(args) if described(args) else _by_options(args)
     failed = failures(body.certificate) if body.certificate else ()
-    return Answer(_data(body, output), _text(body, output), lambda: save(body, output), failed)
+    return Answer(_data(body, output), _text(body, output), lambda: rom.save(body, output), failed)
 
 
-def _checked(
-    args: argparse.Namespace, output: Any, name: str, inputs: "Iterable[Path]" = ()
-) -> Path:
-    """The file to write, before anything is computed for it."""
+def _checked(args: argparse.Namespace, output: Any, name: str, inputs: Iterable[Path] = ()) -> Path:
     check_name(name, "a body")
     return checked(args, output or Path(f"{name}.rom.npz"), "npz", inputs=inputs)
 
 
-def _described(args: argparse.Namespace) -> "tuple[FlexibleBody, Path]":
+def _described(args: argparse.Namespace) -> "tuple[rom.FlexibleBody, Path]":
     part = component(args)
     output = _checked(args, args.output or part.output, part.name, files_in(part.values))
     return part.body(), output
 
 
-def _by_options(args: argparse.Namespace) -> "tuple[FlexibleBody, Path]":
-    from rom.workflow import reduce
-
+def _by_options(args: argparse.Namespace) -> "tuple[rom.FlexibleBody, Path]":
     needed = solid_options(args) | {"-i/--interface": args.interface}
     require(needed, "A body needs an interface, for example -i pin_a=rbe2.")
     name = args.name or args.file.stem
     output = _checked(args, args.output, name)
     chosen, damping = method(args), _damping(args)
-    body = reduce(
+    body = rom.reduce(
         read_model(args),
         method=chosen,
         interfaces=unique(args.interface, "-i"),
@@ -116,17 +103,15 @@ def _by_options(args: argparse.Namespace) -> "tuple[FlexibleBody, Path]":
     return body, output
 
 
-def _damping(args: argparse.Namespace) -> "Rayleigh | ModalDamping | None":
-    from rom.body.damping import ModalDamping, Rayleigh
-
+def _damping(args: argparse.Namespace) -> "rom.Rayleigh | rom.ModalDamping | None":
     if args.damping_ratio is not None:
-        return ModalDamping(args.damping_ratio, args.damping_fixed)
+        return rom.ModalDamping(args.damping_ratio, args.damping_fixed)
     if args.damping_fixed:
         raise ConfigError("--damping-fixed says where a ratio is meant: it needs --damping-ratio.")
-    return None if args.rayleigh is None else Rayleigh(**rayleigh(args.rayleigh))
+    return None if args.rayleigh is None else rom.Rayleigh(**rayleigh(args.rayleigh))
 
 
-def _data(body: "FlexibleBody", output: Path) -> Data:
+def _data(body: "rom.FlexibleBody", output: Path) -> Data:
     return {
         "output": str(output),
         "name": body.name,
@@ -141,7 +126,7 @@ def _data(body: "FlexibleBody", output: Path) -> Data:
     }
 
 
-def _text(body: "FlexibleBody", output: Path) -> str:
+def _text(body: "rom.FlexibleBody", output: Path) -> str:
     full = body.provenance["reduction"]["full dofs"]
     head = (
         f"{output}: body {body.name}, {body.mass:.6g} kg, {full} dofs reduced to "
@@ -155,7 +140,7 @@ def _text(body: "FlexibleBody", output: Path) -> str:
     return f"{head}\n{about}\n\n{body.certificate}"
 
 
-def method(args: argparse.Namespace) -> "Method | Characteristic":
+def method(args: argparse.Namespace) -> "rom.reduction.Method | rom.reduction.Characteristic":
     """The method the options ask for; `rom.config.methods.chosen` refuses contradictions."""
     settings = {key: getattr(args, key) for key in SETTINGS if getattr(args, key) is not None}
     return chosen(settings, full=any(kind == "full" for _, kind in args.interface))

@@ -7,6 +7,7 @@ for print and for browsers without WebGL. Where no picture can be drawn it says 
 import argparse
 from pathlib import Path
 
+import rom
 from rom.cli.answer import Answer
 from rom.cli.options import add_meshing, meshing, option
 from rom.cli.output import add_force, checked, typed_command, usual
@@ -33,8 +34,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> Answer:
     """Describe; the file is written at the end."""
-    from rom import __version__
-    from rom.report.html import write_report
     from rom.report.pages import describe
 
     args.output = usual(args, ".html")
@@ -43,7 +42,7 @@ def run(args: argparse.Namespace) -> Answer:
     title, sections = describe(
         args.file,
         command=typed_command(args),
-        version=__version__,
+        version=rom.__version__,
         move=args.move,
         progress=not args.quiet,
         **meshing(args),
@@ -55,4 +54,4 @@ def run(args: argparse.Namespace) -> Answer:
         "sections": list(sections),
     }
     text = f"{args.output}: {title}"
-    return Answer(data, text, lambda: write_report(sections, args.output, title=title))
+    return Answer(data, text, lambda: rom.write_report(sections, args.output, title=title))

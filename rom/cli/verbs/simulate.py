@@ -8,22 +8,17 @@ import logging
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+import numpy as np
+
+import rom
 from rom.cli.answer import Answer, failures, report_data
 from rom.cli.described import described, mechanism
 from rom.cli.options import ACCELERATION, DURATION, add_meshing, option, require, vector
 from rom.cli.output import add_force, check_encoder, checked, claim, files_in, typed_command, usual
 from rom.cli.verbs.swing import pendulum
-from rom.errors import ConfigError, ResourceError, RomError
 from rom.names import inside
 from rom.process.launcher import ranks
-
-if TYPE_CHECKING:
-    from rom.body.flexible import FlexibleBody
-    from rom.mbs.integrate.keeping import Keeping
-    from rom.mbs.results.solution import Solution
-    from rom.model import Report
 
 log = logging.getLogger("rom")
 PARTS_FOLDER = "motion.parts"  # where the motion is kept while the run lasts
@@ -69,7 +64,6 @@ def run(args: argparse.Namespace) -> Answer:
 
 
 def _mechanism(args: argparse.Namespace) -> Answer:
-    from rom import __version__
     from rom.report.run import Run, made_from, paths_of
     from rom.report.run import run as move
 
@@ -79,12 +73,11 @@ def _mechanism(args: argparse.Namespace) -> Answer:
         checked(args, path, inputs=files_in(file.values))
     check_encoder(paths)
     keep = _keeping(args, made_from(file))
-    origin = {"command": typed_command(args), "version": __version__}
+    origin = {"command": typed_command(args), "version": rom.__version__}
 
-    def rescue(solution: "Solution", audit: "Report") -> Path:
-        motion, *_, record = Run(file, solution, audit, **origin).paths(args.output)
-        Run(file, solution, audit, **origin).write_motion([motion, record])
-        return motion
+    def rescue(solution: "rom.mbs.Solution", audit: rom.Report) -> Path:
+        Run(file, solution, audit, **origin).write_motion([paths[0], paths[-1]])
+        return paths[0]
 
     with _rescuing(args, keep, rescue):
         done = move(file, **origin, progress=_aloud(args), keep=keep)
@@ -93,28 +86,28 @@ def _mechanism(args: argparse.Namespace) -> Answer:
         with _finishing(args, keep):
             done.write(args.output)
 
-    return _answer(done.solution, done.audit, done.paths(args.output), write)
+    return _answer(done.solution, done.audit, paths, write)
 
 
 def _aloud(args: argparse.Namespace) -> bool:
     return ranks()[0] == 0 and not args.quiet
 
 
-def _keeping(args: argparse.Namespace, made_from: dict[str, str]) -> "Keeping | None":
+def _keeping(args: argparse.Namespace, made_from: dict[str, str]) -> "rom.mbs.Keeping | None":
     """The folder of the motion under way; one rank writes it."""
-    from rom.mbs.integrate.keeping import Keeping
-
-    keep = Keeping(args.output / PARTS_FOLDER, args.resume, made_from)
+    keep = rom.mbs.Keeping(args.output / PARTS_FOLDER, args.resume, made_from)
     if args.resume and not keep.state.exists() and (args.output / "run.json").exists():
         text = f"there is nothing to resume: the run in {args.output} came to its end"
-        raise ConfigError(f"{text}; leave out --resume to run it anew.")
+        raise rom.ConfigError(f"{text}; leave out --resume to run it anew.")
     keep.check()
     return keep if ranks()[0] == 0 else None
 
 
 @contextmanager
 def _rescuing(
-    args: argparse.Namespace, keep: "Keeping | None", write: Callable[["Solution", "Report"], Path]
+    args: argparse.Namespace,
+    keep: "rom.mbs.Keeping | None",
+    write: "Callable[[rom.mbs.Solution, rom.Report], Path]",
 ) -> Iterator[None]:
     """Write the motion up to whatever ends it inside, and say how to go on."""
     try:
@@ -124,23 +117,22 @@ def _rescuing(
         if solution is None or keep is None:
             raise
         from rom.mbs.parts.foreign import KEPT_HINT
-        from rom.mbs.results.audit import audit
 
         if _aloud(args):
             words = "checking and writing the motion up to t = %.6g s; Ctrl-C leaves that out"
             log.info(words, solution.t[-1])
         try:
-            place = f"is in {write(solution, audit(solution))}"
-        except ResourceError as full:
+            place = f"is in {write(solution, rom.audit(solution))}"
+        except rom.ResourceError as full:
             place = f"could not be written: {full.message.rstrip('.')}"
-        if isinstance(error, RomError):
+        if isinstance(error, rom.RomError):
             own = error.told_hint.replace(KEPT_HINT, "").strip()
             hints = (own, f"The motion up to there {place}.", _to_go_on(args, keep))
             error.hint = " ".join(hint for hint in hints if hint)
         raise
 
 
-def _to_go_on(args: argparse.Namespace, keep: "Keeping | None") -> str:
+def _to_go_on(args: argparse.Namespace, keep: "rom.mbs.Keeping | None") -> str:
     """What to type after an end that was none of the motion's, if something of it is kept."""
     if keep is None or not keep.state.exists():
         return ""
@@ -148,11 +140,11 @@ def _to_go_on(args: argparse.Namespace, keep: "Keeping | None") -> str:
 
 
 @contextmanager
-def _finishing(args: argparse.Namespace, keep: "Keeping | None") -> Iterator[None]:
+def _finishing(args: argparse.Namespace, keep: "rom.mbs.Keeping | None") -> Iterator[None]:
     """Write results inside; what was kept of the motion goes with that, and stays if it fails."""
     try:
         yield
-    except ResourceError as error:
+    except rom.ResourceError as error:
         if hint := _to_go_on(args, keep):
             error.hint = f"The motion is kept in {args.output / PARTS_FOLDER}. Make room. {hint}"
         raise
@@ -161,7 +153,7 @@ def _finishing(args: argparse.Namespace, keep: "Keeping | None") -> Iterator[Non
 
 
 def _answer(
-    solution: "Solution", audit: "Report", paths: list[Path], write: Callable[[], None]
+    solution: "rom.mbs.Solution", audit: rom.Report, paths: list[Path], write: Callable[[], None]
 ) -> Answer:
     from rom.report.run import happened
 
@@ -179,7 +171,6 @@ def _answer(
 
 
 def _occurred(name: str, times: list[float]) -> str:
-    """A line about an event: how often it happened, and when."""
     if not times:
         return f"Event {name!r} did not happen.\n"
     first = ", ".join(f"{t:.9g}" for t in times[:MOST_TIMES])
@@ -189,16 +180,16 @@ def _occurred(name: str, times: list[float]) -> str:
 
 
 def _pendulum(args: argparse.Namespace) -> Answer:
-    from rom import __version__
     from rom.io.native import load
-    from rom.report.run import RECORD_FILE, SCENE_FILE, Record, file_digest
+    from rom.report.run import RECORD_FILE, SCENE_FILE, Record, file_digest, write_film
+    from rom.report.scene import motion_scene
+    from rom.report.scene_file import write_scene
 
-    needed = {"--hinge": args.hinge, "--t-end": args.t_end, "--dt": args.dt}
-    require(needed)
+    require({"--hinge": args.hinge, "--t-end": args.t_end, "--dt": args.dt})
     if args.dt > args.t_end:
-        raise ConfigError(f"--dt {args.dt:g} must be at most --t-end {args.t_end:g}.")
+        raise rom.ConfigError(f"--dt {args.dt:g} must be at most --t-end {args.t_end:g}.")
     if not any(args.axis):
-        raise ConfigError("--axis 0,0,0 has no direction; give one, such as --axis 0,0,1.")
+        raise rom.ConfigError("--axis 0,0,0 has no direction; give one, such as --axis 0,0,1.")
     folder = claim(args)
     body = load(args.file)
     body.marker(args.hinge)
@@ -211,43 +202,36 @@ def _pendulum(args: argparse.Namespace) -> Answer:
     hung = {"axis": args.axis, "gravity": args.gravity, "hinge": args.hinge}
     made_from = {f"--{name}": repr(value) for name, value in hung.items()}
     keep = _keeping(args, made_from | {str(args.file): file_digest(args.file)})
-    record = Record(body.name, typed_command(args), __version__)
+    record = Record(body.name, typed_command(args), rom.__version__)
 
-    def rescue(solution: "Solution", audit: "Report") -> Path:
+    def rescue(solution: "rom.mbs.Solution", audit: rom.Report) -> Path:
         _write_motion(path, tables, body, solution)
         record.write([path, *tables, args.output / RECORD_FILE], solution, audit)
         return path
 
     with _rescuing(args, keep, rescue):
-        from rom.mbs.integrate.simulation import simulate
-        from rom.mbs.results.audit import audit as audited
-
         mechanism = pendulum(body, args.hinge, axis=args.axis, gravity=args.gravity)
         steps = {"t_end": args.t_end, "dt": args.dt}
-        solution = simulate(mechanism, **steps, progress=_aloud(args), keep=keep)
-        audit = audited(solution)
+        solution = rom.simulate(mechanism, **steps, progress=_aloud(args), keep=keep)
+        audit = rom.audit(solution)
 
     def write() -> None:
-        from rom.report.scene import motion_scene
-        from rom.report.scene_file import write_scene
-
         with _finishing(args, keep):
             _write_motion(path, tables, body, solution)
             record.write(paths, solution, audit)
-            _write_films(films, solution)
+            for film in films:
+                write_film(solution, film)
             write_scene(motion_scene(solution, title=f"Motion of {body.name}"), paths[-2])
 
     return _answer(solution, audit, paths, write)
 
 
 def _write_motion(
-    path: Path, tables: list[Path], body: "FlexibleBody", solution: "Solution"
+    path: Path, tables: list[Path], body: "rom.FlexibleBody", solution: "rom.mbs.Solution"
 ) -> None:
     """Positions of the interfaces [m] and elastic coordinates, one line per time; and histories."""
-    import numpy as np
-
     from rom.io.files import write_whole
-    from rom.io.history import table, write_history
+    from rom.io.history import table
 
     places = {name: solution.position(body.name, name) for name in body.interface_names}
     names = ["t [s]", *(f"{name} {axis} [m]" for name in places for axis in "xyz")]
@@ -256,15 +240,4 @@ def _write_motion(
     content = table(names, values, "%.10g")
     write_whole(path, lambda file: file.write(content))
     for history in tables:
-        write_history(solution, history)
-
-
-def _write_films(films: list[Path], solution: "Solution") -> None:
-    from rom.view.scenes.animation_files import write_animation
-    from rom.view.scenes.film import animate
-
-    for film in films:
-        if film.suffix in (".gif", ".mp4"):
-            animate(solution.mechanism, solution, film)
-        else:
-            write_animation(solution, film)
+        rom.write_history(solution, history)

@@ -10,13 +10,18 @@ there are the single verbs: mesh, reduce, check, simulate, view, report.
 import argparse
 import logging
 import os
+import shlex
 import sys
 from dataclasses import dataclass, replace
+from functools import partial
 from math import pi, sqrt
 from pathlib import Path
-from shlex import quote
 from typing import TYPE_CHECKING
 
+import numpy as np
+import numpy.typing as npt
+
+import rom
 from rom.cli.answer import Answer, Data, failures, report_data
 from rom.cli.described import component, described
 from rom.cli.options import (
@@ -33,16 +38,11 @@ from rom.cli.options import (
     unique,
 )
 from rom.cli.output import add_force, check_encoder, checked, claim, typed_command, usual
-from rom.errors import ConfigError
+from rom.model import Array
 from rom.names import inside
+from rom.view.canvas.scales import round_length
 
 if TYPE_CHECKING:
-    import numpy.typing as npt
-
-    from rom.body.flexible import FlexibleBody
-    from rom.mbs.mechanism import Mechanism
-    from rom.mbs.results.solution import Solution
-    from rom.model import Array
     from rom.reduction.full_model import MassProperties
 
 log = logging.getLogger("rom")
@@ -95,7 +95,9 @@ def run(args: argparse.Namespace) -> Answer:
         import numba
 
         numba.config.DISABLE_JIT = True  # compiling takes longer than one swing in Python
-    mechanism, solution = _moved(body, hinge, swing)
+    hung = pendulum(body, hinge, axis=swing.axis, gravity=swing.gravity)
+    dt = swing.t_end / N_STEPS
+    solution = rom.simulate(hung, t_end=swing.t_end, dt=dt, rho_inf=0.5)
     magnify = args.magnify or magnification(body, solution.elastic(body.name))
     certificate = body.certificate
     data = {
@@ -109,10 +111,8 @@ def run(args: argparse.Namespace) -> Answer:
         "certificate": report_data(certificate),
     }
     failed = tuple(text for text in failures(certificate) if not text.startswith("free:"))
-    motion = mechanism, solution
-    text = _text(body, hinge, data)
-    command = typed_command(args)
-    return Answer(data, text, lambda: _write(files, body, motion, magnify, command), failed)
+    write = partial(_write, files, body, solution, magnify, typed_command(args))
+    return Answer(data, _text(body, hinge, data), write, failed)
 
 
 def _faces(args: argparse.Namespace) -> Answer:
@@ -124,9 +124,9 @@ def _faces(args: argparse.Namespace) -> Answer:
     found = mesh.run(argparse.Namespace(**asked))
     bores = [face["number"] for face in found.data.get("faces", ()) if face["kind"] == "cylinder"]
     hinge = str((*bores, 1)[0]) if is_step else next(iter(found.data["interfaces"]), "FACE")
-    words = "rom", "swing", str(args.file), "--hinge", hinge, "-o", str(args.output)
-    units = ("--units", args.units) if args.units != "SI" else ()
-    command = " ".join(map(quote, (*words, *units)))
+    words = ["rom", "swing", str(args.file), "--hinge", hinge, "-o", str(args.output)]
+    units = ["--units", args.units] if args.units != "SI" else []
+    command = shlex.join([*words, *units])
     text = f"{found.text}\n\n{drawn} shows them. Choose one for --hinge, for example\n  {command}"
     data = {"files": [str(drawn)], "faces": found.data.get("faces", []), "next": [command]}
     return replace(found, data=data, text=text)
@@ -156,28 +156,30 @@ def hinge_of(text: str) -> tuple[str, dict[str, str]]:
 
 def _reduced(
     args: argparse.Namespace, hinge: str, faces: dict[str, str]
-) -> "tuple[FlexibleBody, Swing]":
+) -> "tuple[rom.FlexibleBody, Swing]":
     """The body, and how it will swing, which is refused before the reduction."""
     part = component(args, *OWN_OPTIONS) if described(args) else None
     how = {} if part else reading(args)  # refused before dolfinx is loaded
     if part is None:
         how["faces"] = unique([*how["faces"].items(), *faces.items()], "--face")
-    from rom.body.damping import ModalDamping
     from rom.fe.elasticity import model
-    from rom.reduction.bases.method import CraigBampton
-    from rom.reduction.full_model import mass_properties
     from rom.reduction.interfaces.connection import found
-    from rom.workflow import reduce
 
     full = part.model() if part else model(args.file, material=material(args, USUAL), **how)
-    (at,), rigid = found(full, [hinge]), mass_properties(full)
+    (at,), rigid = found(full, [hinge]), rom.mass_properties(full)
     log.info("%s: %d dofs, %.4g kg", args.file, full.n_dofs, rigid.mass)
     swing = planned(rigid, at.origin, args.gravity, args.t_end, axis=at.axis)
     if part:
         return part.body(full), swing
-    how = {"method": CraigBampton(args.modes), "damping": ModalDamping(0.01, fixed=(hinge,))}
-    kinds = {hinge: "rbe2"}
-    return reduce(full, interfaces=kinds, reference=hinge, name=args.file.stem, **how), swing
+    body = rom.reduce(
+        full,
+        method=rom.CraigBampton(args.modes),
+        interfaces={hinge: "rbe2"},
+        reference=hinge,
+        damping=rom.ModalDamping(0.01, fixed=(hinge,)),
+        name=args.file.stem,
+    )
+    return body, swing
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,19 +193,17 @@ class Swing:
 
 def planned(
     rigid: "MassProperties",
-    point: "Array",
-    gravity: "npt.ArrayLike | None" = None,
+    point: Array,
+    gravity: npt.ArrayLike | None = None,
     t_end: float | None = None,
     *,
-    axis: "Array | None" = None,
+    axis: Array | None = None,
 ) -> Swing:
     """The swing of a body from rest, for one period of the rigid pendulum if nobody says how long.
 
     About the hinge at a point (3,) [m] and its unit axis (3,), or the one across gravity (3,)
     [m/s^2]; this is 9.81 along the coordinate axis most across the body if not given.
     """
-    import numpy as np
-
     arm = rigid.centre - point
     g = _across(arm, axis) if gravity is None else np.asarray(gravity, dtype=float)
     torque = np.cross(arm, g)  # per unit of mass
@@ -213,7 +213,7 @@ def planned(
     gyration = sqrt(0.5 * np.trace(rigid.inertia) / rigid.mass)
     if lever < LEAST_LEVER * gyration:
         turning = "" if axis is None else f", which turns about {np.round(axis, 6).tolist()}"
-        raise ConfigError(
+        raise rom.ConfigError(
             f"gravity {g.tolist()} passes {lever:.2g} m beside the hinge{turning}: nothing would "
             "swing.",
             hint="Choose another --hinge, or --gravity across the part and across its axis.",
@@ -224,10 +224,8 @@ def planned(
     return Swing(tuple(g.tolist()), tuple(n.tolist()), t_end or FAR_SWING * period)
 
 
-def _across(arm: "Array", axis: "Array | None") -> "Array":
+def _across(arm: Array, axis: Array | None) -> Array:
     """Gravity along the coordinate axis most across the arm, less what pulls along the hinge."""
-    import numpy as np
-
     if axis is None:
         return -9.81 * np.eye(3)[2 - int(np.argmin(np.abs(arm[::-1]).round(12)))]
     # of equals the last, and never the axis itself
@@ -239,8 +237,6 @@ def _across(arm: "Array", axis: "Array | None") -> "Array":
 
 def compiled_before() -> bool:
     """Whether the integrator is compiled; asked before it is imported, which decides."""
-    import rom.mbs
-
     if "rom.mbs.kernels.compiled" in sys.modules:
         return True
     places = [Path(rom.mbs.__path__[0]), Path.home() / ".cache" / "numba"]
@@ -250,79 +246,55 @@ def compiled_before() -> bool:
     )
 
 
-def _moved(body: "FlexibleBody", hinge: str, swing: Swing) -> "tuple[Mechanism, Solution]":
-    from rom.mbs.integrate.simulation import simulate
-
-    mechanism = pendulum(body, hinge, axis=swing.axis, gravity=swing.gravity)
-    return mechanism, simulate(mechanism, t_end=swing.t_end, dt=swing.t_end / N_STEPS, rho_inf=0.5)
-
-
 def pendulum(
-    body: "FlexibleBody", hinge: str, *, axis: "npt.ArrayLike", gravity: "npt.ArrayLike"
-) -> "Mechanism":
+    body: "rom.FlexibleBody", hinge: str, *, axis: npt.ArrayLike, gravity: npt.ArrayLike
+) -> "rom.Mechanism":
     """A body that hangs on one of its interfaces where it was drawn."""
-    from rom.mbs.mechanism import Mechanism
-
-    mechanism = Mechanism(gravity=gravity)
+    mechanism = rom.Mechanism(gravity=gravity)
     part = mechanism.add_flexible(body.name, body)
     place = mechanism.ground.marker(tuple(body.marker(hinge).point))
     mechanism.revolute("hinge", place, part.marker(hinge), axis=axis)
     return mechanism
 
 
-def magnification(body: "FlexibleBody", q: "Array") -> float:
-    """1, 2 or 5 times a power of ten, at least 1, with which the largest deformation is seen.
-
-    Of a body with its surface, over elastic coordinates q (n_t, r).
-    """
-    import numpy as np
-
+def magnification(body: "rom.FlexibleBody", q: Array) -> float:
+    """A round factor, at least 1, with which the largest deformation by q (n_t, r) is seen."""
     shape = body.surface.shape
     largest = max(float(np.linalg.norm((shape @ x).reshape(-1, 3), axis=1).max()) for x in q)
     wanted = DRAWN_DEFORMATION_RATIO * body.size / max(largest, 1e-12 * body.size)
-    power = 10.0 ** np.floor(np.log10(wanted))
-    return float(max(1.0, power * max(d for d in (1, 2, 5) if d * power <= wanted)))
+    return max(1.0, round_length(wanted))
 
 
 def _write(
     files: dict[str, Path],
-    body: "FlexibleBody",
-    motion: "tuple[Mechanism, Solution]",
+    body: "rom.FlexibleBody",
+    solution: "rom.mbs.Solution",
     magnify: float,
     command: str,
 ) -> None:
-    import numpy as np
-
-    from rom import __version__
-    from rom.io.history import write_history
-    from rom.io.native import save
-    from rom.mbs.results.audit import audit
-    from rom.report.html import write_report
     from rom.report.pages import of_body, of_run
     from rom.report.run import RECORD_FILE, SCENE_FILE, Record
     from rom.report.scene import motion_scene
     from rom.report.scene_file import write_scene
-    from rom.view import animate, instants
 
-    save(body, files[".rom.npz"])
-    write_history(motion[1], files[TABLE_FILE])
-    times = np.linspace(0, 0.5 * motion[1].t[-1], N_INSTANTS)
-    up = -np.asarray(motion[0].gravity, dtype=float)
-    instants(*motion, files[".png"], times=times, magnify=magnify, up=up)
+    rom.save(body, files[".rom.npz"])
+    rom.write_history(solution, files[TABLE_FILE])
+    mechanism, times = solution.mechanism, np.linspace(0, 0.5 * solution.t[-1], N_INSTANTS)
+    up = -np.asarray(mechanism.gravity, dtype=float)
+    rom.view.instants(mechanism, solution, files[".png"], times=times, magnify=magnify, up=up)
     for path in (files[kind] for kind in (".gif", ".mp4") if kind in files):
-        animate(*motion, path, magnify=magnify, up=up, frames=40)
-    scene = motion_scene(motion[1], title=f"{body.name} swings", magnify=magnify, up=up)
+        rom.view.animate(mechanism, solution, path, magnify=magnify, up=up, frames=40)
+    scene = motion_scene(solution, title=f"{body.name} swings", magnify=magnify, up=up)
     write_scene(scene, files[SCENE_FILE])
-    record = Record(body.name, command, __version__)
-    record.write(
-        [path for path in files.values() if path.suffix != ".html"], motion[1], audit(motion[1])
-    )
+    record = Record(body.name, command, rom.__version__)
+    written = [path for path in files.values() if path.suffix != ".html"]
+    record.write(written, solution, rom.audit(solution))
     title, sections = of_run(files[RECORD_FILE].parent)
     sections |= {f"The body: {name.lower()}": told for name, told in of_body(body, [])[1].items()}
-    write_report(sections, files[".html"], title=title)
+    rom.write_report(sections, files[".html"], title=title)
 
 
-def _text(body: "FlexibleBody", hinge: str, data: Data) -> str:
+def _text(body: "rom.FlexibleBody", hinge: str, data: Data) -> str:
     full = body.provenance["reduction"]["full dofs"]
     held = ", ".join(f"{f:.5g}" for f in data["frequencies"])
     axis, down = (",".join(f"{x:.4g}" for x in data[key]) for key in ("axis", "gravity"))

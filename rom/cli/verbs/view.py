@@ -6,16 +6,13 @@ A body moves in its modes, a component shows its mesh, a mechanism its bodies as
 import argparse
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+import rom
 from rom.cli.answer import Answer
 from rom.cli.described import component, described, mechanism
 from rom.cli.options import add_meshing, count, names, option
 from rom.cli.output import add_force, checked
 from rom.names import check_ending
-
-if TYPE_CHECKING:
-    from rom.view.scenes.window import Scene
 
 SUMMARY = "look at a body, a component or a mechanism"
 EXAMPLES = """\
@@ -40,7 +37,7 @@ def run(args: argparse.Namespace) -> Answer:
     """Load; the picture is drawn, or the window opened, at the end."""
     path = args.output or Path(f"{args.file.name.partition('.')[0]}.png")
     check_ending(path, "a picture", ".png")
-    from rom.view.scenes.window import has_display
+    from rom.view.scenes.window import has_display, show
 
     window = args.output is None and has_display()
     if not window:
@@ -48,8 +45,6 @@ def run(args: argparse.Namespace) -> Answer:
     what, draw, scenes = _subject(args)
     data = {"file": str(args.file), "output": None if window else str(path)}
     if window:
-        from rom.view.scenes.window import show
-
         return Answer(data, f"{what}, in a window", lambda: show(scenes()))
     why = "" if args.output else "; there is no display for a window"
     return Answer(data, f"{path}: {what}{why}", lambda: draw(path))
@@ -57,40 +52,35 @@ def run(args: argparse.Namespace) -> Answer:
 
 def _subject(
     args: argparse.Namespace,
-) -> tuple[str, Callable[[Path], object], "Callable[[], list[Scene]]"]:
+) -> "tuple[str, Callable[[Path], object], Callable[[], list[rom.view.Scene]]]":
     """What it is, how it is drawn, and how it is shown in a window."""
-    from rom.view.scenes.window import Scene, mode_scenes
-
     if not described(args):
         from rom.io.native import load
-        from rom.view.scenes.mode_shapes import mode_shapes
+        from rom.view.scenes.window import mode_scenes
 
-        body = load(args.file)
+        body, how = load(args.file), {"n": args.number, "fixed": args.fixed}
         body.check_support(args.fixed)
         return (
             f"modes of body {body.name}",
-            lambda path: mode_shapes(body, path, n=args.number, fixed=args.fixed),
-            lambda: mode_scenes(body, args.number, args.fixed),
+            lambda path: rom.view.mode_shapes(body, path, **how),
+            lambda: mode_scenes(body, **how),
         )
     from rom.config.document import read_document
+    from rom.report.run import look_of
+    from rom.view.scenes.film import start_scene
 
     if "bodies" in read_document(args.file).data:
-        from rom.view.scenes.film import start, start_actors
-
         file = mechanism(args)
-        made, look = file.mechanism(), file.values["output"]
-        how = {key: look[key] for key in ("view", "up") if key in look}
+        made, look = file.mechanism(), look_of(file)
         return (
             f"mechanism {file.name} as it is placed",
-            lambda path: start(made, path, title=f"Mechanism {file.name}", **how),
-            lambda: [Scene(file.name, start_actors(made))],
+            lambda path: rom.view.start(made, path, title=f"Mechanism {file.name}", **look),
+            lambda: [start_scene(made, file.name, **look)],
         )
-    from rom.view.scenes.meshes import mesh, mesh_actors
-
     part = component(args)
     model = part.model()
     return (
         f"mesh of component {part.name}",
-        lambda path: mesh(model, path, title=f"Component {part.name}"),
-        lambda: [Scene(part.name, mesh_actors(model))],
+        lambda path: rom.view.mesh(model, path, title=f"Component {part.name}"),
+        lambda: [rom.view.Scene(part.name, rom.view.meshed(model))],
     )

@@ -32,14 +32,10 @@ def main(folder: Path) -> None:
     plotter: Plotter = pyvista.Plotter(off_screen=True, window_size=[times * width, times * height])
     plotter.set_background("white")
     aim(plotter, scene, arrays)
-    moving = [k for k in range(len(scene["actors"])) if len(arrays[f"points {k}"]) > 1]
-    for k in range(len(scene["actors"])):
-        add(plotter, scene, arrays, k, 0)
     n = max(len(arrays[f"points {k}"]) for k in range(len(scene["actors"])))
     pictures = np.empty((n, height, width, 3), dtype=np.uint8)
     for frame in range(n):
-        for k in moving if frame else ():
-            add(plotter, scene, arrays, k, frame)
+        show(plotter, scene, arrays, frame)
         plotter.render()
         pictures[frame] = averaged(plotter.screenshot(return_img=True)[..., :3], times)
         with (folder / COUNT_FILE).open("ab") as count:  # a byte for each
@@ -73,6 +69,14 @@ def aim(plotter: Plotter, scene: Keys, arrays: Keys) -> None:
     plotter.enable_parallel_projection()
     plotter.camera.parallel_scale = 0.5 * scene["height"]
     plotter.camera.clipping_range = (reach - depth, reach + depth)
+
+
+def show(plotter: Plotter, scene: Keys, arrays: Keys, frame: int = 0) -> None:
+    """Add all actors, or replace those that move by what they are in a later frame."""
+    for k in range(len(scene["actors"])):
+        n = len(arrays[f"points {k}"])
+        if n > 1 or not frame:
+            add(plotter, scene, arrays, k, frame % n)
 
 
 def add(plotter: Plotter, scene: Keys, arrays: Keys, k: int, frame: int) -> None:

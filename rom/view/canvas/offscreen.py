@@ -35,11 +35,7 @@ def render(
     limits: tuple[float, float] = (0.0, 1.0),
     oversampling: int = OVERSAMPLING,
 ) -> Image:
-    """(f, height, width, 3) pixels of all frames of a scene; what has one frame stays.
-
-    The limits are values at the ends of the colour map. Pictures are drawn so many times larger as
-    ``oversampling`` says and averaged.
-    """
+    """(f, height, width, 3) pixels; limits are of the colours, and what has one frame stays."""
     require("pyvista")
     with scratch("view") as folder:
         write_scene(folder, actors, camera, limits, oversampling)

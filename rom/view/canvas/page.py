@@ -127,10 +127,7 @@ def legend_shape(names: Sequence[str], width: float) -> tuple[int, int]:
 
 
 def legend_above(axes: "Axes", width: float, height: int = 0) -> None:
-    """Names of the curves between axes that are so many pixels wide and their title.
-
-    The title is so high above the axes at least [pixel].
-    """
+    """Names of curves between axes so wide [pixel] and their title, at least so high above them."""
     handles, names = axes.get_legend_handles_labels()
     rows, columns = legend_shape(names, width)
     if rows:
@@ -143,19 +140,14 @@ def legend_above(axes: "Axes", width: float, height: int = 0) -> None:
         axes.set_title(title, loc="left", size=BODY_SIZE, pad=pad)
 
 
-def colour_bar(
-    figure: "Figure",
-    limits: tuple[float, float],
-    label: str,
-    rectangle: tuple[float, float, float, float],
-) -> None:
-    """Horizontal colour bar with its scale below; the rectangle is that of the bar."""
-    axes = area(figure, *rectangle)
+def colour_bar(figure: "Figure", limits: tuple[float, float], label: str, bar: Place) -> None:
+    """Horizontal colour bar with its scale below."""
+    axes = area(figure, *bar)
     shade = np.linspace(0, 1, 512)[None]
     axes.imshow(shade, aspect="auto", cmap=COLOUR_MAP, extent=(*limits, 0.0, 1.0))
     axes.set_yticks([])
     axes.tick_params(labelsize=SMALL_SIZE, pad=3, length=4)
-    axes.locator_params(axis="x", nbins=int(np.clip(rectangle[2] // TICK_WIDTH, 1, 6)))
+    axes.locator_params(axis="x", nbins=int(np.clip(bar[2] // TICK_WIDTH, 1, 6)))
     axes.set_title(label, size=SMALL_SIZE, pad=6)
 
 

@@ -99,9 +99,7 @@ def ring(
         raise ConfigError(f"a bore of {inner:g} m must be smaller than its ring of {outer:g} m.")
     x, y, _ = across(a, b)
     corners = ((a, inner), (a, outer), (b, outer), (b, inner))
-    points = np.vstack([np.asarray(end) + _circle(x, y, d / 2, sides) for end, d in corners])
-    i = np.arange(sides)
-    return points, np.vstack([_band(k * sides + i, (k + 1) % 4 * sides + i) for k in range(4)])
+    return _hollow([np.asarray(end) + _circle(x, y, d / 2, sides) for end, d in corners])
 
 
 @typed
@@ -152,6 +150,14 @@ def _closed(loops: Sequence[Array], start: Array, end: Array) -> Mesh:
     triangles += [np.column_stack([0 * i + n, j, i])]
     triangles += [np.column_stack([0 * i + n + 1, last + i, last + j])]
     return np.vstack([*loops, start, end]), np.vstack(triangles)
+
+
+def _hollow(loops: Sequence[Array]) -> Mesh:
+    """Loops of as many points, each joined to the next one, and the last to the first."""
+    sides, n = len(loops[0]), len(loops)
+    i = np.arange(sides)
+    bands = [_band(k * sides + i, (k + 1) % n * sides + i) for k in range(n)]
+    return np.vstack(loops), np.vstack(bands)
 
 
 @typed
@@ -242,22 +248,18 @@ def extruded(outline: npt.ArrayLike, width: float, *, bore: float = 0.0) -> Mesh
     foot = np.clip(-np.sum(P * d, axis=1) / np.sum(d * d, axis=1), 0.0, 1.0)
     nearest = float(np.linalg.norm(P + foot[:, None] * d, axis=1).min())
     between("bore", bore, 0, 2 * nearest, "[)")
-    if bore:  # as many points as a round hole needs
-        k = -(-BORE_SIDES // len(P))
-        share = np.arange(k)[:, None, None] / k
-        P = (P + share * d).swapaxes(0, 1).reshape(-1, 2)
-    radius = np.linalg.norm(P, axis=1)[:, None]
-    inside = bore / 2 * P / radius if bore else np.zeros((1, 2))
-    loops = [(inside, -1), (P, -1), (P, 1), (inside, 1)]
-    points = np.vstack([np.column_stack([x, np.full(len(x), s * width / 2)]) for x, s in loops])
-    n, m = len(P), len(inside)
-    first = np.cumsum([0, m, n, n])
-    outside, within = np.arange(n), np.arange(n) % m
-    rows = [at + part for at, part in zip(first, (within, outside, outside, within), strict=True)]
-    bands = [_band(rows[k], rows[(k + 1) % 4]) for k in range(4 if bore else 3)]
-    triangles = np.vstack(bands)
-    area = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)  # a fan has half of them
-    return points, triangles[area]
+
+    def raised(x: Array, side: int) -> Array:
+        return np.column_stack([x, np.full(len(x), side * width / 2)])
+
+    if not bore:
+        middle = np.array([0.0, 0.0, width / 2])
+        return _closed([raised(P, -1), raised(P, 1)], -middle, middle)
+    k = -(-BORE_SIDES // len(P))  # as many points as a round hole needs
+    share = np.arange(k)[:, None, None] / k
+    P = (P + share * d).swapaxes(0, 1).reshape(-1, 2)
+    inside = bore / 2 * P / np.linalg.norm(P, axis=1)[:, None]
+    return _hollow([raised(inside, -1), raised(P, -1), raised(P, 1), raised(inside, 1)])
 
 
 @typed
@@ -322,11 +324,11 @@ def involute(angle: Angle) -> Angle:
 
 @typed
 def joined(meshes: Sequence[Mesh]) -> Mesh:
-    """Several surfaces as one."""
+    """Several surfaces as one; all still, or in as many pictures."""
     points, triangles = zip(*meshes, strict=True)
-    first = np.cumsum([0, *map(len, points)])[:-1]
+    first = np.cumsum([0, *(np.shape(x)[-2] for x in points)])[:-1]
     moved = [several + n for several, n in zip(triangles, first, strict=True)]
-    return np.vstack(points), np.vstack(moved)
+    return np.concatenate(points, axis=-2), np.vstack(moved)
 
 
 def across(a: npt.ArrayLike, b: npt.ArrayLike) -> tuple[Array, Array, Array]:

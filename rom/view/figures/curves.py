@@ -84,8 +84,7 @@ def history(  # noqa: PLR0913  keywords of one picture
     numbers = numbered([list(curves) for _, curves in shown])
     for axes, (label, curves), looks in zip(areas, shown, numbers, strict=True):
         _histories(axes, times, curves, looks)
-        axes.set_ylabel(label)
-        axes.set_xlim(times[0], times[-1])
+        axes.set(ylabel=label, xlim=(times[0], times[-1]))
     _complete(areas, over or "time [s]", ax)
     return figure
 
@@ -128,7 +127,9 @@ def _histories(
             values = np.full_like(t, given)
             look |= LEVEL_STYLE
         elif given.dtype.kind == "U":
-            values = _rows(axes, given)
+            words = list(dict.fromkeys(given))
+            axes.set_yticks(range(len(words)), words)
+            values = [words.index(word) for word in given]
         x, y = (np.asarray(v, dtype=float) for v in (where, values))
         one_each(f"values of {name!r}", y.shape, "times", x.shape)
         lines.append((x, y))
@@ -145,18 +146,8 @@ def line_look(k: int) -> page.Style:
     return {"color": LINES[colour], "ls": DASHES[dash], "lw": 1.4, "zorder": 2.0 + 0.1 * dash}
 
 
-def _rows(axes: "Axes", words: Iterable[str]) -> Array:
-    """(n,) numbers of words in the order in which they come, named at the axis."""
-    names = list(dict.fromkeys(words))
-    axes.set_yticks(range(len(names)), names)
-    return np.array([names.index(word) for word in words], dtype=float)
-
-
 def _complete(areas: Sequence["Axes"], xlabel: str, ax: object) -> None:
-    """Names of axes; on a page one horizontal axis for all, and legends above, equal ones once.
-
-    Axes of a caller keep their own, with what is named.
-    """
+    """Names of axes; on a page, not in axes of a caller, one horizontal axis and legends above."""
     for axes in areas:
         axes.set_xlabel(xlabel)
     one_scale(areas)
@@ -306,8 +297,7 @@ def campbell(  # noqa: PLR0913  keywords of one picture
     for axes, (label, values) in zip(areas, panels.items(), strict=True):
         for k, name in enumerate(labels):
             axes.plot(turns, values[:, k], label=name, **line_look(k))
-        axes.set_ylabel(label)
-        axes.set_xlim(turns[0], turns[-1])
+        axes.set(ylabel=label, xlim=(turns[0], turns[-1]))
     _multiples(areas[0], diagram, turns, orders)
     for axes in areas:
         for name, speed in (marks or {}).items():
@@ -319,8 +309,7 @@ def campbell(  # noqa: PLR0913  keywords of one picture
 
 def _multiples(axes: "Axes", diagram: "Campbell", turns: Array, orders: Sequence[float]) -> None:
     """Rays of the orders, and rings where modes meet them."""
-    top = 1.06 * diagram.frequencies.max()
-    axes.set_ylim(0.0, top)
+    axes.set_ylim(0.0, 1.06 * diagram.frequencies.max())
     for k, order in enumerate(orders):
         axes.plot(turns, order * turns / 60, color=GREY, lw=0.9, label=None if k else RAYS_LABEL)
         at = 30 * np.array([speed for _, speed in diagram.crossings(order)]) / np.pi
@@ -380,7 +369,6 @@ def near_ticks(axis: "Axis") -> None:
 
 
 def _round(low: float, high: float) -> Array:
-    """1, 2 and 5 times powers of ten from low to high."""
     powers = 10.0 ** np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)) + 1)
     ticks = np.outer(powers, (1.0, 2.0, 5.0)).ravel()
     return ticks[(ticks >= low) & (ticks <= high)]
@@ -430,8 +418,7 @@ def finish(
     if not axes.images:
         axes.grid(color="#dfe3e8", lw=0.6)
     axes.set_axisbelow(True)
-    for side in ("top", "right"):
-        axes.spines[side].set_visible(False)
+    axes.spines[["top", "right"]].set_visible(False)
     if legend and axes.get_legend_handles_labels()[1]:
         axes.legend(fontsize=page.SMALL_SIZE, framealpha=0.9, edgecolor="none")
 
@@ -501,6 +488,5 @@ def _same_scale(axes: "Axes") -> None:
     shape = axes.get_window_extent().size
     limits = np.array([axes.get_xlim(), axes.get_ylim()])
     half = 0.5 * (np.ptp(limits, axis=1) / shape).max() * shape
-    x, y = limits.mean(axis=1)
-    axes.set_xlim(x - half[0], x + half[0])
-    axes.set_ylim(y - half[1], y + half[1])
+    x, y = limits.mean(axis=1, keepdims=True) + np.outer(half, (-1, 1))
+    axes.set(xlim=x, ylim=y)

@@ -115,8 +115,7 @@ def plane(
 
 def _draw(axes: "Axes", drawing: Drawing, numbers: dict[str, int]) -> None:
     axes.set_title(drawing.title, size=page.BODY_SIZE, loc="left")
-    axes.set_xlabel(drawing.x)
-    axes.set_ylabel(drawing.y)
+    axes.set(xlabel=drawing.x, ylabel=drawing.y)
     over = drawing.shade is not None
     if drawing.shade is not None:
         how: page.Style = {"origin": "lower", "extent": drawing.extent, "cmap": COLOUR_MAP}
@@ -140,8 +139,7 @@ def _draw(axes: "Axes", drawing: Drawing, numbers: dict[str, int]) -> None:
         look |= {"s": 48 if len(points) < MANY_POINTS else 14}
         axes.scatter(*points.T, marker=MARKERS[k % len(MARKERS)], label=label, **look)
     if drawing.extent is not None:
-        axes.set_xlim(drawing.extent[:2])
-        axes.set_ylim(drawing.extent[2:])
+        axes.set(xlim=drawing.extent[:2], ylim=drawing.extent[2:])
     if axes.get_legend_handles_labels()[0]:
         place = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.15), "borderaxespad": 0.0}
         axes.legend(fontsize=page.SMALL_SIZE, frameon=False, ncol=3, **place)
@@ -170,7 +168,6 @@ def _draw_levels(axes: "Axes", drawing: Drawing) -> None:
 
 
 def _fill(axes: "Axes", drawing: Drawing) -> None:
-    """Draw polygons, and their colour bar when they have values."""
     if not len(drawing.polygons):
         return
     from matplotlib.collections import PolyCollection

@@ -112,10 +112,7 @@ def panels(
 
 
 def _columns(row: Sequence[Panel | Scene]) -> list[tuple[float, float]]:
-    """Left end and width of each diagram [pixel]; names of bars stand left of them.
-
-    A scene is no wider than it fills, if there is something else.
-    """
+    """Left end and width of each diagram [pixel]; a scene beside others is as wide as it fills."""
     whole = PAGE_WIDTH - 2 * RIGHT_MARGIN
     widths = [min(_filled(x), whole / len(row)) if isinstance(x, Scene) else 0.0 for x in row]
     others = widths.count(0.0)
@@ -148,7 +145,6 @@ def _filled(scene: Scene) -> float:
 
 
 def _legend_height(row: Sequence[Panel | Scene]) -> int:
-    """Of the highest legend in a row [pixel]."""
     rows = [
         page.legend_shape(legend_names(panel), width)[0] if isinstance(panel, Panel) else 0
         for panel, (_, width) in zip(row, _columns(row), strict=True)
@@ -157,7 +153,6 @@ def _legend_height(row: Sequence[Panel | Scene]) -> int:
 
 
 def _draw(axes: "Axes", panel: Panel, numbers: Mapping[str, int]) -> None:
-    """A diagram with the looks of its named curves."""
     curves, points = _lines(panel)
     for name, line in curves.items():
         guide = name not in numbers and (len(curves) > 1 or bool(points))
@@ -174,8 +169,7 @@ def _draw(axes: "Axes", panel: Panel, numbers: Mapping[str, int]) -> None:
         look["bbox"] = {"fc": "white", "ec": "none", "alpha": 0.8, "pad": 0.8}
         axes.annotate(words, place, (6, 0), textcoords="offset points", **look)
     axes.set_title(panel.title, size=page.BODY_SIZE, loc="left")
-    axes.set_xlabel(panel.xlabel)
-    axes.set_ylabel(panel.ylabel)
+    axes.set(xlabel=panel.xlabel, ylabel=panel.ylabel)
     if panel.log:
         axes.loglog()
         near_ticks(axes.xaxis)
@@ -186,10 +180,14 @@ def _draw(axes: "Axes", panel: Panel, numbers: Mapping[str, int]) -> None:
 
 def _lines(panel: Panel) -> tuple[dict[str, Line], dict[str, Line]]:
     """Curves and points; along linear axes without round-off."""
-    lines = [_paired(*one) for some in (panel.curves, panel.points) for one in some.items()]
+    lines: list[Line] = []
+    for name, line in (*panel.curves.items(), *panel.points.items()):
+        x, y = (np.atleast_1d(np.asarray(values, dtype=float)) for values in line)
+        one_each(f"values of {name!r}", y.shape, "places", x.shape)
+        lines.append((x, y))
     if not panel.log and lines:
-        x, y = (without_round_off(list(values)) for values in zip(*lines, strict=True))
-        lines = list(zip(x, y, strict=True))
+        flat = (without_round_off(list(values)) for values in zip(*lines, strict=True))
+        lines = list(zip(*flat, strict=True))
     n = len(panel.curves)
     curves = dict(zip(panel.curves, lines[:n], strict=True))
     return curves, dict(zip(panel.points, lines[n:], strict=True))
@@ -208,9 +206,3 @@ def _draw_bars(axes: "Axes", panel: Panel) -> None:
     axes.use_sticky_edges = False
     axes.margins(x=0.06)
     axes.invert_yaxis()
-
-
-def _paired(name: str, line: Line) -> Line:
-    x, y = (np.atleast_1d(np.asarray(values, dtype=float)) for values in line)
-    one_each(f"values of {name!r}", y.shape, "places", x.shape)
-    return x, y

@@ -112,8 +112,7 @@ def deformed(  # noqa: PLR0913  keywords of one picture
     ticks = np.unique(np.concatenate([np.asarray(x) for x, _ in curves.values()]))
     axes.set_xticks(ticks, [f"{t:g}" for t in ticks])
     axes.minorticks_off()
-    axes.set_xlabel(xlabel)
-    axes.set_ylabel(ylabel)
+    axes.set(xlabel=xlabel, ylabel=ylabel)
     finish(axes, legend=True)
     return figure
 
@@ -183,8 +182,7 @@ def _shape(
     both = np.vstack([shape.points, shape.before]) if frame is None else frame
     low, high = both.min(axis=0), both.max(axis=0)
     margin = 0.04 * (high - low).max()
-    axes.set_xlim(low[0] - margin, high[0] + margin)
-    axes.set_ylim(low[1] - margin, high[1] + margin)
-    axes.set_aspect("equal")
+    across, upwards = np.transpose([low - margin, high + margin])
+    axes.set(xlim=across, ylim=upwards, aspect="equal")
     axes.set_axis_off()
     return drawn

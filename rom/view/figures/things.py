@@ -294,11 +294,10 @@ def _edges(name: str, thing: Thing, points: Array, cells: Index) -> list[Actor]:
     pairs = np.asarray(thing.edges).reshape(-1, 2)
     n = points.shape[1]
     _require(_between(pairs, n), name, f"edges must be pairs from 0 to {n - 1}")
-    return [Actor(points, pairs, colour="#6b7480", width=0.6)]
+    return [Actor(points, pairs, colour="#6b7480", width=0.6)] if len(pairs) else []
 
 
 def _require(holds: bool, name: str, what: str) -> None:
-    """Refuse a thing by its name."""
     if not holds:
         raise ConfigError(f"{name!r}: {what}.")
 
@@ -358,8 +357,7 @@ def corner(figure: "Figure", camera: Camera, left: float, right: float, top: flo
     bar = page.area(figure, x, top + 52, wide, 10)
     bar.set_axis_off()
     bar.plot([0, 0, 0, 1, 1, 1], [0, 1, 0.5, 0.5, 1, 0], color=TEXT_COLOUR, lw=1.4, clip_on=False)
-    bar.set_xlim(0, 1)
-    bar.set_ylim(0, 1)
+    bar.set(xlim=(0, 1), ylim=(0, 1))
     words, middle = written(length, "m"), right - BAR_SIZE / 2
     page.words(figure, words, middle, top + 24, size=page.SMALL_SIZE, ha="center")
 
@@ -373,8 +371,7 @@ def scale(camera: Camera) -> tuple[float, float]:
 def triad(axes: "Axes", camera: Camera) -> None:
     """The axes of the world as the camera sees them, the nearest one last."""
     axes.set_axis_off()
-    axes.set_xlim(-1.45, 1.45)
-    axes.set_ylim(-1.45, 1.45)
+    axes.set(xlim=(-1.45, 1.45), ylim=(-1.45, 1.45))
     seen = camera.axes
     for k in np.argsort(seen[:, 2]):
         x, y = seen[k, :2]

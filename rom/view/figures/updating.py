@@ -86,9 +86,7 @@ def _responses(
     )
     for (name, (own, values)), look in zip(curves.items(), looks, strict=False):
         axes.semilogy(own, np.abs(np.asarray(values)), label=name, **look)
-    axes.set_xlim(f[0], f[-1])
-    axes.set_xlabel("frequency [Hz]")
-    axes.set_ylabel(label)
+    axes.set(xlim=(f[0], f[-1]), xlabel="frequency [Hz]", ylabel=label)
     finish(axes, legend=True)
 
 

@@ -12,7 +12,7 @@ from rom.io.fields.gltf import MovingMesh, write_glb
 from rom.io.fields.vtkhdf import write_vtkhdf
 from rom.model import Array, Index
 from rom.view.canvas.offscreen import checked
-from rom.view.canvas.solids import Mesh
+from rom.view.canvas.solids import Mesh, joined
 from rom.view.scenes.film import shades_of, upright
 from rom.view.scenes.places import evenly, placed
 from rom.view.scenes.rigid import check_bodies, form_of
@@ -88,15 +88,12 @@ def _bodies(
 
 
 def _surfaces(bodies: list[MovingMesh], t: Array, path: Path, magnify: float) -> Path:
-    """All bodies as one surface in the world."""
-    points, triangles, moved, numbers, count = [], [], [], [], 0
+    surfaces, moved, numbers = [], [], []
     for number, body in enumerate(bodies):
         u = (body.q @ body.shapes.T).reshape(len(t), -1, 3)
         turned = (body.origin, np.array([rotation.matrix(p) for p in body.orientation]))
-        points.append(placed(body.points + u, turned))
+        surfaces.append((placed(body.points + u, turned), body.triangles))
         moved.append(placed(u, (0 * body.origin, turned[1])) / magnify)
-        triangles.append(body.triangles + count)
         numbers.append(np.full((len(t), len(body.points)), float(number)))
-        count += len(body.points)
     fields = {"displacement [m]": np.hstack(moved), "body": np.hstack(numbers)}
-    return write_vtkhdf(np.hstack(points), np.vstack(triangles), t, path, fields=fields)
+    return write_vtkhdf(*joined(surfaces), t, path, fields=fields)

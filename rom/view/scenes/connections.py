@@ -126,7 +126,6 @@ def _bearing(scenery: Scenery, joint: "Joint", axis: Array | None) -> tuple[Arra
 
 
 def _grounded(scenery: Scenery, joint: "Joint", axis: Array | None) -> Iterator[Actor]:
-    """Under a joint that holds a body to the ground."""
     first, second = joint.markers
     here, mover = (first, second) if first.body == GROUND else (second, first)
     point = scenery.places.point(here)[0]
@@ -174,7 +173,6 @@ def _on_plane(scenery: Scenery, joint: "Joint", normal: Array) -> Iterator[Actor
 
 
 def _both(places: Places, first: Marker, second: Marker) -> tuple[Array, Array]:
-    """(f, 3) where two markers are."""
     a, b = np.broadcast_arrays(places.point(first), places.point(second))
     return a, b
 

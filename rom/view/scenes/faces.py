@@ -13,7 +13,7 @@ from rom.arguments import typed
 from rom.errors import ConfigError
 from rom.model import Array, Index
 from rom.view.canvas import page
-from rom.view.canvas.offscreen import Image, render
+from rom.view.canvas.offscreen import render
 from rom.view.canvas.scene import TEXT_COLOUR, Actor, Camera, aimed, boundary
 
 if TYPE_CHECKING:
@@ -68,7 +68,14 @@ def faces(
     images = render(list(_actors(both, triangles)), camera)
     sides = _numbers(both, triangles, camera)
     placed = [_placed(_spots(side, list(triangles)), camera.size) for side in sides]
-    return _sheet(images, placed, _words(x[used], triangles, placed), title)
+    below = images.shape[1] + GAP
+    words = _words(x[used], triangles, placed)
+    figure = page.titled(PAGE_WIDTH, HEADER_HEIGHT + 2 * below, title, words)
+    for k, side in enumerate(placed):
+        axes = page.place(figure, images[k], 0, HEADER_HEIGHT + k * below).axes
+        for spot, at in side:
+            _write(axes, spot, at)
+    return figure
 
 
 def _turned(x: Array, camera: Camera) -> Array:
@@ -149,16 +156,6 @@ def _words(x: Array, triangles: Mapping[str, Index], placed: list[Labels]) -> st
     hidden = sorted(set(triangles) - labelled - {""}, key=lambda label: (len(label), label))
     words = f"The part, {size}, from one side and, below, from the opposite one."
     return words + (f" Not seen, or too small: {', '.join(hidden)}." if hidden else "")
-
-
-def _sheet(images: Image, placed: list[Labels], words: str, title: str) -> "Figure":
-    height = images.shape[1]
-    figure = page.titled(PAGE_WIDTH, HEADER_HEIGHT + 2 * (height + GAP), title, words)
-    for k, side in enumerate(placed):
-        axes = page.place(figure, images[k], 0, HEADER_HEIGHT + k * (height + GAP)).axes
-        for spot, at in side:
-            _write(axes, spot, at)
-    return figure
 
 
 def _write(axes: "Axes", spot: Spot, at: tuple[float, float]) -> None:

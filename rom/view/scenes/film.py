@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+import rom.mbs
 from rom.arguments import AnyMechanism, AnySolution, typed
 from rom.model import Array, Index
 from rom.view.canvas import page
 from rom.view.canvas.films import Film, wanted
 from rom.view.canvas.scales import clock_texts, prefixed
 from rom.view.canvas.scene import Actor, sharp_edges
-from rom.view.canvas.solids import Mesh
+from rom.view.canvas.solids import Mesh, joined
 from rom.view.canvas.symbols import polyline
 from rom.view.figures.things import (
     COLOURS,
@@ -22,7 +23,6 @@ from rom.view.figures.things import (
     STILL_WIDTH,
     Scene,
     Thing,
-    actors_of,
     as_thing,
     film,
     scene_page,
@@ -35,9 +35,6 @@ from rom.view.scenes.rigid import BOX_OPACITY, check_bodies, form_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from rom.mbs.mechanism import Mechanism
-    from rom.mbs.results.solution import Solution
 
 Direction = npt.ArrayLike | None
 N_INSTANTS = 4  # that are chosen where none are asked for
@@ -177,9 +174,9 @@ class Stage:
 
     actors: list[Actor]  # bodies, their edges and the symbols between them
     limits: tuple[float, float]  # deformation at the ends of the colours, in the unit
-    unit: str  # of the colours
+    unit: str  # of the colours, in which the largest deformation is between 1 and 1000
     name: str  # names of the flexible bodies
-    grey: str = "rigid bodies"  # what has no colours
+    grey: str  # what has no colours
 
     def scene(
         self, title: str, view: Direction, up: Direction, frames: slice = slice(None)
@@ -190,17 +187,24 @@ class Stage:
         return Scene(title, things, label, view, up, self.limits)
 
 
-def _stage(mechanism: "Mechanism", solution: "Solution", steps: Index, look: Look) -> Stage:
+def _stage(
+    mechanism: "rom.mbs.Mechanism", solution: "rom.mbs.Solution", steps: Index, look: Look
+) -> Stage:
     check_bodies(mechanism, "shapes", look.shapes)
     check_bodies(mechanism, "traces", look.traces)
     places = moving(mechanism, solution, steps, look.magnify)
     drawn = {name: _body(places, name, look) for name in mechanism.parts}
-    stage = _scaled({name: actors[:2] for name, actors in drawn.items()})
+    sizes = {name: v for name, (surface, *_) in drawn.items() if (v := surface.values) is not None}
+    largest = max((float(v.max()) for v in sizes.values()), default=0.0)
+    factor, unit = prefixed(largest, "m")
+    bodies = [actor for actors in drawn.values() for actor in actors[:2]]
+    scaled = [a if a.values is None else replace(a, values=a.values * factor) for a in bodies]
     more = [actor for actors in drawn.values() for actor in actors[2:]]
     more += symbols_of(places, look) if look.symbols else []
     more += [_trace(solution.position(name)) for name in look.traces]
-    grey = "rigid bodies and rods" if mechanism.nonlinear else stage.grey
-    return replace(stage, actors=[*stage.actors, *together(more)], grey=grey)
+    limits = 0.0, max(largest * factor, 1e-12)
+    grey = "rigid bodies and rods" if mechanism.nonlinear else "rigid bodies"
+    return Stage([*together(scaled), *together(more)], limits, unit, " and ".join(sizes), grey)
 
 
 def _body(places: Places, name: str, look: Look) -> list[Actor]:
@@ -236,32 +240,19 @@ def symbols_of(places: Places, look: Look) -> list[Actor]:
     return connections(places, drawn, surfaces, up)
 
 
-def upright(mechanism: "Mechanism", up: Direction = None) -> Direction:
+def upright(mechanism: "rom.mbs.Mechanism", up: Direction = None) -> Direction:
     """(3,) what is asked for, or against gravity; None without."""
     gravity = np.asarray(mechanism.gravity, dtype=float)
     return -gravity if up is None and gravity.any() else up
 
 
-def shades_of(mechanism: "Mechanism") -> dict[str, int]:
+def shades_of(mechanism: "rom.mbs.Mechanism") -> dict[str, int]:
     """Number of the grey of each body; all frames of a non-linear body have one."""
     whole = {part.name: name for name, all_ in mechanism.nonlinear.items() for part in all_.parts}
     owner = {name: whole.get(name, name) for name in mechanism.parts}
     rigid = dict.fromkeys(owner[n] for n, part in mechanism.parts.items() if part.flexible is None)
     number = {name: k % len(METAL_COLOURS) for k, name in enumerate(rigid)}
     return {name: number.get(thing, 0) for name, thing in owner.items()}
-
-
-def _scaled(bodies: dict[str, list[Actor]]) -> Stage:
-    """Colours in a unit in which the largest deformation is between 1 and 1000."""
-    actors = [actor for surface_and_edges in bodies.values() for actor in surface_and_edges]
-    sizes = {name: v for name, (surface, _) in bodies.items() if (v := surface.values) is not None}
-    if not sizes:
-        return Stage(together(actors), (0.0, 1.0), "m", "")
-    largest = max(float(v.max()) for v in sizes.values())
-    factor, unit = prefixed(largest, "m")
-    scaled = [a if a.values is None else replace(a, values=a.values * factor) for a in actors]
-    limits = 0.0, max(largest * factor, 1e-12)
-    return Stage(together(scaled), limits, unit, " and ".join(sizes))
 
 
 def together(actors: list[Actor]) -> list[Actor]:
@@ -273,9 +264,7 @@ def together(actors: list[Actor]) -> list[Actor]:
             look = actor.colour, actor.width, actor.opacity
             plain.setdefault((*look, actor.cells.shape[1], len(actor.points)), []).append(actor)
     for alike in plain.values():
-        first = np.cumsum([0, *(actor.points.shape[1] for actor in alike)])
-        cells = np.vstack([a.cells + n for a, n in zip(alike, first[:-1], strict=True)])
-        points = np.concatenate([actor.points for actor in alike], axis=1)
+        points, cells = joined([(actor.points, actor.cells) for actor in alike])
         kept.append(replace(alike[0], points=points, cells=cells))
     return kept
 
@@ -315,23 +304,25 @@ def start(
     Raises:
         ConfigError: if pictures cannot be made here.
     """
-    up = upright(mechanism, up)
-    things = _things(mechanism, symbols=symbols, up=up)
-    whole = seen(Scene(title, things, view=view, up=up), START_WIDTH)
+    scene = start_scene(mechanism, title, symbols=symbols, view=view, up=up)
     words = (
         f"{len(mechanism.parts)} bodies as they are placed, before joints pull them together. "
         "Flexible bodies are drawn by their surface, rigid ones as tubes from the mass centre to "
         "their markers, in a block of the same mass and inertia."
     )
-    return scene_page(whole, words)
+    return scene_page(seen(scene, START_WIDTH), words)
 
 
-def start_actors(mechanism: "Mechanism") -> list[Actor]:
-    """Bodies as they are placed, their sharp edges, and the symbols between them."""
-    return actors_of(Scene("", _things(mechanism, symbols=True, up=None)))
-
-
-def _things(mechanism: "Mechanism", *, symbols: bool, up: Direction) -> dict[str, Thing | Mesh]:
+def start_scene(
+    mechanism: "rom.mbs.Mechanism",
+    title: str,
+    *,
+    symbols: bool = True,
+    view: Direction = None,
+    up: Direction = None,
+) -> Scene:
+    """A mechanism as its bodies are placed; arguments as of `start`."""
+    up = upright(mechanism, up)
     places = at_start(mechanism)
     things: dict[str, Thing | Mesh] = {}
     for k, part in enumerate(mechanism.parts.values()):
@@ -343,4 +334,5 @@ def _things(mechanism: "Mechanism", *, symbols: bool, up: Direction) -> dict[str
             block = placed(form.block[0][None], pose), form.block[1]
             things[f"_block {k}"] = Thing(*block, colour, None, BOX_OPACITY, 1.0, NO_LINES)
     more = together(symbols_of(places, Look({}, up=up))) if symbols else []
-    return things | {f"_symbol {k}": as_thing(actor) for k, actor in enumerate(more)}
+    things |= {f"_symbol {k}": as_thing(actor) for k, actor in enumerate(more)}
+    return Scene(title, things, view=view, up=up)

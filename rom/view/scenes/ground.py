@@ -43,10 +43,7 @@ class Scenery:
         """(k, 3) places of other markers in all instants, from one in the frame of its body [m]."""
         r, A = self.places.point(marker), self.places.pose(marker.body)[1]
         apart = [self.places.point(other) - r for other in others[:MAX_TOUCHING]]
-        turned = (np.broadcast_to(A, (len(d), 3, 3)) for d in apart)
-        return np.vstack(
-            [np.einsum("fba,fb->fa", B, d) for B, d in zip(turned, apart, strict=True)]
-        )
+        return np.vstack([(d[:, None] @ A)[:, 0] for d in apart])
 
 
 def symbol_size(places: Places, drawn: dict[str, Array]) -> float:
@@ -96,10 +93,7 @@ def support(
 
 
 def wall(scenery: Scenery, point: Array, normal: Array, foot: float = 0.0) -> Iterator[Actor]:
-    """Hatched ground whose surface is at a point (3,) and faces along a normal (3,).
-
-    The foot is the width of what stands on it [m].
-    """
+    """Hatched ground at a point (3,) that faces along a normal (3,), about a foot so wide [m]."""
     axes = np.roll(upright(normal, scenery.up), -1, axis=1)  # the normal last
     size = max(5.0 * scenery.size, WALL_RATIO * foot)
     plate = symbols.ground_plate(size, size, 0.16 * size)
@@ -107,10 +101,7 @@ def wall(scenery: Scenery, point: Array, normal: Array, foot: float = 0.0) -> It
 
 
 def guide(scenery: Scenery, first: Marker, second: Marker, axis: Array) -> Iterator[Actor]:
-    """What a marker slides along: a line on a body that moves, a hatched rail on the ground.
-
-    The first marker carries the axis (3,), which is in the frame of its body; the second slides.
-    """
+    """A line, or on the ground a rail, of the second marker along an axis (3,) of the first one."""
     places, size = scenery.places, scenery.size
     way = scenery.seen_from(first, [second]) @ axis
     solid_ends = max(scenery.beyond(second, axis), scenery.beyond(second, -axis))

@@ -10,8 +10,8 @@ from rom.arguments import typed
 from rom.errors import ConfigError
 from rom.model import FEModel
 from rom.view.canvas import page
-from rom.view.canvas.scene import Actor, Camera, directed_edges
-from rom.view.figures.things import NO_LINES, Scene, Thing, actors_of, scene_page, seen
+from rom.view.canvas.scene import Camera, directed_edges
+from rom.view.figures.things import NO_LINES, Scene, Thing, scene_page, seen
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -98,8 +98,3 @@ def in_sight(model: FEModel, name: str, camera: Camera) -> bool:
         return True
     a, b, c = np.moveaxis(X[np.asarray(things[name].cells)], 1, 0)
     return bool((np.cross(b - a, c - a) @ camera.toward > 0).any())
-
-
-def mesh_actors(model: FEModel) -> list[Actor]:
-    """The outer surface, its elements, and its interfaces in colour."""
-    return actors_of(Scene("mesh", meshed(model)))

@@ -50,12 +50,8 @@ def mode_shapes(
         ConfigError: if the body has no surface, or pictures cannot be made here.
         InterfaceError: if an interface is unknown.
     """
-    surface_of(body)
     body = body.in_units("SI")
-    omega, V = body.modes(fixed=fixed)
-    elastic = np.flatnonzero(omega > 0)[:n]
-    names = [f"mode {i}: {omega[k] / (2 * np.pi):.5g} Hz" for i, k in enumerate(elastic, start=1)]
-    shapes = {name: displacement(body, V[:, k]) for name, k in zip(names, elastic, strict=True)}
+    shapes = elastic_shapes(body, n, fixed)
     support = f"{' and '.join(fixed)} held" if fixed else "free, its six rigid motions left out"
     words = (
         f"Lowest elastic modes of the reduced body {body.name} ({body.n_modes} elastic "
@@ -63,6 +59,16 @@ def mode_shapes(
     )
     title = f"Mode shapes of {body.name}"
     return modes_page(body.surface, shapes, title, words, what="body", view=view, up=up)
+
+
+def elastic_shapes(body: AnyBody, n: int, fixed: tuple[str, ...]) -> dict[str, Array]:
+    """{number and frequency: (s, 3) displacement of the surface} of the lowest elastic modes."""
+    surface_of(body)
+    omega, V = body.modes(fixed=fixed)
+    return {
+        f"mode {i}: {omega[k] / (2 * np.pi):.5g} Hz": displacement(body, V[:, k])
+        for i, k in enumerate(np.flatnonzero(omega > 0)[:n], start=1)
+    }
 
 
 def displacement(body: AnyBody, motion: Array) -> Array:
@@ -75,10 +81,9 @@ def displacement(body: AnyBody, motion: Array) -> Array:
 def modes_page(
     surface: Any, shapes: Mapping[str, Array], title: str, words: str, *, what: str, **look: Any
 ) -> "Figure":
-    """A page of modes, {name: (s, 3) displacements of a surface}, all seen from the same place.
+    """A page of modes, {name: (s, 3) displacements of a surface}, seen as a `Scene` is.
 
-    To the caption the meaning of displacements and grey lines is added; ``what`` is that whose size
-    displacements are compared with, the look from where it is seen, as a `Scene` wants it.
+    Displacements are compared with the size of ``what``, which the caption adds to the words.
     """
     X, size = surface.points, np.ptp(surface.points, axis=0).max()
     lengths = np.array([np.linalg.norm(u, axis=1) for u in shapes.values()])

@@ -1,18 +1,14 @@
 """Where bodies and markers are in the instants that are drawn."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+import rom.mbs
 from rom.arguments import AnyMechanism
 from rom.mbs.parts.bodies import GROUND, Marker
 from rom.model import Array, Index
 from rom.rotation import matrix
-
-if TYPE_CHECKING:
-    from rom.mbs.mechanism import Mechanism
-    from rom.mbs.results.solution import Solution
 
 Steps = Index | list[int]  # numbers of instants
 Pose = tuple[Array, Array]  # (f, 3) origins and (f, 3, 3) axes, as columns in the world
@@ -53,14 +49,16 @@ class Places:
         return self.pose(body)[1] @ vector
 
 
-def at_start(mechanism: "Mechanism") -> Places:
+def at_start(mechanism: "rom.mbs.Mechanism") -> Places:
     """Bodies where they were added."""
     parts = mechanism.parts.items()
     poses = {name: (part.at[None], matrix(part.p)[None]) for name, part in parts}
     return Places(mechanism, poses, {name: part.q[None] for name, part in parts})
 
 
-def moving(mechanism: "Mechanism", solution: "Solution", steps: Steps, magnify: float) -> Places:
+def moving(
+    mechanism: "rom.mbs.Mechanism", solution: "rom.mbs.Solution", steps: Steps, magnify: float
+) -> Places:
     """Bodies at some of the instants of a motion."""
     poses, elastic = {}, {}
     for name in mechanism.parts:
@@ -87,11 +85,8 @@ def placed(X: Array, pose: Pose) -> Array:
     return r[:, None] + np.einsum("fab,fnb->fna", A, np.broadcast_to(X, (len(r), *X.shape[1:])))
 
 
-def different(solution: "Solution", n: int) -> Array:
-    """(n,) instants [s] at which a mechanism differs most: each the farthest from those before.
-
-    The first one is the start. Fewer where the motion has no more places.
-    """
+def different(solution: "rom.mbs.Solution", n: int) -> Array:
+    """(n,) instants [s] that differ most, the start and each the farthest from those before."""
     steps = np.unique(evenly(solution.t.size, MAX_CANDIDATES))
     places, parts = moving(solution.mechanism, solution, steps, 1.0), solution.mechanism.parts
     points = [r for r, _ in places.poses.values()]

@@ -5,20 +5,17 @@ Those of a rod are boxes.
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+import rom.mbs
 from rom.arguments import typed
 from rom.errors import ConfigError
 from rom.model import Array, Index
 from rom.names import named, offered
 from rom.view.canvas.solids import Mesh, box, cylinder, ellipsoid, joined
-
-if TYPE_CHECKING:
-    from rom.mbs.mechanism import Mechanism
-    from rom.mbs.parts.bodies import Part
 
 TUBE_RATIO = 0.07  # diameter of a tube, of the reach of the body
 BOX_OPACITY, BLOCK_OPACITY = 0.22, 0.5  # of a box around tubes, and of one that is alone
@@ -36,11 +33,11 @@ class Form:
     opacity: float = 1.0  # 0 to 1
 
 
-def form_of(mechanism: "Mechanism", name: str, shapes: Mapping[str, Mesh]) -> Form:
+def form_of(mechanism: "rom.mbs.Mechanism", name: str, shapes: Mapping[str, Mesh]) -> Form:
     """The surface of a flexible body; of others a given shape, or else tubes to their markers."""
     part = mechanism.parts[name]
     surface = getattr(part.flexible, "surface", None)
-    if surface is not None:
+    if surface is not None and len(surface.triangles):
         return Form(surface.points, surface.triangles, surface)
     if name in shapes:
         points, triangles = shapes[name]
@@ -49,14 +46,14 @@ def form_of(mechanism: "Mechanism", name: str, shapes: Mapping[str, Mesh]) -> Fo
     return Form(*bars(part, ends), None, shadow(part, ends), 1.0 if ends else BLOCK_OPACITY)
 
 
-def check_bodies(mechanism: "Mechanism", what: str, names: Collection[str]) -> None:
+def check_bodies(mechanism: "rom.mbs.Mechanism", what: str, names: Collection[str]) -> None:
     """Refuse names of bodies that a mechanism does not have."""
     if unknown := set(names) - set(mechanism.parts):
         there = offered(mechanism.parts)
         raise ConfigError(f"{what}: no body {named(sorted(unknown))}; there are {there}.")
 
 
-def ends_of(mechanism: "Mechanism", name: str) -> list[Array]:
+def ends_of(mechanism: "rom.mbs.Mechanism", name: str) -> list[Array]:
     """(k) points (3,) of a rigid body beside its mass centre, named or held by something [m]."""
     part = mechanism.parts[name]
     held = [marker for joint in mechanism.joints.values() for marker in joint.markers]
@@ -66,7 +63,7 @@ def ends_of(mechanism: "Mechanism", name: str) -> list[Array]:
     return [np.array(p) for p in sorted(far)]
 
 
-def bars(part: "Part", ends: list[Array]) -> Mesh:
+def bars(part: "rom.mbs.Part", ends: list[Array]) -> Mesh:
     """Tubes from the mass centre to some points; without any a box of the inertia of the body."""
     if not ends:
         return inertia_box(part)
@@ -76,14 +73,14 @@ def bars(part: "Part", ends: list[Array]) -> Mesh:
     return joined([*tubes, *knots])
 
 
-def shadow(part: "Part", ends: list[Array]) -> Mesh | None:
+def shadow(part: "rom.mbs.Part", ends: list[Array]) -> Mesh | None:
     """What is drawn half-transparent beside the bars: the box of the inertia, unless it is huge."""
     reach = max((float(np.linalg.norm(p)) for p in ends), default=0.0)
     block = inertia_box(part)
     return block if reach and np.ptp(block[0], axis=0).max() <= MAX_BOX_RATIO * reach else None
 
 
-def inertia_box(part: "Part") -> Mesh:
+def inertia_box(part: "rom.mbs.Part") -> Mesh:
     """The even block with the mass and the inertia of a body, in its frame."""
     size, axes = block_of(np.asarray(part.second, dtype=float), part.mass)
     points, triangles = box(size)

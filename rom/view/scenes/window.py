@@ -8,7 +8,6 @@ import json
 import os
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,25 +17,19 @@ from rom.arguments import AnyBody, AnyMechanism, typed, whole
 from rom.errors import ConfigError
 from rom.model import FEModel
 from rom.process.child import scratch
-from rom.view.canvas import offscreen
-from rom.view.canvas.draw import Plotter, add, aim, read
+from rom.view.canvas import draw, offscreen
+from rom.view.canvas.draw import Plotter, aim, read
 from rom.view.canvas.offscreen import require, write_scene
-from rom.view.canvas.scene import Actor, aimed, sharp_edges
-from rom.view.scenes.film import start_actors
-from rom.view.scenes.meshes import mesh_actors, surface_of
-from rom.view.scenes.mode_shapes import AMPLITUDE_RATIO, displacement
+from rom.view.canvas.scene import UNDEFORMED_COLOUR, sharp_edges
+from rom.view.figures.things import NO_LINES, Scene, Thing, seen
+from rom.view.scenes.film import start_scene
+from rom.view.scenes.meshes import meshed, surface_of
+from rom.view.scenes.mode_shapes import AMPLITUDE_RATIO, elastic_shapes
 
 WINDOW_WIDTH = 1200  # [pixel]
-N_FRAMES, FRAME_PAUSE = 24, 40  # of one period of a mode; between frames [ms]
+PHASES = tuple(2 * np.pi * np.arange(24) / 24)  # of the frames of a mode [rad]
+FRAME_PAUSE = 40  # between frames [ms]
 KEYS_HELP = "arrow keys: next and last; mouse: turn; q: close"
-
-
-@dataclass(frozen=True, slots=True)
-class Scene:
-    """What is seen at one time: a title, and actors that stay or move."""
-
-    title: str
-    actors: list[Actor]
 
 
 def has_display() -> bool:
@@ -46,22 +39,21 @@ def has_display() -> bool:
     return True
 
 
-def mode_scenes(body: AnyBody, n: int, fixed: tuple[str, ...] = ()) -> list[Scene]:
+def mode_scenes(
+    body: AnyBody, n: int, fixed: tuple[str, ...] = (), phases: Sequence[float] = PHASES
+) -> list[Scene]:
     """The lowest elastic modes of a body, moving."""
-    surface_of(body)
     body = body.in_units("SI")
-    omega, V = body.modes(fixed=fixed)
-    X, size = body.surface.points, np.ptp(body.surface.points, axis=0).max()
-    sine = np.sin(2 * np.pi * np.arange(N_FRAMES) / N_FRAMES)[:, None, None]
+    surface = surface_of(body)
+    X, size = surface.points, np.ptp(surface.points, axis=0).max()
+    still = Thing(X, sharp_edges(X, surface.triangles), UNDEFORMED_COLOUR, width=1.0)
     scenes = []
-    for i, k in enumerate(np.flatnonzero(omega > 0)[:n]):
-        u = displacement(body, V[:, k])
+    for name, u in elastic_shapes(body, n, fixed).items():
         length = np.linalg.norm(u, axis=1)
-        moved = X + AMPLITUDE_RATIO * size / length.max() * sine * u
-        edges = sharp_edges(X, body.surface.triangles)
-        surface = Actor(moved, body.surface.triangles, (length / length.max())[None])
-        title = f"{body.name}, mode {i + 1}: {omega[k] / (2 * np.pi):.5g} Hz"
-        scenes.append(Scene(title, [surface, Actor(X[None], edges, colour="#7c828c")]))
+        moved = X + AMPLITUDE_RATIO * size / length.max() * np.multiply.outer(np.sin(phases), u)
+        moving = Thing(moved, surface.triangles, values=length / length.max(), edges=NO_LINES)
+        things = {"moving": moving, "_still": still}
+        scenes.append(Scene(f"{body.name}, {name}", things, limits=(0.0, 1.0)))
     return scenes
 
 
@@ -89,29 +81,26 @@ def plotter(thing: AnyBody | FEModel | AnyMechanism, *, n: int = 1) -> Any:
     require("pyvista")
     import pyvista
 
-    actors = _actors(thing, n)
+    shown = _shown(thing, n)
     made: Plotter = pyvista.Plotter(window_size=[WINDOW_WIDTH, 3 * WINDOW_WIDTH // 4])
     made.set_background("white")
     with scratch("view") as folder:
-        _left(folder, actors)
+        _leave(folder, shown)
         scene, arrays = read(folder)
-    for k in range(len(actors)):
-        add(made, scene, arrays, k, 0)
+    draw.show(made, scene, arrays)
     aim(made, scene, arrays)
     made.add_axes()
     return made
 
 
-def _actors(thing: AnyBody | FEModel | AnyMechanism, n: int) -> list[Actor]:
+def _shown(thing: AnyBody | FEModel | AnyMechanism, n: int) -> Scene:
     if isinstance(thing, FEModel):
-        return mesh_actors(thing)
+        return Scene("mesh", meshed(thing))
     if hasattr(thing, "parts"):
-        return start_actors(thing)
-    scenes = mode_scenes(thing, n)
+        return start_scene(thing, "start")
+    scenes = mode_scenes(thing, n, phases=(np.pi / 2,))
     whole("n", n, 1, len(scenes), reason=f"the elastic modes of body {thing.name!r}")
-    surface, still = scenes[n - 1].actors
-    largest = np.abs(surface.points - surface.points[0]).max(axis=(1, 2)).argmax()
-    return [replace(surface, points=surface.points[largest][None]), still]
+    return scenes[n - 1]
 
 
 def show(scenes: Sequence[Scene]) -> None:
@@ -126,14 +115,13 @@ def leave(scenes: Sequence[Scene], folder: Path) -> None:
     """Write the scenes where the process of the window finds them."""
     for k, scene in enumerate(scenes):
         (folder / str(k)).mkdir()
-        _left(folder / str(k), scene.actors)
+        _leave(folder / str(k), scene)
     (folder / "titles.json").write_text(json.dumps([scene.title for scene in scenes]))
 
 
-def _left(folder: Path, actors: Sequence[Actor]) -> None:
-    """Write what is seen from where into a folder."""
-    seen = np.concatenate([actor.points.reshape(-1, 3) for actor in actors])
-    write_scene(folder, actors, aimed(seen, WINDOW_WIDTH), (0.0, 1.0))
+def _leave(folder: Path, scene: Scene) -> None:
+    view = seen(scene, WINDOW_WIDTH)
+    write_scene(folder, view.actors, view.camera, view.limits)
 
 
 class Window:
@@ -155,8 +143,7 @@ class Window:
         self.at, self.frame = (self.at + step) % len(self.titles), 0
         self.scene, self.arrays = read(self.folder / str(self.at))
         self.plotter.clear_actors()
-        for k in range(len(self.scene["actors"])):
-            add(self.plotter, self.scene, self.arrays, k, 0)
+        draw.show(self.plotter, self.scene, self.arrays)
         text = self.titles[self.at] + f"\n{KEYS_HELP}" * (len(self.titles) > 1)
         self.plotter.add_text(text, font_size=10, color="#20242a", name="title", render=False)
         if not step:
@@ -165,10 +152,7 @@ class Window:
     def tick(self, *_: object) -> None:
         """Show the next frame of what moves."""
         self.frame += 1
-        for k in range(len(self.scene["actors"])):
-            n = len(self.arrays[f"points {k}"])
-            if n > 1:
-                add(self.plotter, self.scene, self.arrays, k, self.frame % n)
+        draw.show(self.plotter, self.scene, self.arrays, self.frame)
         self.plotter.render()
 
     def open(self) -> None:
