@@ -1,5 +1,6 @@
 """Files are written whole or not at all, and looked at before they are read."""
 
+import math
 import os
 import secrets
 import shutil
@@ -103,6 +104,16 @@ def need(holds: object, otherwise: str) -> None:
     """Raise a ValueError, for `damaged`, in these words unless something holds."""
     if not holds:
         raise ValueError(otherwise)
+
+
+def number(text: str) -> float:
+    """A finite number, its exponent with E or D; else a ValueError, for `damaged`."""
+    try:
+        value = float(text.upper().replace("D", "E"))
+    except ValueError:
+        value = math.nan
+    need(math.isfinite(value), f"{text.strip()[:40]!r} is no finite number")
+    return value
 
 
 def check_writable(path: str | Path) -> Path:

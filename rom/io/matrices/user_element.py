@@ -22,7 +22,7 @@ from scipy.sparse import csr_matrix, tril
 
 from rom.decks.lines import whole
 from rom.errors import ConfigError, UnsafeFileError, in_file
-from rom.io.files import lines_of, need, write_lines
+from rom.io.files import lines_of, need, number, write_lines
 from rom.io.matrices.dmig import Dofs
 from rom.model import Array
 from rom.names import ORIGIN_MARK
@@ -108,7 +108,7 @@ def _keyword(element: _Element, line: str) -> tuple[str, str]:
 
 def _data(element: _Element, keyword: str, kind: str, words: list[str]) -> None:
     if keyword == "*MATRIX":
-        element.values[kind] += [float(word.replace("D", "E").replace("d", "e")) for word in words]
+        element.values[kind] += map(number, words)
     elif keyword in ("*USER ELEMENT", NODE_LIST):
         numbers = [whole(word) for word in words]
         place, components = (numbers[0], numbers[1:]) if element.lists else (1, numbers)
@@ -128,9 +128,8 @@ def _matrices(element: _Element) -> dict[str, tuple[csr_matrix, Dofs]]:
     found = {}
     for kind, values in element.values.items():
         wanted = n * (n + 1) // 2
-        what = f"{len(values)} numbers; the upper triangle of {n} rows has {wanted}, all finite"
-        fits = len(values) == wanted and np.isfinite(values).all()
-        need(fits, f"the matrix {kind} has {what}")
+        what = f"{len(values)} numbers; the upper triangle of {n} rows has {wanted}"
+        need(len(values) == wanted, f"the matrix {kind} has {what}")
         A = np.zeros((n, n))
         A[np.tril_indices(n)] = values  # rows of this triangle are columns of the other
         found[kind] = csr_matrix(A), dofs
