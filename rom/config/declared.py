@@ -15,13 +15,13 @@ from typing import Any, Literal
 
 from rom.arguments import Quantity, Whole
 from rom.arguments.kinds import parameters_of
-from rom.config.keys import FilePath, Flag, Key, Kind, Named, Table, Text, Words
+from rom.config.keys import Flag, Key, Kind, Named, Table, Text, file_path, words
 from rom.fields import follow
 
 SHAPE_OR_UNIT = re.compile(r"^\([\dnr, ]+\)( or \([\d, ]+\))? | ?\[(?!degrees)[^]]*\]")
 NO_VALUE = re.compile("; None( for|:)")
 PLAIN_KINDS: dict[object, Kind] = {float: Quantity(), int: Whole(), bool: Flag(), str: Text()}
-PLAIN_KINDS[Path] = FilePath()
+PLAIN_KINDS[Path] = file_path
 
 
 class Declared(Table):
@@ -110,7 +110,7 @@ def _kind(annotation: object) -> Kind | None:
     if origin in (dict, Mapping) and (kind := _kind(inner[1])) is not None:
         return Named(kind, "values")
     if origin in (tuple, list, Sequence) and inner[0] is str:
-        return Words()
+        return words
     if origin is tuple and isinstance(kind := _kind(inner[0]), Quantity):
         return replace(kind, shapes=((None if inner[-1] is ... else len(inner),),))
     if is_dataclass(annotation):

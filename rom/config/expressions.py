@@ -13,8 +13,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple, NoReturn
 
+from rom.arguments import Quantity
 from rom.config.document import Values
-from rom.config.keys import Key, Named, Place, Table, Text, nearest
+from rom.config.keys import Key, Named, Place, Table, Text, nearest, read_value, written
 from rom.mbs.elements.formulas.codes import (
     ADD,
     DIV,
@@ -189,21 +190,13 @@ class Reader:
             yield code, 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class AnyQuantity:
-    """A number with any unit."""
-
-    summary: str = "number, or number with any unit"
-
-    def read(self, value: object, place: Place) -> float:
-        """The number in SI."""
-        if isinstance(value, str) and (number := QUANTITY_NUMBER.match(value.strip())):
-            symbol = value.strip()[number.end() :].strip()
-            with place.told():
-                return in_si(value, symbol or "1")
-        if isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e300:
-            return float(value)
-        place.refuse(value, f" must be a {self.summary}")
+@written("number, or number with any unit")
+def any_quantity(value: object, place: Place) -> Any:
+    """The number in SI."""
+    unit = "1"
+    if isinstance(value, str) and (number := QUANTITY_NUMBER.match(value.strip())):
+        unit = value.strip()[number.end() :].strip() or "1"
+    return read_value(Quantity(unit), value, place)
 
 
 @dataclass(frozen=True, slots=True)
@@ -256,7 +249,7 @@ def formula_keys(unit: str, variables: tuple[str, ...]) -> tuple[Key, ...]:
     return (
         Key("expression", Text(), f"A formula of {of}, in SI.", ...),
         Key("unit", UnitName(unit), "Unit of its values; the SI unit if missing."),
-        Key("constants", Named(AnyQuantity(), "constants"), "Numbers with names, in it by SI."),
+        Key("constants", Named(any_quantity, "constants"), "Numbers with names, in it by SI."),
     )
 
 
