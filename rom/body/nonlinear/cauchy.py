@@ -1,6 +1,6 @@
 """Stress of a body at large deflection, by the gradient of its displacement."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -70,15 +70,6 @@ class CauchyRecovery:
     def von_mises(self, q: Array, accelerations: Array | None = None) -> Array:
         """(p,) equivalent stress [Pa]; see `field`."""
         return von_mises(self.field(q, accelerations))
-
-    def in_units(self, length: float, pressure: float, coordinate: float) -> "CauchyRecovery":
-        """In other units, whose factors are given; a coordinate is multiplied by its own."""
-        return replace(
-            self,
-            points=self.points * length,
-            gradient=self.gradient / coordinate,
-            stiffness=self.stiffness * pressure,
-        )
 
     def fits(self, r: int) -> bool:
         """Whether the arrays belong together, to r coordinates and to points that exist."""

@@ -10,7 +10,6 @@ Source:
 
 import re
 import struct
-from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import chain
@@ -123,11 +122,11 @@ def read_op4(path: str | Path) -> Matrices:
 
 
 def _by_name(where: str, all_found: list[_Strings]) -> Matrices:
-    times, seen = Counter(found.name for found in all_found), Counter[str]()
-    keys = []
-    for name in (found.name for found in all_found):
-        seen[name] += 1
-        keys.append(name if times[name] == 1 else f"{name}#{seen[name]}")
+    names = [found.name for found in all_found]
+    keys = [
+        name if names.count(name) == 1 else f"{name}#{names[:k].count(name) + 1}"
+        for k, name in enumerate(names)
+    ]
     matrices = {key: found.matrix() for key, found in zip(keys, all_found, strict=True)}
     return Matrices(where, matrices, dict(zip(keys, (f.place for f in all_found), strict=True)))
 
