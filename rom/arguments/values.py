@@ -91,10 +91,7 @@ def matrix(name: str, value: Any, shape: tuple[int | None, int | None] = (None, 
 def symmetric(
     name: str, A: Any, rtol: float, *, where: str = "", error: type[RomError] = QualityGateError
 ) -> None:
-    """Refuse a matrix (n, n), sparse or dense, of a file, that belongs to no energy.
-
-    Round-off is a difference of its halves up to rtol [1] of its largest entry.
-    """
+    """Refuse a matrix (n, n) whose halves differ by more than rtol [1] of its largest entry."""
     gap, size = (abs(X).max() if A.shape[0] else 0.0 for X in (A - A.T, A))
     if gap > rtol * size:
         raise error(

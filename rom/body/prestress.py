@@ -87,8 +87,7 @@ class UnitLoads:
     ) -> list[tuple[str, str, float]]:
         """Pairs of interfaces, and the force [N] that buckles the body pressed between them.
 
-        As on hinges: forces keep to the line of the pair, which holds nothing else of it. Of
-        more than `MAX_PAIRS` pairs of rigid or averaged interfaces none is looked at. The shapes E
+        As on hinges, for up to `MAX_PAIRS` pairs of rigid or averaged interfaces. The shapes E
         (n_local, r) are mass-normalised in their mean-axis frame, omega (r,) [rad/s] are theirs.
         """
         pairs = list(combinations([m for m in markers.values() if m.patch is None], 2))
@@ -161,8 +160,7 @@ class UnitLoads:
     ) -> Array:
         """What the forces on interfaces add when their surfaces turn as a whole.
 
-        An interface that turns by theta carries its points along on circles, by
-        theta x (theta x r) / 2, which no linear map u = T a contains.
+        Points go on circles, by theta x (theta x r) / 2, which no linear map u = T a contains.
         """
         tractions, total = self.mesh.apply_K(U) - forces, np.zeros((U.shape[1], *2 * E.shape[1:]))
         for name in dict.fromkeys([*markers, *(c.interface.name for c in carried)]):

@@ -132,10 +132,7 @@ def _marker(ops: Operators, interface: Interface, tie: Tie, E: Array) -> Marker:
 
 
 def stress_recovery(model: FEModel, E: Array, missing: Array | None = None) -> StressRecovery:
-    """Stress on the surface at small deflection, of nodal displacements E (n_local, r).
-
-    Those of the modes left out are missing ones (n_local, 12 + r), see `rom.body.recovery`.
-    """
+    """Stress of shapes E (n_local, r), and of missing ones, see `rom.body.recovery`."""
     nodes = stressed_nodes(model)
     shapes = E if missing is None else np.hstack([E, missing])
     operator = model.stresses.at_nodes(shapes, nodes).reshape(6 * nodes.size, -1)

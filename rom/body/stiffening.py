@@ -130,10 +130,9 @@ def _check(body: BodyData) -> None:
 
 
 def moved_stiffening(old: BodyData, new: BodyData, X: Array, reference: object) -> dict[str, Array]:
-    """Geometric stiffness seen from another frame, its shapes phi - (t + w x X), [t; w] = X (6, r).
+    """Geometric stiffness seen from another frame, without the rigid motion X (6, r) of its shapes.
 
-    The frame turns and moves with the body: rotations compose, and what the reference condition
-    sees of the second order is rigid motion too.
+    Rotations compose; what the reference condition sees of the second order is rigid too.
     """
     if not old.K_geo:
         return {}

@@ -47,7 +47,6 @@ def write_archive(
     """Write a file, whole or not at all; the same content gives the same bytes.
 
     The manifest is what a reader needs to know about the arrays, messages say ``what`` they are of.
-    An array that holds a number that is not finite is refused.
     """
     for name, A in arrays.items():
         if not np.isfinite(A).all():
@@ -69,10 +68,7 @@ def write_archive(
 def read_archive(
     path: str | Path, kind: Kind, limit: int = MAX_BYTES
 ) -> tuple[dict[str, Any], dict[str, Array]]:
-    """Manifest and arrays of a file, its checksums compared.
-
-    One that is of another kind, or asks for more bytes of memory than the limit, is refused.
-    """
+    """Manifest and arrays of a file of a kind, within a limit of memory, its checksums compared."""
     path = check_readable(path, max(limit, MAX_FILE_BYTES))
     try:
         with in_file(path), zipfile.ZipFile(path) as archive:

@@ -21,8 +21,7 @@ def write_whole(path: str | Path, content: bytes | Callable[[IO[bytes]], object]
     """Write a file through a temporary one in the same folder, then rename; its path.
 
     A file of that name is replaced only by a complete new one. The content may be a function that
-    writes into the open binary file. A folder that is missing or may not be written is a
-    ConfigError, a full disk a ResourceError.
+    writes into the open binary file.
     """
     path = check_writable(path)
     part = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")

@@ -146,9 +146,6 @@ def asked(solution: Any, names: Sequence[str]) -> list[Channel]:
 
     A body alone has its position and velocity, anything else all that it has; without any name the
     positions of all bodies.
-
-    Raises:
-        ConfigError: listing what there is, for a name of nothing.
     """
     known, chosen = list(channels(solution)), list[Channel]()
     words = [" ".join(c.path[1:]).replace(" markers ", " ") for c in known]

@@ -53,8 +53,7 @@ def check_replaceable(
 ) -> Path:
     """The path, if a file of that name can be written and none of somebody else's is lost.
 
-    To be asked before a long computation. What will be written is of a kind, a key of `FILE_SIGNS`
-    or a format of `rom.export`; inputs are never written, whatever else is there if forced.
+    Asked before a long computation. Kinds are keys of `FILE_SIGNS` or formats of `rom.export`.
     """
     path = check_writable(path)
     for source in inputs:
@@ -90,14 +89,10 @@ def is_ours(path: Path, kind: str) -> bool:
 
 @contextmanager
 def claimed(folder: str | Path) -> Iterator[None]:
-    """Keep other runs out of a folder, which is made if it is missing.
+    """Keep other runs out of a folder, which is made if it is missing and goes if it stays empty.
 
-    The lock is one of the system and ends with the process that holds it, however that ends; a
-    folder that was made and stayed empty is removed. A file system without locks keeps nothing out.
-
-    Raises:
-        ConfigError: if it is no folder, or may not be made or written.
-        ResourceError: naming the process that has claimed it.
+    The lock is one of the system and ends with the process that holds it, however that ends. A file
+    system without locks keeps nothing out.
     """
     folder = Path(folder)
     kind = _kind(folder)

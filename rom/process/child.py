@@ -97,10 +97,7 @@ def start(
     variables: Mapping[str, str] | None = None,
     fed: bool = False,
 ) -> subprocess.Popen[bytes]:
-    """Start a command beside this process; arguments as in `run`, `finish` waits for it.
-
-    With ``fed`` its standard input is a pipe for what `finish` is given.
-    """
+    """Start a command as `run` does; with ``fed`` it reads what `finish` is given."""
     limits = limits or Limits()
     entry = [sys.executable, "-P", str(ENTRY_FILE), str(os.getpid())]
     entry += [str(limits.processor), str(limits.memory)]
@@ -237,10 +234,9 @@ def _remove_abandoned(path: Path) -> None:
 
 
 def trusted(path: Path) -> bool:
-    """Whether what lies there may be loaded as code: nobody can have written it who writes no code.
+    """Whether what lies there may be loaded as code, as only those have written it whose code runs.
 
-    That is this user, the administrator, and whoever owns the package, whose code runs anyway; what
-    is not there is nobody's.
+    These are this user, the administrator, and whoever owns the package.
     """
     try:
         about = path.stat()

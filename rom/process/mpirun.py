@@ -20,10 +20,7 @@ TIME_LIMIT = 20.0  # [s] for saying a version
 
 
 def found() -> str:
-    """Path of the launcher beside this Python, where pip and conda put it, or of the system.
-
-    Empty where there is none.
-    """
+    """Path of the launcher beside this Python, where pip puts it, or of the system, or nothing."""
     beside = shutil.which(PROGRAM_NAME, path=str(Path(sys.executable).parent))
     return beside or shutil.which(PROGRAM_NAME) or ""
 

@@ -52,10 +52,7 @@ class Quartic(Energy):
 
     @classmethod
     def from_gram(cls, G: Array, r: int) -> "Quartic":
-        """From the Gram matrix (N, N) of r linear strains and r (r + 1) / 2 quadratic ones [N m].
-
-        See `rom.fe.forms.large_strain`.
-        """
+        """From the Gram matrix (N, N) of r strains, see `rom.fe.forms.large_strain`."""
         K, A, B = G[:r, :r], G[:r, r:], G[r:, r:]
         pair = pair_numbers(r)
         i, j, k = entries(r, 3).T

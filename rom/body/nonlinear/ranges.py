@@ -147,10 +147,7 @@ def axis_point(geometric: Geometric, model: FEModel, reference: str) -> Array:
 
 
 def nodal_forces(loads: list[Load], model: FEModel, ops: Operators, about: Array) -> Array:
-    """(n_local, l) forces of loads at their largest on the nodes of this process [N].
-
-    Operators are those of nodal dofs, with all the model carries; (3,) is a point of the axis.
-    """
+    """(n_local, l) nodal forces [N] of loads at their largest, (3,) about a point of the axis."""
     F, nodes = np.zeros((ops.n_local, len(loads))), slice(ops.first // 3, None)
     field = centrifugal(model.points[nodes][: ops.n_local // 3] - about)
     for k, load in enumerate(loads):

@@ -44,10 +44,7 @@ def free_motions(rows: Array) -> Array:
 
 
 def follow(energy: Energy, loads: Array, held: Array | None = None) -> Array:
-    """(s, r) coordinates in equilibrium with loads (s, r) [N], one after the other from rest.
-
-    Supports let rows (h, r) of coordinates vanish. A load without stable equilibrium is refused.
-    """
+    """(s, r) equilibria with loads (s, r) [N] from rest, where rows (h, r) are held at zero."""
     return np.array([passed[-1] for passed in passages(energy, loads, held)])
 
 
@@ -158,8 +155,7 @@ class Stretch:
 def critical_shares(energy: Energy, load: Array, held: Array) -> Array:
     """(k,) shares, at most one, of a load (r,) [N] at which a stiffness vanishes on the way.
 
-    In the order in which they are passed on the path by arc length, limits and bifurcations; one
-    that does not lead to the load is refused.
+    Limits and bifurcations as they are passed on the path by arc length, which leads to the load.
     """
     body = Held(energy, free_motions(held))
     rest = np.zeros(body.n)
@@ -177,10 +173,7 @@ def critical_shares(energy: Energy, load: Array, held: Array) -> Array:
 
 
 def newton(energy: Energy, q: Array, load: Array) -> Array | None:
-    """The minimum (r,) of energy less work of a load (r,) [N] near q (r,); None if there is none.
-
-    Newton's method with a search along each increment.
-    """
+    """The minimum (r,) of energy less work of a load (r,) [N] near q (r,), or None."""
     scale = np.sqrt(np.diag(energy.K))
     U, force, K = energy.expansion(q)
     for _ in range(MAX_ITERATIONS):

@@ -80,8 +80,7 @@ def model_description(
 ) -> bytes:
     """The XML text for this very FMU, the C name of its binary and its C files.
 
-    Outputs are those of the last communication point and do not follow inputs at once, which
-    spares the caller algebraic loops.
+    Outputs do not follow inputs at once, which spares the caller algebraic loops.
     """
     root = ET.Element(
         "fmiModelDescription",

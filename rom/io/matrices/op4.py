@@ -65,10 +65,7 @@ class _Strings:
 
 
 class Matrices(dict[str, csr_matrix]):
-    """Matrices of a file by their names, ``NAME#1``, ``NAME#2`` where a name stands twice.
-
-    Where is the file, and places say where in it each stands.
-    """
+    """Matrices of a file by their names, ``NAME#1``, ``NAME#2`` where a name stands twice."""
 
     def __init__(self, where: str, found: Mapping[str, csr_matrix], places: Mapping[str, str]):
         super().__init__(found)

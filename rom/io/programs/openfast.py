@@ -99,8 +99,7 @@ def superelement(
 ) -> Superelement:
     """The matrices and the weight, without a table of loads; see `write_openfast`.
 
-    A held body keeps its weight whatever its small motions; in the frame of a floating one gravity
-    turns, and its change with the modes is left out.
+    In the frame of a floating body gravity turns; its change with the modes is left out.
     """
     form = interface_form(body)
     rows = _rows(body, form, held)

@@ -64,11 +64,7 @@ def audit(solution: Solution) -> Report:
 
 
 def warn_of_failures(solution: Solution) -> None:
-    """Warn once of a motion whose balances, joints or steps the audit finds wrong.
-
-    Every fourth instant is looked at, which takes a few per cent of the time of the run. Of bodies
-    that left their range `rom.mbs.results.audit` warns.
-    """
+    """Warn once of a motion whose balances, joints or steps the audit finds wrong."""
     n = solution.t.size
     seen = np.unique([*range(0, n, LOOK_EVERY), n - 1])
     motion = {name: getattr(solution, name)[seen] for name in MOTION_ARRAYS}
