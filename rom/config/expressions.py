@@ -94,7 +94,8 @@ class Reader:
         while at < len(self.text):
             found = TOKEN_PATTERN.match(self.text, at)
             if found is None:
-                self._refuse(at, f"{self.text[at]!r} has no meaning here", self._known)
+                known = f"Known: + - * / ^ ( ) , {', '.join(self.names)}."
+                self._refuse(at, f"{self.text[at]!r} has no meaning here", known)
             token = Token(str(found.lastgroup), found[0], at)
             if token.kind == "word":
                 if before.kind == "number":
@@ -105,10 +106,6 @@ class Reader:
                 self._refuse(at, f"a sign is missing between {before.text} and {token.text}")
             yield token
             at, before = found.end(), token
-
-    @property
-    def _known(self) -> str:
-        return f"Known: + - * / ^ ( ) , {', '.join(self.names)}."
 
     def _tree(self, tokens: list[Token]) -> ast.expr:
         """The tree, each node of which has its ``col_offset`` in the text as written."""

@@ -192,7 +192,7 @@ def warn_of_limits(solution: Solution) -> None:
             continue
         share, bent = softening(solution, name), deformation(solution, name, surface=False)
         if share >= 1.0:
-            top = np.linalg.norm(_omega(solution, name), axis=1).max()
+            top = np.linalg.norm(solution._rates(name, 3, 6), axis=1).max()
             warn(
                 f"body {name!r} turned at {top:.3g} rad/s; at {top / share:.3g} rad/s centrifugal "
                 "force has used up the stiffness of a body without geometric stiffness, which this "
@@ -288,15 +288,8 @@ def _top(solution: Solution, body: int) -> float:
     """Largest angular speed of a body, -1 for the ground."""
     if body < 0:
         return 0.0
-    omega = _omega(solution, solution.packed.names[body])
+    omega = solution._rates(solution.packed.names[body], 3, 6)
     return float(np.nanmax(np.linalg.norm(omega, axis=1), initial=0.0))
-
-
-def _omega(solution: Solution, name: str) -> Array:
-    """(n_t, 3) angular velocity of the frame that is integrated, in its axes [rad/s]."""
-    packed = solution.packed
-    at = packed.system.bodies.v_at[packed.names.index(name)] + 3
-    return solution.v[:, at : at + 3]
 
 
 def _spin(solution: Solution, body: int) -> Array:
@@ -314,7 +307,7 @@ def softening(solution: Solution, name: str) -> float:
     stiffens more than it softens.
     """
     part = solution.mechanism.parts[name]
-    body, omega = part.flexible, _omega(solution, name)
+    body, omega = part.flexible, solution._rates(name, 3, 6)
     omega = omega[np.isfinite(omega).all(axis=1)]
     if body.K_geo or not omega.size:
         return 0.0
