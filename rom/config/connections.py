@@ -97,11 +97,8 @@ def _motor(entry: Entry) -> None:
     if law["kind"] in ("expression", "python"):  # they take coordinate and rate
         entry.made.motor(entry.name, joint, value, coordinate=coordinate)
         return
-
-    def by_time(t: float, _x: float, _rate: float) -> float:
-        return float(value(t))
-
-    entry.made.motor(entry.name, joint, by_time, coordinate=coordinate, compiled=False)
+    how: Values = {"coordinate": coordinate, "compiled": False}
+    entry.made.motor(entry.name, joint, lambda t, x, rate: float(value(t)), **how)
 
 
 def _load(entry: Entry) -> None:

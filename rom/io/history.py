@@ -18,10 +18,7 @@ from rom.names import csv_cell, offered
 
 AXIS_LETTERS = ("x", "y", "z")
 QUATERNION_PARTS = ("p0", "p1", "p2", "p3")
-DIMENSION_NAMES = {
-    AXIS_LETTERS: "axis",
-    QUATERNION_PARTS: "quaternion",
-}  # of data sets, by their coordinates
+DIMENSION_NAMES = {AXIS_LETTERS: "axis", QUATERNION_PARTS: "quaternion"}  # of data sets
 ENERGIES = ("kinetic", "strain", "potential", "drives", "forces", "damping", "total")
 
 
@@ -67,7 +64,6 @@ def write_history(solution: AnySolution, path: str | Path, *, every: int = 1) ->
 
 
 def _every(solution: Any, every: int) -> tuple[Array, tuple[Channel, ...]]:
-    """Times and channels of every so many instants."""
     whole("every", every, 1)
     rows = slice(None, None, every)
     t = solution.t[rows]
@@ -181,14 +177,11 @@ def _of_body(solution: Any, name: str, part: Any) -> Iterator[Channel]:
 
 
 def _table(solution: Any, t: Array, found: tuple[Channel, ...]) -> bytes:
-    """Comma separated, one line of names with units in brackets, then numbers of 17 digits."""
-    return table(
-        ["t [s]", *_head(found)], np.column_stack([t, *(c.values for c in found)]), "%.17g"
-    )
+    columns = np.column_stack([t, *(c.values for c in found)])
+    return table(["t [s]", *_head(found)], columns, "%.17g")
 
 
 def _head(found: tuple[Channel, ...]) -> list[str]:
-    """Names of all columns, units in brackets."""
     return [f"{name} [{c.unit}]" for c in found for name in c.names]
 
 

@@ -95,10 +95,11 @@ def claimed(folder: str | Path) -> Iterator[None]:
     system without locks keeps nothing out.
     """
     folder = Path(folder)
-    kind = _kind(folder)
-    if kind is not None and not stat.S_ISDIR(kind):
+    mode = 0
+    with suppress(OSError):  # asked once, as other runs make and remove it
+        mode = folder.stat().st_mode
+    if mode and not stat.S_ISDIR(mode):
         raise ConfigError(f"{folder} is a file; a folder is needed.")
-    missing = kind is None
     try:
         handle = _locked(folder)
     except OSError as error:
@@ -112,17 +113,9 @@ def claimed(folder: str | Path) -> Iterator[None]:
         if handle is not None:
             (folder / LOCK_NAME).unlink(missing_ok=True)
             os.close(handle)
-        if missing:
+        if not mode:
             with suppress(OSError):  # something is in it, or another run has taken it
                 folder.rmdir()
-
-
-def _kind(folder: Path) -> int | None:
-    """Mode of what has this name, asked once as other runs make and remove it; None if none."""
-    try:
-        return folder.stat().st_mode
-    except OSError:
-        return None
 
 
 def _locked(folder: Path) -> int | None:

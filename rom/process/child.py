@@ -135,7 +135,6 @@ def finish(
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
-    """End a child and everything in its session."""
     for number in (signal.SIGTERM, signal.SIGKILL):
         with suppress(ProcessLookupError, PermissionError):
             os.killpg(process.pid, number)

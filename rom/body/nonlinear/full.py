@@ -144,7 +144,6 @@ class HeldSolid:
         return None
 
     def _moments(self, u: Array, W: Array | None) -> Iterator[tuple[TurningSection, Array]]:
-        """Each section, and the moment on it."""
         if W is None or W.size == u.size:
             return iter(())
         return zip(self.sections, W[u.size :].reshape(-1, 3), strict=True)

@@ -114,7 +114,6 @@ def _mark(data: bytes, place: int) -> int:
 
 
 def _closed(data: bytes, place: int) -> int:
-    """Where a dataset ends."""
     need((end := _mark(data, place)) >= 0, "the closing -1 is missing")
     return end
 

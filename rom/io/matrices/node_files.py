@@ -51,7 +51,6 @@ def _node_file(path: Path) -> tuple[Index, Array]:
 
 
 def _deck(path: Path) -> Nodes:
-    """The nodes and sets of a deck."""
     deck = Nodes(path)
     for block in deck.blocks():
         if block.keyword in NODE_KEYWORDS:

@@ -9,7 +9,7 @@ import numpy as np
 
 from rom.decks.lines import whole
 from rom.errors import UnsafeFileError
-from rom.io.files import check_readable, damaged, need, number
+from rom.io.files import Line, check_readable, damaged, need, number
 from rom.io.sid.format import BLOCKS, NODE_BLOCKS, SIZES, SYMMETRIC, UNIT, ZERO, shape_of
 from rom.model import Array
 from rom.names import ORIGIN_MARK, is_whole
@@ -47,11 +47,11 @@ class RawFile:
     blocks: dict[str, RawBlock] = field(default_factory=dict)
 
 
-class _Lines:
+class _Lines(Line):
     """Lines that are not empty, with their numbers; written in a message, the place of the last."""
 
     def __init__(self, path: Path, text: str):
-        self.path, self.number = path, 0
+        super().__init__(path)
         self._rest: Iterator[tuple[int, str]] = (
             (k, line.strip()) for k, line in enumerate(text.splitlines(), 1) if line.strip()
         )
@@ -68,9 +68,6 @@ class _Lines:
     def expect(self, word: str) -> None:
         line = self.next()
         need(line == word, f"{word!r} was expected, found {line[:MOST_QUOTED]!r}")
-
-    def __str__(self) -> str:
-        return f"{self.path}, line {self.number}"
 
 
 def read_raw(path: str | Path) -> RawFile:
