@@ -48,9 +48,6 @@ def typed(public: Public) -> Public:
 
     Annotations are read at the first call. A class that is imported for type checks alone is known
     by its name: an object of it cannot exist unless somebody else has imported it.
-
-    Raises:
-        ConfigError: at a call, naming function and argument.
     """
     if not isinstance(public, type):
         return _typed_function(public)  # type: ignore[return-value]

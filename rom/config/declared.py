@@ -27,14 +27,9 @@ PLAIN_KINDS[Path] = file_path
 class Declared(Table):
     """The keys of a table as functions and records have them, which are imported when it is used.
 
-    Args:
-        places: methods of a mechanism, and import strings "module:name" of functions and records,
-            with blanks.
-        keys: in front of their keys, or in place of those of the same name.
-        about: one sentence, in place of the first one about the first of them.
-        without: arguments that are no keys, with blanks.
-        defaults: where they are others than those of the signature.
-        kinds: where they are others than those of the annotation.
+    Places, with blanks, are methods of a mechanism and import strings "module:name" of functions
+    and records; keys stand in front of theirs, or in place of those of the same name. Without are
+    arguments that are no keys; defaults and kinds differ from those of signature and annotation.
     """
 
     places: list[str]

@@ -270,11 +270,11 @@ class Named:
         found: Values = {}
         for name, item in value.items():
             try:
-                check_text(name, self.what)
+                with place.told():
+                    check_text(name, self.what)
+                found[name] = read_value(self.kind, item, place.at(name))
             except ConfigError as error:
-                place.mistakes.append(place.error(f"{place.name}: {error.message}", error.hint))
-            else:
-                collect(found, name, self.kind, item, place)
+                place.mistakes.append(error)
         return found
 
 

@@ -62,12 +62,9 @@ class MechanismFile(Described):
         progress: bool = False,
         keep: "Keeping | None" = None,
     ) -> "Solution":
-        """Move it as ``[simulation]`` says.
+        """Move it as ``[simulation]`` says, or what was made of it already.
 
-        Args:
-            made: the mechanism, if it has been built already.
-            progress: report on stderr.
-            keep: folder that is written while the run lasts.
+        Progress is told on stderr; a folder to keep is written while the run lasts.
         """
         from rom.mbs.integrate.simulation import simulate
 

@@ -118,10 +118,8 @@ def channels(solution: Any) -> Iterator[Channel]:
         if known is None or known.coordinate is None:
             continue
         motion = solution.joint(joint)
-        for what, row, unit in (
-            ("angle", known.turn, "rad"),
-            ("displacement", known.displacement, "m"),
-        ):
+        angle, way = ("angle", known.turn, "rad"), ("displacement", known.displacement, "m")
+        for what, row, unit in (angle, way):
             if row is not None:
                 yield Channel((*place, what), unit, ("",), getattr(motion, what))
                 rate = getattr(motion, f"{what}_rate")

@@ -171,7 +171,8 @@ def _document(matrices: Mapping[str, Array], dofs: Dofs, nodes: dict[int, Array]
         before = now
     for kind, A in matrices.items():
         yield f"*MATRIX, TYPE={kind}"
-        yield from _rows(tril(A).toarray()[np.tril_indices(len(dofs))])
+        values = tril(A).toarray()[np.tril_indices(len(dofs))]
+        yield from map(_row, np.split(values, range(PER_LINE, values.size, PER_LINE)))
     yield "*ELEMENT, TYPE=U1, ELSET=BODY"
     yield from _wrapped([1, *labels])
     yield "*UEL PROPERTY, ELSET=BODY"
@@ -181,11 +182,6 @@ def _wrapped(numbers: list[int]) -> Iterator[str]:
     lines = [numbers[k : k + PER_LINE] for k in range(0, len(numbers), PER_LINE)]
     for k, line in enumerate(lines):
         yield ", ".join(map(str, line)) + ("," if k + 1 < len(lines) else "")
-
-
-def _rows(values: Array) -> Iterator[str]:
-    for k in range(0, len(values), PER_LINE):
-        yield _row(values[k : k + PER_LINE])
 
 
 def _row(values: Iterable[float]) -> str:
