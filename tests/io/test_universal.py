@@ -1,6 +1,5 @@
 """Universal files and files for ParaView: known numbers come back, broken files are named."""
 
-import struct
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
-from cases.files.decks import IM, RE, X, dataset, header
+from cases.files.decks import IM, RE, X, binary, dataset
 from cases.paths import TESTS
 from cases.refusals import refuses
 from cases.solid import block, reduced
@@ -33,11 +32,7 @@ def test_all_eight_forms_of_numbers_are_read(kind, spacing, tmp_path):
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("kind", [5, 6])
 def test_binary_datasets_are_read_in_both_byte_orders(kind, order, tmp_path):
-    numbers = np.column_stack([RE, IM]).ravel()
-    packed = struct.pack(f"{'<>'[order - 1]}10{'fd'[kind - 5]}", *numbers)
-    head = f"    58b{order:6d}{2:6d}{11:12d}{len(packed):12d}" + " 0 0 0 0"
-    data = f"{-1:6d}\n{head}\n{header(kind, 5, 1)}".encode() + packed + b"\n    -1\n"
-    (tmp_path / "b.uff").write_bytes(data)
+    (tmp_path / "b.uff").write_bytes(binary(kind, order))
     (f,) = read_universal(tmp_path / "b.uff")
     assert_allclose(f.y, RE + 1j * IM, rtol=1e-6)
     assert_allclose(f.x, X)
