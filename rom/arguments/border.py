@@ -141,7 +141,6 @@ class _Border:
         self.usual = {p: limits for p, limits in ranges if limits}
 
     def passed(self, args: Given, named: Named) -> tuple[list[object], Named]:
-        """The arguments as the function gets them."""
         unknown = [] if self.more else [name for name in named if name not in self.takes]
         for name in unknown:
             if owners := getattr(type(named[name]), "TAKEN_BY", None):

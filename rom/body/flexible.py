@@ -341,10 +341,7 @@ class FlexibleBody(BodyData):
         return self.quartic
 
     def full_matrices(self) -> tuple[Array, Array]:
-        """(6 + r, 6 + r) mass and stiffness of small motions, in units of the body.
-
-        The six rigid coordinates come first.
-        """
+        """(6 + r, 6 + r) mass and stiffness of small motions, rigid ones first, in its units."""
         M = np.block([[rigid_mass(self), rigid_elastic(self)], [rigid_elastic(self).T, self.M]])
         K = np.zeros_like(M)
         K[6:, 6:] = self.K

@@ -31,7 +31,6 @@ class InertiaIntegrals:
     S_kl: Array
 
     def __add__(self, other: "InertiaIntegrals") -> "InertiaIntegrals":
-        """Integrals of two bodies that share the shapes."""
         names = InertiaIntegrals.__slots__
         return InertiaIntegrals(*(getattr(self, n) + getattr(other, n) for n in names))
 

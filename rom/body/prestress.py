@@ -85,11 +85,7 @@ class UnitLoads:
     def buckling_loads(
         self, E: Array, omega: Array, markers: dict[str, Marker]
     ) -> list[tuple[str, str, float]]:
-        """Pairs of interfaces, and the force [N] that buckles the body pressed between them.
-
-        As on hinges, for up to `MAX_PAIRS` pairs of rigid or averaged interfaces. The shapes E
-        (n_local, r) are mass-normalised in their mean-axis frame, omega (r,) [rad/s] are theirs.
-        """
+        """Pairs of interfaces, and the force [N] that buckles the body between them on hinges."""
         pairs = list(combinations([m for m in markers.values() if m.patch is None], 2))
         lines = [(one, two, two.point - one.point) for one, two in pairs]
         pressed = [

@@ -74,12 +74,7 @@ def flexible_body(
     name: str,
     provenance: Provenance,
 ) -> FlexibleBody:
-    """The body in its mean-axis frame.
-
-    Shapes E (n_local, r) are mass-normalised, without rigid motion and in nodal dofs, omega (r,)
-    their circular frequencies [rad/s]; operators have the mass of the mesh alone. Ties are those of
-    the interfaces that become markers.
-    """
+    """The body of mass-normalised nodal shapes E (n_local, r), by operators of the mesh alone."""
     integrals = inertia_integrals(ops, own_points(ops, model.points), E)
     surface = None
     if (mesh := model.surface) is not None:

@@ -73,7 +73,6 @@ class MechanismFile(Described):
             return simulate(made, progress=progress, keep=keep, **self.values["simulation"])
 
     def _entries(self, *, bodies: bool) -> list[tuple[str, str, Values]]:
-        """Section, name and values of all sections of bodies, or of all others."""
         some = [name for name, section in sections().items() if section.bodies is bodies]
         return [(s, name, values) for s in some for name, values in self.values[s].items()]
 

@@ -44,10 +44,7 @@ class Kind(NamedTuple):
 def write_archive(
     path: str | Path, manifest: dict[str, Any], arrays: dict[str, Array], what: str
 ) -> Path:
-    """Write a file, whole or not at all; the same content gives the same bytes.
-
-    The manifest is what a reader needs to know about the arrays, messages say ``what`` they are of.
-    """
+    """Write a file, whole or not at all; messages say ``what`` the arrays are of."""
     for name, A in arrays.items():
         if not np.isfinite(A).all():
             raise QualityGateError(f"{name} of {what} must be finite; nothing was written.")

@@ -18,11 +18,7 @@ from rom.readable import check_readable as check_readable
 
 
 def write_whole(path: str | Path, content: bytes | Callable[[IO[bytes]], object]) -> Path:
-    """Write a file through a temporary one in the same folder, then rename; its path.
-
-    A file of that name is replaced only by a complete new one. The content may be a function that
-    writes into the open binary file.
-    """
+    """Write a file whole or not at all, by bytes or a function: it replaces one of that name."""
     path = check_writable(path)
     part = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
     try:

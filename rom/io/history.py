@@ -136,11 +136,7 @@ def channels(solution: Any) -> Iterator[Channel]:
 
 
 def asked(solution: Any, names: Sequence[str]) -> list[Channel]:
-    """The quantities of a motion that names ask for, as "slider", "crank pin" or "pivot angle".
-
-    A body alone has its position and velocity, anything else all that it has; without any name the
-    positions of all bodies.
-    """
+    """The quantities of a motion that names ask for, as "slider", "crank pin" or "pivot angle"."""
     known, chosen = list(channels(solution)), list[Channel]()
     words = [" ".join(c.path[1:]).replace(" markers ", " ") for c in known]
     for name in names or [f"{body} position" for body in solution.mechanism.parts]:

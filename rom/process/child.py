@@ -77,11 +77,7 @@ def run(
     variables: Mapping[str, str] | None = None,
     given: bytes | None = None,
 ) -> Ended:
-    """Run a command to its end; whatever interrupts this process ends the child with all its own.
-
-    In a folder, here by default, within limits, with variables beside those of this process, and
-    with bytes given to its standard input, which is empty without.
-    """
+    """Run a command to its end; whatever interrupts this process ends it with all its own."""
     limits = limits or Limits()
     with terminable():
         fed = given is not None
@@ -233,10 +229,7 @@ def _remove_abandoned(path: Path) -> None:
 
 
 def trusted(path: Path) -> bool:
-    """Whether what lies there may be loaded as code, as only those have written it whose code runs.
-
-    These are this user, the administrator, and whoever owns the package.
-    """
+    """Whether none but this user, root and the owner of the package can have written there."""
     try:
         about = path.stat()
     except OSError:

@@ -47,7 +47,6 @@ def mapped_files() -> list[str]:
 
 
 def _lines(file: str) -> list[str]:
-    """Of a file of the system; none where it does not tell."""
     try:
         return Path(file).read_text().splitlines()
     except OSError:

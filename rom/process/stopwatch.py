@@ -67,10 +67,7 @@ class Stopwatch:
         return sum(sum(pieces.values()) for pieces in self.stages.values())
 
     def table(self) -> dict[str, dict[str, float]]:
-        """{stage: {"seconds", "MB", "ranks", pieces, their numbers, notes}}, as provenance has it.
-
-        Seconds and memory are those of one rank.
-        """
+        """{stage: {"seconds", "MB", "ranks", pieces, numbers, notes}} of one rank."""
         return {
             stage: {
                 "seconds": round(sum(pieces.values()), 4),

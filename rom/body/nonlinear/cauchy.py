@@ -45,10 +45,7 @@ class CauchyRecovery:
         return self.gradient.shape[1]
 
     def field(self, q: Array, accelerations: Array | None = None) -> Array:
-        """(p, 6) stress xx, yy, zz, yz, xz, xy [Pa] in the deformed body for coordinates q (r,).
-
-        Axes are those of its frame; no correction by accelerations is known at large deflection.
-        """
+        """(p, 6) stress xx, yy, zz, yz, xz, xy [Pa] in the deformed body, axes of its frame."""
         if accelerations is not None:
             text = "accelerations: no stress of modes left out is known at large deflection"
             raise ConfigError(f"{text}; keep as many modes as the loads excite.")

@@ -73,11 +73,7 @@ ELLIPTIC_STRETCH = 3.0**-0.5
 
 @dataclass(frozen=True)
 class Bent:
-    """A reduction under way, and the range of loads by which the body is to bend far.
-
-    The basis has constraint and fixed-interface modes and the factor of K_ii; the body is seen from
-    the interface ``reference``.
-    """
+    """A reduction under way, and the range of loads by which the body is to bend far."""
 
     geometric: Geometric
     model: FEModel

@@ -49,10 +49,7 @@ def follow(energy: Energy, loads: Array, held: Array | None = None) -> Array:
 
 
 def passages(energy: Energy, loads: Array, held: Array | None = None) -> list[Array]:
-    """For each load the states (k, r) on the way to it, itself the last; see `follow`.
-
-    Where a body snaps, these are the states of its path by arc length, stable or not.
-    """
+    """For each load the states (k, r) on the way to it, by arc length if it snaps; itself last."""
     body = Held(energy, free_motions(np.zeros((0, energy.n)) if held is None else held))
     y, at, found = np.zeros(body.n), np.zeros(body.n), []
     for load in loads @ body.N:
@@ -153,10 +150,7 @@ class Stretch:
 
 @_found_beyond(0.0)
 def critical_shares(energy: Energy, load: Array, held: Array) -> Array:
-    """(k,) shares, at most one, of a load (r,) [N] at which a stiffness vanishes on the way.
-
-    Limits and bifurcations as they are passed on the path by arc length, which leads to the load.
-    """
+    """(k,) shares, at most one, of a load (r,) [N] at which a stiffness vanishes on the way."""
     body = Held(energy, free_motions(held))
     rest = np.zeros(body.n)
     path, found = Stretch(body, rest, load @ body.N), list[float]()

@@ -62,7 +62,6 @@ def _deck(path: Path) -> Nodes:
 
 
 def _table(path: Path) -> tuple[Index, Array]:
-    """Lines ``label, x, y, z``."""
     block = Block("NODE", {}, (check_readable(path), 1))
     with path.open(encoding="utf-8", errors="replace") as file:
         for number, line in enumerate(file, 1):

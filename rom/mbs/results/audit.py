@@ -78,7 +78,6 @@ def warn_of_failures(solution: Solution) -> None:
 
 
 def _of_steps(solution: Solution) -> list[Row]:
-    """What one look at all instants tells of a motion as a whole."""
     return [*_energy(solution), *_momentum(solution), *_joints(solution), *_numbers(solution)]
 
 
@@ -218,11 +217,7 @@ def warn_of_range(mechanism: Mechanism, packed: Packed, state: State) -> None:
 
 
 def pressed(solution: Solution, name: str) -> float | None:
-    """Largest force that presses two interfaces of a body together, over what buckles it there [1].
-
-    As on hinges, with a warning of too much. Zero where geometric stiffness is known to the motion,
-    None where the body does not know its buckling loads.
-    """
+    """Largest force that presses two interfaces together, over what buckles it; None if unknown."""
     body = solution.mechanism.parts[name].flexible
     if body.K_geo or body.quartic is not None:
         return 0.0
