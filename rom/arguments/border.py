@@ -48,9 +48,6 @@ def typed(public: Public) -> Public:
 
     Annotations are read at the first call. A class that is imported for type checks alone is known
     by its name: an object of it cannot exist unless somebody else has imported it.
-
-    Raises:
-        ConfigError: at a call, naming function and argument.
     """
     if not isinstance(public, type):
         return _typed_function(public)  # type: ignore[return-value]
@@ -144,7 +141,6 @@ class _Border:
         self.usual = {p: limits for p, limits in ranges if limits}
 
     def passed(self, args: Given, named: Named) -> tuple[list[object], Named]:
-        """The arguments as the function gets them."""
         unknown = [] if self.more else [name for name in named if name not in self.takes]
         for name in unknown:
             if owners := getattr(type(named[name]), "TAKEN_BY", None):

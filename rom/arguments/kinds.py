@@ -52,10 +52,7 @@ ARRAY_LIKE = frozenset(typing.get_args(npt.ArrayLike))  # none from NumPy 2.5 on
 
 @dataclass(eq=False)
 class Unfit(Exception):
-    """A value is not what is wanted, in words; or its part at a place, such as ``['a']``.
-
-    A sentence is said of it behind its name where that is more than what is wanted.
-    """
+    """A value, or its part at a place such as ``['a']``, is not what is wanted."""
 
     value: object
     wanted: str

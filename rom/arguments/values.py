@@ -91,10 +91,7 @@ def matrix(name: str, value: Any, shape: tuple[int | None, int | None] = (None, 
 def symmetric(
     name: str, A: Any, rtol: float, *, where: str = "", error: type[RomError] = QualityGateError
 ) -> None:
-    """Refuse a matrix (n, n), sparse or dense, of a file, that belongs to no energy.
-
-    Round-off is a difference of its halves up to rtol [1] of its largest entry.
-    """
+    """Refuse a matrix (n, n) whose halves differ by more than rtol [1] of its largest entry."""
     gap, size = (abs(X).max() if A.shape[0] else 0.0 for X in (A - A.T, A))
     if gap > rtol * size:
         raise error(
@@ -218,22 +215,14 @@ def number(name: str, value: object, *, error: type[RomError] = ConfigError) -> 
 
 
 def positive(
-    name: str,
-    value: object,
-    *,
-    error: type[RomError] = ConfigError,
-    infinite: bool = False,
+    name: str, value: object, *, error: type[RomError] = ConfigError, infinite: bool = False
 ) -> float:
     """The value as a positive float, finite or, where that is taken, infinite."""
     return _limited(name, value, Positive(infinite=infinite), error)
 
 
 def not_negative(
-    name: str,
-    value: object,
-    *,
-    error: type[RomError] = ConfigError,
-    infinite: bool = False,
+    name: str, value: object, *, error: type[RomError] = ConfigError, infinite: bool = False
 ) -> float:
     """The value as a float of zero or more, finite or, where that is taken, infinite."""
     return _limited(name, value, NotNegative(infinite=infinite), error)

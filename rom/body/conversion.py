@@ -22,29 +22,16 @@ SIX = np.array([1, 1, 1, 0, 0, 0])  # powers of a length in a displacement and a
 
 
 @dataclass(frozen=True, slots=True)
-class Factors:
-    """Numbers in the new units per number in the old ones."""
+class Factors(UnitSystem):
+    """Numbers in the new units, whose name it has, per number in the old ones."""
 
-    length: float
-    mass: float
-    time: float
     shape: float  # of a displacement shape, by choice: an elastic coordinate is length / shape
 
     @classmethod
     def between(cls, old: UnitSystem, new: UnitSystem) -> "Factors":
         """From one system to another."""
         mass = old.mass / new.mass
-        return cls(old.length / new.length, mass, old.time / new.time, mass**-0.5)
-
-    @property
-    def force(self) -> float:
-        """Of a force."""
-        return self.mass * self.length / self.time**2
-
-    @property
-    def pressure(self) -> float:
-        """Of a stress."""
-        return self.force / self.length**2
+        return cls(new.name, old.length / new.length, mass, old.time / new.time, mass**-0.5)
 
     def load(self, name: str) -> float:
         """Of a load by its name in ``K_geo``."""
@@ -143,7 +130,10 @@ def _coordinates(body: BodyData, marker: Marker, f: Factors) -> Array:
 
 def _stress(stress: StressRecovery | CauchyRecovery, f: Factors) -> StressRecovery | CauchyRecovery:
     if isinstance(stress, CauchyRecovery):
-        return stress.in_units(f.length, f.pressure, f.length / f.shape)
+        gradient, stiffness = stress.gradient / (f.length / f.shape), stress.stiffness * f.pressure
+        return replace(
+            stress, points=stress.points * f.length, gradient=gradient, stiffness=stiffness
+        )
     per_coordinate, inertial = f.pressure * f.shape / f.length, stress.inertial
     if inertial is not None:
         columns = np.full(inertial.shape[1], per_coordinate * f.time**2)

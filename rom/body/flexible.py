@@ -74,7 +74,7 @@ class FlexibleBody(BodyData):
         evidence = "none" if self.certificate is None else repr(self.certificate)
         centre = ", ".join(f"{x:.5g}" for x in self.first_moment / self.mass)
         lowest = ", ".join(f"{w / (2 * np.pi):.5g}" for w in self.omega[:6])
-        places = {m.name: f"{m.kind} at {m.point.tolist()}" for m in self.markers.values()}
+        markers = self.markers.values()
         rows = [
             ("mass [kg]", self.mass),
             ("mass centre [m]", centre),
@@ -83,7 +83,7 @@ class FlexibleBody(BodyData):
             ("frame", self.reference),
             ("geometric stiffness", listed(self.K_geo)),
             ("certificate", evidence),
-            *((f"interface {name}", place) for name, place in places.items()),
+            *((f"interface {m.name}", f"{m.kind} at {m.point.tolist()}") for m in markers),
         ]
         return html_table(f"Flexible body {self.name}", ("", ""), rows)
 
@@ -341,10 +341,7 @@ class FlexibleBody(BodyData):
         return self.quartic
 
     def full_matrices(self) -> tuple[Array, Array]:
-        """(6 + r, 6 + r) mass and stiffness of small motions, in units of the body.
-
-        The six rigid coordinates come first.
-        """
+        """(6 + r, 6 + r) mass and stiffness of small motions, rigid ones first, in its units."""
         M = np.block([[rigid_mass(self), rigid_elastic(self)], [rigid_elastic(self).T, self.M]])
         K = np.zeros_like(M)
         K[6:, 6:] = self.K

@@ -48,10 +48,7 @@ def seen_from(body: Body, reference: object) -> Body:
 def at_large_deflection(
     body: Body, reference: object, E: Array, model: FEModel, ops: Operators
 ) -> tuple[Body, Array]:
-    """The body in another frame with its energy at finite strain, and its nodal shapes there.
-
-    Shapes E (n_local, r) are those of the old frame; operators are those of nodal dofs.
-    """
+    """The body in another frame with its energy at finite strain, and its shapes E there."""
     X, (found, V) = reference_motion(body, reference), _on_normal_modes(moved_to(body, reference))
     shapes = (E - rigid_motions(own_points(ops, model.points)) @ X) @ V
     energy = Quartic.from_gram(model.stresses.large_strain().gram(shapes), found.n_modes)

@@ -31,7 +31,6 @@ class InertiaIntegrals:
     S_kl: Array
 
     def __add__(self, other: "InertiaIntegrals") -> "InertiaIntegrals":
-        """Integrals of two bodies that share the shapes."""
         names = InertiaIntegrals.__slots__
         return InertiaIntegrals(*(getattr(self, n) + getattr(other, n) for n in names))
 
@@ -52,10 +51,7 @@ def weighted(weights: Array, parts: Sequence[InertiaIntegrals]) -> InertiaIntegr
 def inertia_integrals(
     ops: Operators, points: Array, Psi: Array, part: Any = None
 ) -> InertiaIntegrals:
-    """Integrals of the finite element body, or of a part with the mass (n, n) [kg].
-
-    Points (n_local / 3, 3) [m] and shapes Psi (n_local, r) are of the nodes of this process.
-    """
+    """Integrals of the finite element body, or of a part with the mass (n, n) [kg]."""
     fields = np.column_stack([np.ones(ops.n_local), points.reshape(-1), Psi])
     n, k = fields.shape[0] // 3, fields.shape[1]
     S = np.empty((3, k, 3, k))

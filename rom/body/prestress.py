@@ -85,12 +85,7 @@ class UnitLoads:
     def buckling_loads(
         self, E: Array, omega: Array, markers: dict[str, Marker]
     ) -> list[tuple[str, str, float]]:
-        """Pairs of interfaces, and the force [N] that buckles the body pressed between them.
-
-        As on hinges: forces keep to the line of the pair, which holds nothing else of it. Of
-        more than `MAX_PAIRS` pairs of rigid or averaged interfaces none is looked at. The shapes E
-        (n_local, r) are mass-normalised in their mean-axis frame, omega (r,) [rad/s] are theirs.
-        """
+        """Pairs of interfaces, and the force [N] that buckles the body between them on hinges."""
         pairs = list(combinations([m for m in markers.values() if m.patch is None], 2))
         lines = [(one, two, two.point - one.point) for one, two in pairs]
         pressed = [
@@ -161,8 +156,7 @@ class UnitLoads:
     ) -> Array:
         """What the forces on interfaces add when their surfaces turn as a whole.
 
-        An interface that turns by theta carries its points along on circles, by
-        theta x (theta x r) / 2, which no linear map u = T a contains.
+        Points go on circles, by theta x (theta x r) / 2, which no linear map u = T a contains.
         """
         tractions, total = self.mesh.apply_K(U) - forces, np.zeros((U.shape[1], *2 * E.shape[1:]))
         for name in dict.fromkeys([*markers, *(c.interface.name for c in carried)]):

@@ -74,12 +74,7 @@ def flexible_body(
     name: str,
     provenance: Provenance,
 ) -> FlexibleBody:
-    """The body in its mean-axis frame.
-
-    Shapes E (n_local, r) are mass-normalised, without rigid motion and in nodal dofs, omega (r,)
-    their circular frequencies [rad/s]; operators have the mass of the mesh alone. Ties are those of
-    the interfaces that become markers.
-    """
+    """The body of mass-normalised nodal shapes E (n_local, r), by operators of the mesh alone."""
     integrals = inertia_integrals(ops, own_points(ops, model.points), E)
     surface = None
     if (mesh := model.surface) is not None:
@@ -132,10 +127,7 @@ def _marker(ops: Operators, interface: Interface, tie: Tie, E: Array) -> Marker:
 
 
 def stress_recovery(model: FEModel, E: Array, missing: Array | None = None) -> StressRecovery:
-    """Stress on the surface at small deflection, of nodal displacements E (n_local, r).
-
-    Those of the modes left out are missing ones (n_local, 12 + r), see `rom.body.recovery`.
-    """
+    """Stress of shapes E (n_local, r), and of missing ones, see `rom.body.recovery`."""
     nodes = stressed_nodes(model)
     shapes = E if missing is None else np.hstack([E, missing])
     operator = model.stresses.at_nodes(shapes, nodes).reshape(6 * nodes.size, -1)

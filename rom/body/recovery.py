@@ -65,8 +65,7 @@ class StressRecovery:
     def accelerations(a: Array, alpha: Array, omega: Array, qdd: Array) -> Array:
         """(12 + r,) what the stress of the modes left out depends on, axes of the body.
 
-        Those are the acceleration of the origin minus gravity a (3,) [m/s^2], alpha (3,) [rad/s^2],
-        omega (3,) [rad/s], and second derivatives qdd (r,) of the elastic coordinates.
+        Acceleration of the origin minus gravity a (3,) [m/s^2], alpha (3,), omega (3,), qdd (r,).
         """
         return np.concatenate([a, alpha, [omega[i] * omega[j] for i, j in PRODUCTS], qdd])
 

@@ -99,11 +99,7 @@ def rigid_elastic(body: BodyData) -> Array:
 
 
 def moved_frame(body: Body, X: Array) -> Body:
-    """The body with shapes phi_k - (t_k + w_k x X), X = [t; w] (6, r); still not normalised.
-
-    Every integral follows from those of the old shapes and of the undeformed body. Geometric
-    stiffness stays as it was, see `rom.body.stiffening.moved_stiffening`.
-    """
+    """The body with shapes phi_k - (t_k + w_k x X), X = [t; w] (6, r), and its old K_geo."""
     t, W, P = X[:3], turns_of(X), second_moment(body)
     Wd = np.einsum("abk,b->ak", W, body.first_moment)
     S, Ibar = moved_integrals(body, X)

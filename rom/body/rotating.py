@@ -60,10 +60,8 @@ def rotating_matrices(
 ) -> tuple[Array, Array]:
     """Stiffness and gyroscopic matrix (r, r) of small vibrations in a frame that turns steadily.
 
-    Centrifugal stiffening by K_geo, spin softening by the inertia of the shapes themselves, and
-    Coriolis forces, all from the same integrals as the equations of motion. The frame turns with w
-    (3,) [rad/s] about an axis through a point (3,) [m], body frame; coordinates (h, 6 + r) of
-    interfaces held besides it pull with the force they carry at rest.
+    The frame turns with w (3,) [rad/s] about an axis through a point (3,) [m], body frame;
+    coordinates (h, 6 + r) of interfaces held besides it pull with the force they carry at rest.
     """
     psi = SecondOrder.of(body)
     a_origin = -np.cross(w, np.cross(w, at))  # acceleration of the body origin

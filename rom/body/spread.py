@@ -28,12 +28,10 @@ class SpreadLoad:
     shapes: Array
 
     def __add__(self, other: "SpreadLoad") -> "SpreadLoad":
-        """Both loads at once."""
         pairs = ((getattr(self, x), getattr(other, x)) for x in ("force", "first", "shapes"))
         return SpreadLoad(*(a + b for a, b in pairs))
 
     def __rmul__(self, factor: float) -> "SpreadLoad":
-        """The load so many times."""
         return SpreadLoad(factor * self.force, factor * self.first, factor * self.shapes)
 
 

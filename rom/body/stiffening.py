@@ -125,16 +125,14 @@ def _check(body: BodyData) -> None:
     for load, A in body.K_geo.items():
         text = f"body {body.name!r} has a geometric stiffness for the unknown load {load!r}; use"
         check_known(load, known, text)
-        A = np.asarray(A)
         name = f"the geometric stiffness {load!r} of body {body.name!r}"
-        symmetric(name, matrix(name, A, (r, r)), 1e-9, error=ConfigError)
+        symmetric(name, matrix(name, np.asarray(A), (r, r)), 1e-9, error=ConfigError)
 
 
 def moved_stiffening(old: BodyData, new: BodyData, X: Array, reference: object) -> dict[str, Array]:
-    """Geometric stiffness seen from another frame, its shapes phi - (t + w x X), [t; w] = X (6, r).
+    """Geometric stiffness seen from another frame, without the rigid motion X (6, r) of its shapes.
 
-    The frame turns and moves with the body: rotations compose, and what the reference condition
-    sees of the second order is rigid motion too.
+    Rotations compose; what the reference condition sees of the second order is rigid too.
     """
     if not old.K_geo:
         return {}

@@ -56,9 +56,8 @@ def strain_rows(
 ) -> Array:
     """(k, r) normal strain along directions in the surface per elastic coordinate [1/m].
 
-    It is constant in the triangle in which the point lies, as under a gauge of its size. Gauges
-    lie at points (k, 3) [m] along directions (k, 3) of any length; messages call one ``what``,
-    with its entry in ``numbers``. One that is off the surface, or stands up from it, is refused.
+    It is that of the triangle in which the point lies. Gauges at points (k, 3) [m] along directions
+    (k, 3), which messages call ``what`` with its entry in ``numbers``, must lie on the surface.
     """
     surface = surface_of(body)
     corners = surface.points[surface.triangles]

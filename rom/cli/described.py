@@ -8,7 +8,8 @@ import rom
 from rom.arguments import Quantity, Whole
 from rom.cli.options import count, faces, meshing, names, number_or_text, numbers_of, option, unique
 from rom.config.component_keys import TABLE
-from rom.config.keys import Text, Words
+from rom.config.keys import Text
+from rom.config.keys import words as some_words
 
 if TYPE_CHECKING:
     from rom.config.component import Component
@@ -37,7 +38,7 @@ MOTION_KEYS: dict[str, tuple[str, ...]] = {
     "film": ("output", "film"),
     "history": ("output", "history"),
 }
-VALUES: dict[type, Callable[[str], object]] = {Whole: count, Words: names, Text: str}  # of options
+VALUES: dict[object, Callable[[str], object]] = {Whole: count, some_words: names, Text: str}
 REPLACED_KEYS = {  # an option takes the place of what contradicts it
     "modes": (("reduction", "f_max"), ("reduction", "tol")),
     "f_max": (("reduction", "modes"),),
@@ -63,7 +64,8 @@ def keyed(to: argparse._ActionsContainer, *several: str) -> None:
             about += f" (default {', '.join(map(str, default))})"
         how = {"choices": kind.choices} if getattr(kind, "choices", ()) else {}
         # what reads its value in SI; None for a flag, which has none
-        read = numbers_of(kind) if isinstance(kind, Quantity) else VALUES.get(type(kind))
+        by_kind = VALUES.get(kind) or VALUES.get(type(kind))
+        read = numbers_of(kind) if isinstance(kind, Quantity) else by_kind
         option(to, words, about, read, default=key.default, **how)
 
 

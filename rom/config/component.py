@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -196,8 +196,6 @@ class Component(Described):
         return [Attachment(**values) for values in self.values.get("attachments", {}).values()]
 
     def _matrices(self) -> "FEModel":
-        from dataclasses import replace
-
         from rom.io.matrices.node_files import read_node_sets
         from rom.io.matrices.read_model import read_model
 

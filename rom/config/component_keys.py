@@ -8,18 +8,19 @@ from rom.arguments import Number, Positive, Quantity, Whole
 from rom.config.declared import Declared
 from rom.config.document import Values
 from rom.config.keys import (
-    Anything,
     Either,
-    FilePath,
     Flag,
     Key,
     Named,
-    OutputPath,
     Place,
     Table,
     Text,
     Variants,
-    Words,
+    anything,
+    file_path,
+    output_path,
+    words,
+    written,
 )
 from rom.config.methods import METHODS
 from rom.fe.mesh.picks import picks
@@ -55,17 +56,12 @@ class Solids:
         return SOLID.read(value, place)
 
 
-@dataclass(frozen=True, slots=True)
-class Faces:
+@written("number, point, or text as `radius:0.006`")
+def faces(value: object, place: Place) -> object:
     """What picks faces of a STEP file."""
-
-    summary: str = "number, point, or text as `radius:0.006`"
-
-    def read(self, value: object, place: Place) -> object:
-        """The value, if it picks anything."""
-        with place.told():
-            picks(value)
-        return value
+    with place.told():
+        picks(value)
+    return value
 
 
 KINDS = {
@@ -79,7 +75,7 @@ INTERFACE = Either(Text(), Variants(KINDS))
 TABLE = Table("A component.", (
     Key("name", Text(), "Name of the body; that of the file if missing."),
     Key("geometry", Table("The solid as a geometry or mesh; needs FEniCSx.", (
-        Key("file", FilePath(), "`.geo`, `.py`, `.step`, `.msh`, `.unv`, `.inp` or `.bdf`.", ...),
+        Key("file", file_path, "`.geo`, `.py`, `.step`, `.msh`, `.unv`, `.inp` or `.bdf`.", ...),
         Key("unit", Text(LENGTHS), "Length unit of its coordinates; a `.step` knows its own.", "m"),
         Key("units", Text(tuple(SYSTEMS)), "Unit system of a deck, with the materials it says; in "
             "place of a unit.", "SI"),
@@ -89,11 +85,11 @@ TABLE = Table("A component.", (
         Key("solver", Text(), "How equations are solved: direct, low-rank, out-of-core, "
             "low-rank+out-of-core or iterative; auto is direct where its factor fits, else "
             "out-of-core, else iterative.", "auto"),
-        Key("parameters", Named(Anything("number or text"), "parameters"),
+        Key("parameters", Named(anything, "parameters"),
             "Parameters of the geometry. A plain number goes there as it is; a length with its "
             "unit is converted to that of the geometry (`.step`: to metres), another quantity "
             "to SI."),
-        Key("faces", Named(Faces(), "faces"),
+        Key("faces", Named(faces, "faces"),
             "Names for faces of a `.step`: a number; a point [m]; \"radius:0.006\" for all "
             "cylinders of that radius [m]; \"normal:0,0,1\" for the plane that looks there; "
             "\"3+4\" or a list for several."),
@@ -101,7 +97,7 @@ TABLE = Table("A component.", (
     Key("matrices", Table("The solid as matrices of another program, in place of a geometry.", (
         Key("stiffness", Text(), "File, `:NAME` behind it where it holds several.", ...),
         Key("mass", Text(), "Likewise.", ...),
-        Key("nodes", FilePath(), "`.inp`, `.bdf`, `.dat` or `.csv`.", ...),
+        Key("nodes", file_path, "`.inp`, `.bdf`, `.dat` or `.csv`.", ...),
         Key("units", Text(tuple(SYSTEMS)), "Unit system of the files.", "SI"),
         Key("sets", Named(Quantity("1", ((None,),)), "labels"),
             "Labels of the nodes of an interface, where the `.inp` has no set of its name."),
@@ -127,7 +123,7 @@ TABLE = Table("A component.", (
             "Where moment-matching is to be exact; 0 if missing."),
         Key("characteristic", Whole(), "Full interfaces follow so many characteristic modes."),
         Key("gravity_shapes", Flag(), "Keep the answers to gravity along each axis.", False),
-        Key("reference", Words(), "The frame: mean-axis, an interface, or two of them.",
+        Key("reference", words, "The frame: mean-axis, an interface, or two of them.",
             ("mean-axis",)),
         Key("stiffening", Flag(), "Add the geometric stiffness of rotation and of loads on "
             "interfaces.", False),
@@ -141,7 +137,7 @@ TABLE = Table("A component.", (
             Key("shapes", Whole(1), "So many shapes are added; as tol asks if missing."),
             Key("steps", Whole(1), "States on the way to the largest load.", 4),
             Key("about", Quantity("m", ((3,),)), "A point of its axis; the reference if missing."),
-            Key("fixed", Words(), "Held beside the reference, wholly or as `name:yz`.", ()),
+            Key("fixed", words, "Held beside the reference, wholly or as `name:yz`.", ()),
             about="Loads under which it is to deflect far, and shapes for them.",
             without="n_modes n_shapes n_steps",
             spin=Quantity("rad/s", ((3,),)),
@@ -152,17 +148,17 @@ TABLE = Table("A component.", (
     )), "How it is reduced.", {}),
     Key("damping", Table("Structural damping: a ratio, or alpha and beta.", (
         Key("ratio", Quantity(), "Damping ratio of every mode, e.g. 0.01."),
-        Key("fixed", Words(), "Interfaces held where the ratio is meant, wholly or as `name:yz`; "
+        Key("fixed", words, "Interfaces held where the ratio is meant, wholly or as `name:yz`; "
             "those of the free body without it.", ()),
         Key("alpha", Quantity("1/s"), "D = alpha M + beta K."),
         Key("beta", Quantity("s"), "D = alpha M + beta K."),
     )), "Structural damping; none if missing."),
     Key("modes", Table("What `rom modes` computes.", (
         Key("number", Whole(1), "Number of modes, rigid ones too.", 12),
-        Key("fixed", Words(), "Interfaces held, wholly or as `name:yz`.", ()),
-        Key("spring", Words(), "Stiffness to the ground, `name=kx,ky,kz` or six numbers.", ()),
+        Key("fixed", words, "Interfaces held, wholly or as `name:yz`.", ()),
+        Key("spring", words, "Stiffness to the ground, `name=kx,ky,kz` or six numbers.", ()),
     )), "What `rom modes` computes.", {}),
     Key("output", Table("What `rom reduce` writes.", (
-        Key("file", OutputPath(), "The body file, `.rom.npz`.", ...),
+        Key("file", output_path, "The body file, `.rom.npz`.", ...),
     )), "What `rom reduce` writes."),
 ))  # fmt: skip

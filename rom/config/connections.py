@@ -97,11 +97,7 @@ def _motor(entry: Entry) -> None:
     if law["kind"] in ("expression", "python"):  # they take coordinate and rate
         entry.made.motor(entry.name, joint, value, **how)
         return
-
-    def by_time(t: float, _x: float, _rate: float) -> float:
-        return float(value(t))
-
-    entry.made.motor(entry.name, joint, by_time, **how, compiled=False)
+    entry.made.motor(entry.name, joint, lambda t, x, rate: float(value(t)), compiled=False, **how)
 
 
 def _load(entry: Entry) -> None:

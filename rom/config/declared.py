@@ -15,26 +15,21 @@ from typing import Any, Literal
 
 from rom.arguments import Quantity, Whole
 from rom.arguments.kinds import parameters_of
-from rom.config.keys import FilePath, Flag, Key, Kind, Named, Table, Text, Words
+from rom.config.keys import Flag, Key, Kind, Named, Table, Text, file_path, words
 from rom.fields import follow
 
 SHAPE_OR_UNIT = re.compile(r"^\([\dnr, ]+\)( or \([\d, ]+\))? | ?\[(?!degrees)[^]]*\]")
 NO_VALUE = re.compile("; None( for|:)")
 PLAIN_KINDS: dict[object, Kind] = {float: Quantity(), int: Whole(), bool: Flag(), str: Text()}
-PLAIN_KINDS[Path] = FilePath()
+PLAIN_KINDS[Path] = file_path
 
 
 class Declared(Table):
     """The keys of a table as functions and records have them, which are imported when it is used.
 
-    Args:
-        places: methods of a mechanism, and import strings "module:name" of functions and records,
-            with blanks.
-        keys: in front of their keys, or in place of those of the same name.
-        about: one sentence, in place of the first one about the first of them.
-        without: arguments that are no keys, with blanks.
-        defaults: where they are others than those of the signature.
-        kinds: where they are others than those of the annotation.
+    Places, with blanks, are methods of a mechanism and import strings "module:name" of functions
+    and records; keys stand in front of theirs, or in place of those of the same name. Without are
+    arguments that are no keys; defaults and kinds differ from those of signature and annotation.
     """
 
     places: list[str]
@@ -110,7 +105,7 @@ def _kind(annotation: object) -> Kind | None:
     if origin in (dict, Mapping) and (kind := _kind(inner[1])) is not None:
         return Named(kind, "values")
     if origin in (tuple, list, Sequence) and inner[0] is str:
-        return Words()
+        return words
     if origin is tuple and isinstance(kind := _kind(inner[0]), Quantity):
         return replace(kind, shapes=((None if inner[-1] is ... else len(inner),),))
     if is_dataclass(annotation):

@@ -13,8 +13,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple, NoReturn
 
+from rom.arguments import Quantity
 from rom.config.document import Values
-from rom.config.keys import Key, Named, Place, Table, Text, nearest
+from rom.config.keys import Key, Named, Place, Table, Text, nearest, read_value, written
 from rom.mbs.elements.formulas.codes import (
     ADD,
     DIV,
@@ -93,7 +94,8 @@ class Reader:
         while at < len(self.text):
             found = TOKEN_PATTERN.match(self.text, at)
             if found is None:
-                self._refuse(at, f"{self.text[at]!r} has no meaning here", self._known)
+                known = f"Known: + - * / ^ ( ) , {', '.join(self.names)}."
+                self._refuse(at, f"{self.text[at]!r} has no meaning here", known)
             token = Token(str(found.lastgroup), found[0], at)
             if token.kind == "word":
                 if before.kind == "number":
@@ -104,10 +106,6 @@ class Reader:
                 self._refuse(at, f"a sign is missing between {before.text} and {token.text}")
             yield token
             at, before = found.end(), token
-
-    @property
-    def _known(self) -> str:
-        return f"Known: + - * / ^ ( ) , {', '.join(self.names)}."
 
     def _tree(self, tokens: list[Token]) -> ast.expr:
         """The tree, each node of which has its ``col_offset`` in the text as written."""
@@ -189,21 +187,13 @@ class Reader:
             yield code, 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class AnyQuantity:
-    """A number with any unit."""
-
-    summary: str = "number, or number with any unit"
-
-    def read(self, value: object, place: Place) -> float:
-        """The number in SI."""
-        if isinstance(value, str) and (number := QUANTITY_NUMBER.match(value.strip())):
-            symbol = value.strip()[number.end() :].strip()
-            with place.told():
-                return in_si(value, symbol or "1")
-        if isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e300:
-            return float(value)
-        place.refuse(value, f" must be a {self.summary}")
+@written("number, or number with any unit")
+def any_quantity(value: object, place: Place) -> Any:
+    """The number in SI."""
+    unit = "1"
+    if isinstance(value, str) and (number := QUANTITY_NUMBER.match(value.strip())):
+        unit = value.strip()[number.end() :].strip() or "1"
+    return read_value(Quantity(unit), value, place)
 
 
 @dataclass(frozen=True, slots=True)
@@ -256,7 +246,7 @@ def formula_keys(unit: str, variables: tuple[str, ...]) -> tuple[Key, ...]:
     return (
         Key("expression", Text(), f"A formula of {of}, in SI.", ...),
         Key("unit", UnitName(unit), "Unit of its values; the SI unit if missing."),
-        Key("constants", Named(AnyQuantity(), "constants"), "Numbers with names, in it by SI."),
+        Key("constants", Named(any_quantity, "constants"), "Numbers with names, in it by SI."),
     )
 
 

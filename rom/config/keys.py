@@ -1,12 +1,14 @@
 """The keys of a file as a table: validation, error messages and documentation follow from it."""
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
+from functools import partial
+from operator import itemgetter
 from pathlib import Path
-from typing import Any, NoReturn, Protocol
+from typing import Any, ClassVar, NoReturn, Protocol
 
 from rom.arguments import Quantity, Whole, shortened
 from rom.config.document import Document, KeyPath, Values
@@ -121,6 +123,19 @@ Kind = Written | Quantity | Whole
 
 
 @dataclass(frozen=True, slots=True)
+class Plain:
+    """A value that one function reads."""
+
+    summary: str
+    read: Callable[[object, Place], Any]
+
+
+def written(summary: str) -> Callable[[Callable[[object, Place], Any]], Plain]:
+    """Make a kind, with words for the documentation, of the function that reads its values."""
+    return partial(Plain, summary)
+
+
+@dataclass(frozen=True, slots=True)
 class Flag:
     """true or false, or a word that says more than true."""
 
@@ -161,55 +176,35 @@ class Text:
         return value
 
 
-@dataclass(frozen=True, slots=True)
-class Words:
+@written("text, or list of texts")
+def words(value: object, place: Place) -> tuple[str, ...]:
     """A text or a list of texts."""
-
-    summary: str = "text, or list of texts"
-
-    def read(self, value: object, place: Place) -> tuple[str, ...]:
-        """The texts."""
-        values = value if isinstance(value, list) else [value]
-        return tuple(Text().read(item, place) for item in values)
+    values = value if isinstance(value, list) else [value]
+    return tuple(Text().read(item, place) for item in values)
 
 
-@dataclass(frozen=True, slots=True)
-class FilePath:
+@written("file")
+def file_path(value: object, place: Place) -> Path:
     """A file, relative to the folder of the document."""
-
-    summary: str = "file"
-
-    def read(self, value: object, place: Place) -> Path:
-        """The path."""
-        return place.document.path.parent / Text().read(value, place)
+    return place.document.path.parent / Text().read(value, place)
 
 
-@dataclass(frozen=True, slots=True)
-class OutputPath:
+@written("file")
+def output_path(value: object, place: Place) -> Path:
     """A file that is written, in the folder of the document or one below it."""
-
-    summary: str = "file"
-
-    def read(self, value: object, place: Place) -> Path:
-        """The path."""
-        path, folder = FilePath().read(value, place), place.document.path.parent
-        if not path.resolve().is_relative_to(folder.resolve()):
-            outside = f" leads out of the folder of its file, {folder.resolve()}"
-            place.refuse(value, f"{outside}; -o on the command line may name any place")
-        return path
+    path, folder = Path(file_path.read(value, place)), place.document.path.parent
+    if not path.resolve().is_relative_to(folder.resolve()):
+        outside = f" leads out of the folder of its file, {folder.resolve()}"
+        place.refuse(value, f"{outside}; -o on the command line may name any place")
+    return path
 
 
-@dataclass(frozen=True, slots=True)
-class Anything:
+@written("number or text")
+def anything(value: object, place: Place) -> object:
     """Left to whoever uses it."""
-
-    summary: str
-
-    def read(self, value: object, place: Place) -> object:
-        """The value as it is."""
-        if isinstance(value, int | float | str | list | dict):
-            return value
-        place.refuse(value, f" must be a {self.summary}")
+    if isinstance(value, int | float | str | list | dict):
+        return value
+    place.refuse(value, " must be a number or text")
 
 
 @dataclass(frozen=True, slots=True)
@@ -228,11 +223,7 @@ class Table:
 
     about: str  # one sentence
     keys: tuple[Key, ...]
-
-    @property
-    def summary(self) -> str:
-        """Called a table."""
-        return "table"
+    summary: ClassVar[str] = "table"
 
     def read(self, value: object, place: Place) -> Values:
         """Values by key: those given, and defaults that are values."""
@@ -279,11 +270,11 @@ class Named:
         found: Values = {}
         for name, item in value.items():
             try:
-                check_text(name, self.what)
+                with place.told():
+                    check_text(name, self.what)
+                found[name] = read_value(self.kind, item, place.at(name))
             except ConfigError as error:
-                place.mistakes.append(place.error(f"{place.name}: {error.message}", error.hint))
-            else:
-                collect(found, name, self.kind, item, place)
+                place.mistakes.append(error)
         return found
 
 
@@ -371,12 +362,9 @@ def raise_mistakes(place: Place) -> None:
     if found:
         count, found = len(found), found[:MOST_TOLD]
         file = str(place.document.path)
-        by_line = sorted(
-            ((int("0" + e.where.removeprefix(file).strip(":")), e) for e in found),
-            key=lambda pair: pair[0],
-        )
+        numbered = ((int("0" + e.where.removeprefix(file).strip(":")), e) for e in found)
+        by_line = sorted(numbered, key=itemgetter(0))
         messages = [f"line {line}: {e.message}" if line else e.message for line, e in by_line]
-        hint = by_line[0][1].hint
         more = f" And {count - len(found)} more." if count > len(found) else ""
-        where = by_line[0][1].where
-        raise ConfigError(f"{count} mistakes. {' '.join(messages)}{more}", where=where, hint=hint)
+        text, first = f"{count} mistakes. {' '.join(messages)}{more}", by_line[0][1]
+        raise ConfigError(text, where=first.where, hint=first.hint)

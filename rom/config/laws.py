@@ -28,10 +28,7 @@ Function = Callable[[Any], Any]
 
 @dataclass(frozen=True, slots=True)
 class Law:
-    """A function of time with its first and second derivative; each takes numbers and arrays.
-
-    Those of a function in Python are not known.
-    """
+    """A function of time of numbers or arrays, with its derivatives; those in Python have none."""
 
     value: Function
     rate: Function | None

@@ -62,12 +62,9 @@ class MechanismFile(Described):
         progress: bool = False,
         keep: "Keeping | None" = None,
     ) -> "Solution":
-        """Move it as ``[simulation]`` says.
+        """Move it as ``[simulation]`` says, or what was made of it already.
 
-        Args:
-            made: the mechanism, if it has been built already.
-            progress: report on stderr.
-            keep: folder that is written while the run lasts.
+        Progress is told on stderr; a folder to keep is written while the run lasts.
         """
         from rom.mbs.integrate.simulation import simulate
 
@@ -76,7 +73,6 @@ class MechanismFile(Described):
             return simulate(made, progress=progress, keep=keep, **self.values["simulation"])
 
     def _entries(self, *, bodies: bool) -> list[tuple[str, str, Values]]:
-        """Section, name and values of all sections of bodies, or of all others."""
         some = [name for name, section in sections().items() if section.bodies is bodies]
         return [(s, name, values) for s in some for name, values in self.values[s].items()]
 
@@ -88,7 +84,6 @@ class MechanismFile(Described):
         return [*joints, *gears, *(entry for entry in entries if entry[0] != "joints")]
 
     def _connect(self, made: "Mechanism", section: str, name: str, values: Values) -> None:
-        """Call the method of the mechanism with what the entry says."""
         place = Place(self.document, (section, name))
         markers = [marker for key in MARKER_KEYS for marker in _markers(values.pop(key, []))]
         ends: list[Any] = [self._marker(made, marker) for marker in markers]
@@ -125,14 +120,11 @@ class MechanismFile(Described):
 
     def _marker(self, made: "Mechanism", marker: tuple[str, Any]) -> Any:
         body, where = marker
-        if body == GROUND:
-            points = self.values["ground"]
-            return made.ground.marker(points[where] if isinstance(where, str) else where)
-        return (
-            made.marker(f"{body}.{where}")
-            if isinstance(where, str)
-            else made.part(body).marker(where)
-        )
+        if body == GROUND and isinstance(where, str):
+            where = self.values["ground"][where]
+        if isinstance(where, str):
+            return made.marker(f"{body}.{where}")
+        return made.part(body).marker(where)
 
     def _refuse_unknown_markers(self, made: "Mechanism") -> None:
         """All of them at once, in whatever joint or force they stand."""
@@ -148,25 +140,23 @@ class MechanismFile(Described):
         body, where = marker
         names: Values = {GROUND: self.values["ground"]}
         names |= {key: made.parts[key].names for key in self.values["bodies"]}
-        for key, rod in made.nonlinear.items():  # its ends, and all frames by number
-            names[key] = [*rod.body.places, *map(str, range(len(rod.parts)))]
+        for key, one in made.nonlinear.items():  # its ends, and all frames by number
+            names[key] = [*one.body.places, *map(str, range(len(one.parts)))]
         if body not in names:
             place.mistakes.append(place.error(f"there is no body {body!r}.", nearest(body, names)))
             return
+        rod = made.nonlinear.get(body)
         if isinstance(where, str) and where not in names[body]:
             what = "the ground has no point" if body == GROUND else f"body {body!r} has no marker"
-            known = (
-                list(made.nonlinear[body].body.places) if body in made.nonlinear else names[body]
-            )
+            known = names[body] if rod is None else rod.body.places
             place.mistakes.append(place.error(f"{what} {where!r}.", nearest(where, known)))
-        elif not isinstance(where, str) and body in made.nonlinear:
+        elif not isinstance(where, str) and rod is not None:
             frames = f'"{body}.start", "{body}.end" or "{body}.3" for its frame 3'
             what = f"rod {body!r} has no points of its own."
             place.mistakes.append(place.error(what, f"Write {frames}."))
 
 
 def _markers(found: Any) -> list[Any]:
-    """One marker or several of an entry, as a list."""
     return [found] if isinstance(found, tuple) else list(found)
 
 

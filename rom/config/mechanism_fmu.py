@@ -133,7 +133,6 @@ def _bodies(
 
 
 def _numbers(part: Part) -> Values:
-    """A rigid body by its numbers, in SI."""
     vectors = {
         "inertia": np.trace(part.second) * np.eye(3) - part.second,
         "at": part.at,

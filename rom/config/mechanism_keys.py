@@ -11,7 +11,6 @@ from rom.config.declared import Declared
 from rom.config.expressions import FormulaTable, formula_keys, formula_kind
 from rom.config.keys import (
     Either,
-    FilePath,
     Flag,
     Key,
     Kind,
@@ -20,8 +19,10 @@ from rom.config.keys import (
     Table,
     Text,
     Variants,
-    Words,
+    file_path,
     read_value,
+    words,
+    written,
 )
 from rom.config.laws import ByCoordinate, law_kind
 from rom.config.python_files import PYTHON_KEYS
@@ -31,26 +32,19 @@ from rom.fields import find, names
 POINT, DIRECTION = Quantity("m", ((3,),)), Quantity("1", ((3,),))
 
 
-@dataclass(frozen=True, slots=True)
-class MarkerName:
-    """A marker: "body.marker", or a point of a rigid body or the ground."""
-
-    summary: str = (
-        '"body.marker", or { body = [x, y, z] } for a point of the ground or a rigid body'
+@written('"body.marker", or { body = [x, y, z] } for a point of the ground or a rigid body')
+def marker_name(value: object, place: Place) -> tuple[str, object]:
+    """Name of the body, and name or coordinates of the marker."""
+    if isinstance(value, Mapping) and len(value) == 1:
+        ((body, point),) = value.items()
+        return body, read_value(POINT, point, place.at(body))
+    if isinstance(value, str) and "." in value.strip("."):
+        body, _, marker = value.partition(".")
+        return body, marker
+    raise place.error(
+        f"{place.name} = {shortened(value)} is no marker.",
+        'Write "body.marker", or { ground = [x, y, z] }.',
     )
-
-    def read(self, value: object, place: Place) -> tuple[str, object]:
-        """Name of the body, and name or coordinates of the marker."""
-        if isinstance(value, Mapping) and len(value) == 1:
-            ((body, point),) = value.items()
-            return body, read_value(POINT, point, place.at(body))
-        if isinstance(value, str) and "." in value.strip("."):
-            body, _, marker = value.partition(".")
-            return body, marker
-        raise place.error(
-            f"{place.name} = {shortened(value)} is no marker.",
-            'Write "body.marker", or { ground = [x, y, z] }.',
-        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +65,7 @@ class Markers:
             place.refuse(
                 value, f": {'two markers are' if self.two else 'a list of markers is'} needed"
             )
-        return [MarkerName().read(item, place) for item in value]
+        return [marker_name.read(item, place) for item in value]
 
 
 ANGLE = Key("angle", Quantity("rad"), "Angle, right-handed.", ...)
@@ -85,9 +79,9 @@ RIGID = Declared(
 )
 FROM_FILE = Declared(
     "add_flexible",
-    Key("file", FilePath(), "A body file `.rom.npz`, or a component file `.toml`.", ...),
+    Key("file", file_path, "A body file `.rom.npz`, or a component file `.toml`.", ...),
     Key("rigid", Flag(), "Take mass, inertia and interfaces of it only.", False),
-    Key("reference", Words(), "Another floating frame, see the component file."),
+    Key("reference", words, "Another floating frame, see the component file."),
     ORIENTATION,
     about="A body from a file; its frame is that of its geometry.",
 )
@@ -123,13 +117,13 @@ ON_MARKERS = "sphere_on_plane disc_on_plane sphere_on_sphere sphere_on_cylinder 
 CONTACTS = {kind: Declared(f"{kind} {IMPACT}", BETWEEN) for kind in ON_MARKERS.split()} | {
     kind: Declared(
         f"{kind} {IMPACT}",
-        Key("marker", MarkerName(), "Where the other surface is.", ...),
+        Key("marker", marker_name, "Where the other surface is.", ...),
         FLEXIBLE,
         WHERE,
     )
     for kind in ("surface_on_plane", "surface_on_sphere", "surface_on_cylinder")
 }
-MARKER = Key("marker", MarkerName(), "Where it acts.", ...)
+MARKER = Key("marker", marker_name, "Where it acts.", ...)
 FACTOR = Key("factor", law_kind("1"), "A law that multiplies the vector; constant if missing.")
 MOTION = ("t", "x", "v")
 PRESSURE = Key("pressure", Quantity("Pa"), "Pressure.", ...)
@@ -162,7 +156,7 @@ USER_FORCE = (MANY, *PYTHON_KEYS, SAMPLED)
 LAW = (
     *USER_FORCE,
     Key("memory", Quantity("1", ((None,),)), "Numbers it remembers, at the start.", []),
-    Key("outputs", Words(), "Names of its own outputs.", ()),
+    Key("outputs", words, "Names of its own outputs.", ()),
     Key("energy", Flag(), "Whether it tells stored energy and lost power.", False),
 )
 LAWS = {
@@ -281,7 +275,7 @@ WRITTEN = (
     Key("history", Text(("csv", "h5")), FORMS, "csv"),
     Key("film", Text(("gif", "mp4", "glb", "vtkhdf")), FILMS),
     Key("picture", Flag(), "A picture of four instants.", False),
-    Key("plot", Words(), "Columns of the table to draw over time, without their unit.", ()),
+    Key("plot", words, "Columns of the table to draw over time, without their unit.", ()),
     Key("magnify", Positive("1"), "Deformations are drawn so much larger.", 1.0),
     Key("view", DIRECTION, "Direction to the eye."),
     Key("up", DIRECTION, "Upright direction."),

@@ -10,14 +10,14 @@ from typing import Any
 
 from rom.arguments import Quantity
 from rom.config.document import Document, KeyPath, Values
-from rom.config.keys import FilePath, Key, Place, Text, nearest
+from rom.config.keys import Key, Place, Text, file_path, nearest
 from rom.errors import RomError, UnsafeFileError
 from rom.io.files import check_readable
 
 Function = Callable[..., Any]  # of a file
 NUMBERS = Quantity("1", ((None,),))
 PYTHON_KEYS = (
-    Key("file", FilePath(), "Python file.", ...),
+    Key("file", file_path, "Python file.", ...),
     Key("function", Text(), "Name of a function in it.", ...),
     Key("parameters", NUMBERS, "Numbers handed to it behind its other arguments.", []),
 )

@@ -44,11 +44,7 @@ class Kind(NamedTuple):
 def write_archive(
     path: str | Path, manifest: dict[str, Any], arrays: dict[str, Array], what: str
 ) -> Path:
-    """Write a file, whole or not at all; the same content gives the same bytes.
-
-    The manifest is what a reader needs to know about the arrays, messages say ``what`` they are of.
-    An array that holds a number that is not finite is refused.
-    """
+    """Write a file, whole or not at all; messages say ``what`` the arrays are of."""
     for name, A in arrays.items():
         if not np.isfinite(A).all():
             raise QualityGateError(f"{name} of {what} must be finite; nothing was written.")
@@ -69,37 +65,28 @@ def write_archive(
 def read_archive(
     path: str | Path, kind: Kind, limit: int = MAX_BYTES
 ) -> tuple[dict[str, Any], dict[str, Array]]:
-    """Manifest and arrays of a file, its checksums compared.
-
-    One that is of another kind, or asks for more bytes of memory than the limit, is refused.
-    """
+    """Manifest and arrays of a file of a kind, within a limit of memory, its checksums compared."""
     path = check_readable(path, max(limit, MAX_FILE_BYTES))
-    with in_file(path):
-        manifest, arrays = _checked(path, kind, limit)
-        for name, A in arrays.items():
-            if manifest["sha256"][name] != digest(A):
-                raise FileFormatError(f"the array {name!r} was changed after writing.")
-    return manifest, arrays
-
-
-def _checked(path: Path, kind: Kind, limit: int) -> tuple[dict[str, Any], dict[str, Array]]:
-    """Manifest and arrays as they are."""
     try:
-        with zipfile.ZipFile(path) as archive:
+        with in_file(path), zipfile.ZipFile(path) as archive:
             refuse_hostile(archive, limit)
             manifest = _read_manifest(archive, kind)
-            names = sorted(_digests(manifest, kind))
-            there = set(archive.namelist())
-            if missing := [name for name in names if f"{name}.npy" not in there]:
+            digests, there = _digests(manifest, kind), archive.namelist()
+            if missing := [name for name in sorted(digests) if f"{name}.npy" not in there]:
                 raise FileFormatError(
                     f"the file lacks the array {named(missing)} of its manifest.",
                     hint="It may have been changed after writing; write or copy it again.",
                 )
-            return manifest, {name: _read(archive, name) for name in names}
+            arrays = {name: _read(archive, name) for name in sorted(digests)}
     except (zipfile.BadZipFile, OSError, EOFError, KeyError, RuntimeError) as e:
         cut = "It may have been cut in a transfer; write or copy it again."
-        hint = READER_ADVICE.get(path.suffix.lower(), cut)
-        raise FileFormatError(f"this is not a complete {kind.what} ({e}).", hint=hint) from e
+        hint, what = READER_ADVICE.get(path.suffix.lower(), cut), f"a complete {kind.what} ({e})"
+        raise FileFormatError(f"this is not {what}.", where=str(path), hint=hint) from e
+    for name, A in arrays.items():
+        if digests[name] != digest(A):
+            text = f"the array {name!r} was changed after writing."
+            raise FileFormatError(text, where=str(path))
+    return manifest, arrays
 
 
 @contextmanager

@@ -1,5 +1,6 @@
 """Files are written whole or not at all, and looked at before they are read."""
 
+import math
 import os
 import secrets
 import shutil
@@ -18,12 +19,7 @@ from rom.readable import check_readable as check_readable
 
 
 def write_whole(path: str | Path, content: bytes | Callable[[IO[bytes]], object]) -> Path:
-    """Write a file through a temporary one in the same folder, then rename; its path.
-
-    A file of that name is replaced only by a complete new one. The content may be a function that
-    writes into the open binary file. A folder that is missing or may not be written is a
-    ConfigError, a full disk a ResourceError.
-    """
+    """Write a file whole or not at all, by bytes or a function: it replaces one of that name."""
     path = check_writable(path)
     part = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
     try:
@@ -104,6 +100,16 @@ def need(holds: object, otherwise: str) -> None:
     """Raise a ValueError, for `damaged`, in these words unless something holds."""
     if not holds:
         raise ValueError(otherwise)
+
+
+def number(text: str) -> float:
+    """A finite number, its exponent with E or D; else a ValueError, for `damaged`."""
+    try:
+        value = float(text.upper().replace("D", "E"))
+    except ValueError:
+        value = math.nan
+    need(math.isfinite(value), f"{text.strip()[:40]!r} is no finite number")
+    return value
 
 
 def check_writable(path: str | Path) -> Path:

@@ -17,10 +17,7 @@ from rom.names import csv_cell, offered
 
 AXIS_LETTERS = ("x", "y", "z")
 QUATERNION_PARTS = ("p0", "p1", "p2", "p3")
-DIMENSION_NAMES = {
-    AXIS_LETTERS: "axis",
-    QUATERNION_PARTS: "quaternion",
-}  # of data sets, by their coordinates
+DIMENSION_NAMES = {AXIS_LETTERS: "axis", QUATERNION_PARTS: "quaternion"}  # of data sets
 ENERGIES = ("kinetic", "strain", "potential", "drives", "forces", "damping", "total")
 
 
@@ -66,7 +63,6 @@ def write_history(solution: AnySolution, path: str | Path, *, every: int = 1) ->
 
 
 def _every(solution: Any, every: int) -> tuple[Array, tuple[Channel, ...]]:
-    """Times and channels of every so many instants."""
     whole("every", every, 1)
     rows = slice(None, None, every)
     t = solution.t[rows]
@@ -114,10 +110,8 @@ def channels(solution: Any) -> Iterator[Channel]:
         if known is None or known.coordinate is None:
             continue
         motion = solution.joint(joint)
-        for what, row, unit in (
-            ("angle", known.turn, "rad"),
-            ("displacement", known.displacement, "m"),
-        ):
+        angle, way = ("angle", known.turn, "rad"), ("displacement", known.displacement, "m")
+        for what, row, unit in (angle, way):
             if row is not None:
                 yield Channel((*place, what), unit, ("",), getattr(motion, what))
                 rate = getattr(motion, f"{what}_rate")
@@ -134,14 +128,7 @@ def channels(solution: Any) -> Iterator[Channel]:
 
 
 def asked(solution: Any, names: Sequence[str]) -> list[Channel]:
-    """The quantities of a motion that names ask for, as "slider", "crank pin" or "pivot angle".
-
-    A body alone has its position and velocity, anything else all that it has; without any name the
-    positions of all bodies.
-
-    Raises:
-        ConfigError: listing what there is, for a name of nothing.
-    """
+    """The quantities of a motion that names ask for, as "slider", "crank pin" or "pivot angle"."""
     known, chosen = list(channels(solution)), list[Channel]()
     words = [" ".join(c.path[1:]).replace(" markers ", " ") for c in known]
     for name in names or [f"{body} position" for body in solution.mechanism.parts]:
@@ -176,14 +163,11 @@ def _of_body(solution: Any, name: str, part: Any) -> Iterator[Channel]:
 
 
 def _table(solution: Any, t: Array, found: tuple[Channel, ...]) -> bytes:
-    """Comma separated, one line of names with units in brackets, then numbers of 17 digits."""
-    return table(
-        ["t [s]", *_head(found)], np.column_stack([t, *(c.values for c in found)]), "%.17g"
-    )
+    columns = np.column_stack([t, *(c.values for c in found)])
+    return table(["t [s]", *_head(found)], columns, "%.17g")
 
 
 def _head(found: tuple[Channel, ...]) -> list[str]:
-    """Names of all columns, units in brackets."""
     return [f"{name} [{c.unit}]" for c in found for name in c.names]
 
 

@@ -64,7 +64,6 @@ def read(
 
 
 def _check_numbers(manifest: dict[str, Any], arrays: dict[str, Array]) -> None:
-    """Known units, and numbers whose squares are finite."""
     if manifest.get("units") not in list(SYSTEMS):
         raise FileFormatError(
             f"the unit system {manifest.get('units')!r} is unknown; known: {sorted(SYSTEMS)}."
@@ -250,7 +249,6 @@ def _verify(body: FlexibleBody) -> None:
 
 
 def _misfits(body: FlexibleBody, r: int) -> Iterator[str]:
-    """What does not belong to a body of r elastic coordinates."""
     shapes = {
         "first_moment": (3,), "inertia": (3, 3), "S": (3, r), "Ibar_kl": (3, 3, r),
         "S_kl": (3, 3, r, r), "K": (r, r), "D": (r, r), "omega": (r,),

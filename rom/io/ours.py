@@ -54,8 +54,7 @@ def check_replaceable(
 ) -> Path:
     """The path, if a file of that name can be written and none of somebody else's is lost.
 
-    To be asked before a long computation. What will be written is of a kind, a key of `FILE_SIGNS`
-    or a format of `rom.export`; inputs are never written, whatever else is there if forced.
+    Asked before a long computation. Kinds are keys of `FILE_SIGNS` or formats of `rom.export`.
     """
     path = check_writable(path)
     for source in inputs:
@@ -91,20 +90,17 @@ def is_ours(path: Path, kind: str) -> bool:
 
 @contextmanager
 def claimed(folder: str | Path) -> Iterator[None]:
-    """Keep other runs out of a folder, which is made if it is missing.
+    """Keep other runs out of a folder, which is made if it is missing and goes if it stays empty.
 
-    The lock is one of the system and ends with the process that holds it, however that ends; a
-    folder that was made and stayed empty is removed. A file system without locks keeps nothing out.
-
-    Raises:
-        ConfigError: if it is no folder, or may not be made or written.
-        ResourceError: naming the process that has claimed it.
+    The lock is one of the system and ends with the process that holds it, however that ends. A file
+    system without locks keeps nothing out.
     """
     folder = Path(folder)
-    kind = _kind(folder)
-    if kind is not None and not stat.S_ISDIR(kind):
+    mode = 0
+    with suppress(OSError):  # asked once, as other runs make and remove it
+        mode = folder.stat().st_mode
+    if mode and not stat.S_ISDIR(mode):
         raise ConfigError(f"{folder} is a file; a folder is needed.")
-    missing = kind is None
     try:
         handle = _locked(folder)
     except OSError as error:
@@ -118,17 +114,9 @@ def claimed(folder: str | Path) -> Iterator[None]:
         if handle is not None:
             (folder / LOCK_NAME).unlink(missing_ok=True)
             os.close(handle)
-        if missing:
+        if not mode:
             with suppress(OSError):  # something is in it, or another run has taken it
                 folder.rmdir()
-
-
-def _kind(folder: Path) -> int | None:
-    """Mode of what has this name, asked once as other runs make and remove it; None if none."""
-    try:
-        return folder.stat().st_mode
-    except OSError:
-        return None
 
 
 def _locked(folder: Path) -> int | None:

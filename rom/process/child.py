@@ -79,11 +79,7 @@ def run(
     variables: Mapping[str, str] | None = None,
     given: bytes | None = None,
 ) -> Ended:
-    """Run a command to its end; whatever interrupts this process ends the child with all its own.
-
-    In a folder, here by default, within limits, with variables beside those of this process, and
-    with bytes given to its standard input, which is empty without.
-    """
+    """Run a command to its end; whatever interrupts this process ends it with all its own."""
     limits = limits or Limits()
     with terminable():
         fed = given is not None
@@ -99,10 +95,7 @@ def start(
     variables: Mapping[str, str] | None = None,
     fed: bool = False,
 ) -> Child:
-    """Start a command beside this process; arguments as in `run`, `finish` waits for it.
-
-    With ``fed`` its standard input is a pipe for what `finish` is given.
-    """
+    """Start a command as `run` does; with ``fed`` it reads what `finish` is given."""
     limits = limits or Limits()
     entry = [sys.executable, "-P", str(ENTRY_FILE), str(os.getpid())]
     entry += [str(limits.processor), str(limits.memory)]
@@ -237,11 +230,7 @@ def _remove_abandoned(path: Path) -> None:
 
 
 def trusted(path: Path) -> bool:
-    """Whether what lies there may be loaded as code: nobody can have written it who writes no code.
-
-    That is this user, the administrator, and whoever owns the package, whose code runs anyway; what
-    is not there is nobody's.
-    """
+    """Whether none but this user, root and the owner of the package can have written there."""
     try:
         about = path.stat()
     except OSError:

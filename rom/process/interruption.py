@@ -25,14 +25,10 @@ def _raise(number: int, frame: FrameType | None) -> None:
 
 @contextmanager
 def terminable() -> Iterator[None]:
-    """Raise `Terminated` inside when SIGTERM comes; outside, SIGTERM means what it did before.
+    """Raise `Terminated` inside when SIGTERM comes; if nobody catches it, the process ends by it.
 
-    Ctrl-C raises inside too where a library has let it end the process at once, as gmsh does when
-    it is imported.
-
-    A `Terminated` that leaves the outermost block ends the process by SIGTERM, as whoever sent it
-    expects. Where SIGTERM has a handler already, or in another thread than the main one, nothing
-    is changed. May be nested.
+    Ctrl-C raises inside too where a library has let it end the process at once, as gmsh does. Where
+    SIGTERM has a handler already, or in another thread than the main one, nothing is changed.
     """
     main = threading.current_thread() is threading.main_thread()
     if not main or signal.getsignal(signal.SIGTERM) is not signal.SIG_DFL:
@@ -56,10 +52,7 @@ def terminable() -> Iterator[None]:
 
 @contextmanager
 def uninterrupted() -> Iterator[None]:
-    """Do what is inside to its end; Ctrl-C and SIGTERM that come meanwhile count behind it.
-
-    In another thread than the main one, which no signal interrupts, nothing is changed.
-    """
+    """Do what is inside to its end; Ctrl-C and SIGTERM that come meanwhile count behind it."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

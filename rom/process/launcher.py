@@ -35,10 +35,7 @@ def ranks() -> tuple[int, int]:
 
 
 def share_the_machine() -> None:
-    """Under mpirun give this rank one thread, and let others run while it waits for messages.
-
-    What the user has chosen in a variable stays.
-    """
+    """Under mpirun take one thread, and let others run while waiting, unless variables say more."""
     if ranks()[1] == 1:
         return
     if not any(name in os.environ for name in (THREADS_VARIABLE, *OTHER_VARIABLES)):

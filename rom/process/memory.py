@@ -25,11 +25,7 @@ def total_bytes() -> int:
 
 
 def free_bytes() -> float:
-    """Memory this process may still take [bytes].
-
-    The least of what the machine has free, what its control groups leave, and what its own limit
-    on address space leaves.
-    """
+    """Memory this process may still take [bytes]."""
     return min(machine_free_bytes(), *map(group_bytes, _groups()), address_bytes())
 
 
@@ -51,7 +47,6 @@ def mapped_files() -> list[str]:
 
 
 def _lines(file: str) -> list[str]:
-    """Of a file of the system; none where it does not tell."""
     try:
         return Path(file).read_text().splitlines()
     except OSError:

@@ -11,19 +11,16 @@ from rom.process.child import Limits, run
 
 PROGRAM_NAME = "mpirun"
 OPEN_MPI, MPICH_NAME = "Open MPI", "MPICH"
-VERSIONS = (  # what they say of themselves
-    (OPEN_MPI, re.compile(r"\(Open MPI\) (\S+)")),
-    (MPICH_NAME, re.compile(r"HYDRA build details:\s+Version:\s+(\S+)")),
-)
-KINDS = (OPEN_MPI, MPICH_NAME)
+VERSIONS = {  # what they say of themselves
+    OPEN_MPI: re.compile(r"\(Open MPI\) (\S+)"),
+    MPICH_NAME: re.compile(r"HYDRA build details:\s+Version:\s+(\S+)"),
+}
+KINDS = tuple(VERSIONS)
 TIME_LIMIT = 20.0  # [s] for saying a version
 
 
 def found() -> str:
-    """Path of the launcher beside this Python, where pip and conda put it, or of the system.
-
-    Empty where there is none.
-    """
+    """Path of the launcher beside this Python, where pip puts it, or of the system, or nothing."""
     beside = shutil.which(PROGRAM_NAME, path=str(Path(sys.executable).parent))
     return beside or shutil.which(PROGRAM_NAME) or ""
 
@@ -35,8 +32,7 @@ def version(program: str) -> str:
         ended = run([program, "--version"], limits=Limits(seconds=TIME_LIMIT))
     except OSError:
         return ""
-    output = ended.out
-    named = ((name, pattern.search(output)) for name, pattern in VERSIONS)
+    named = ((name, pattern.search(ended.out)) for name, pattern in VERSIONS.items())
     return next((f"{name} {match[1]}" for name, match in named if match), "")
 
 

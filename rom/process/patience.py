@@ -85,10 +85,7 @@ class Turns:
         self._held: set[Path] = set()
 
     def take(self, path: Path, *, wait: bool = True) -> bool:
-        """Take the turn to make a file, or wait until whoever makes it has done so or died.
-
-        Whether it is ours; False where there are no locks. Without waiting it is only asked for.
-        """
+        """Whether the turn to make a file is ours, at once or after whoever has it."""
         if not self._lock(path, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB)):
             return False
         self._held.add(path)

@@ -54,19 +54,13 @@ def line(text: str) -> None:
 
 
 def looked_for() -> bool:
-    """Whether a line of progress is seen and wanted, where no argument says so.
-
-    On the first rank, where stderr is a terminal; not with ``-q`` or the logger "rom" at errors.
-    """
+    """Whether progress is seen and wanted: on the first rank, on a terminal, without ``-q``."""
     return not ranks()[0] and sys.stderr.isatty() and log.isEnabledFor(logging.WARNING)
 
 
 @contextmanager
 def stages(total: int, begun: int = 0, *, long: bool = True) -> Iterator[Callable[[str], None]]:
-    """Around work in stages, begun of which had a line before; silent where nobody looks.
-
-    Gives what takes the name of a stage at its begin.
-    """
+    """Around work in stages, begun of which had a line before; gives what takes their names."""
     if not (long and looked_for()):
         yield lambda label: None
         return

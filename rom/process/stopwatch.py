@@ -67,10 +67,7 @@ class Stopwatch:
         return sum(sum(pieces.values()) for pieces in self.stages.values())
 
     def table(self) -> dict[str, dict[str, float]]:
-        """{stage: {"seconds", "MB", "ranks", pieces, their numbers, notes}}, as provenance has it.
-
-        Seconds and memory are those of one rank.
-        """
+        """{stage: {"seconds", "MB", "ranks", pieces, numbers, notes}} of one rank."""
         return {
             stage: {
                 "seconds": round(sum(pieces.values()), 4),
@@ -125,14 +122,3 @@ def note(name: str, value: float) -> None:
     watch = _running.get()
     if watch is not None:
         watch.note(name, value)
-
-
-def stage_rows(stages: dict[str, dict[str, float]]) -> Iterator[tuple[str, float, str]]:
-    """Quantity, value and unit of each number that stages have, seconds and flops."""
-    for stage, table in stages.items():
-        yield f"{stage}, all of it", table["seconds"], "s"
-        for name in (FACTORISATION_PIECE, SOLUTION_PIECE, SEARCH_PIECE):
-            if name in table:
-                yield f"{stage}, {table[f'number of {name}']:g} {name}", table[name], "s"
-        if FLOPS_NOTE in table:
-            yield f"{stage}, {FLOPS_NOTE}", table[FLOPS_NOTE] / 1e9, "Gflop"

@@ -469,17 +469,6 @@ def test_a_body_of_large_deflection_keeps_its_frame_and_its_programs(certified, 
     refuses(ConfigError, "large deflection", rom.export, body, tmp_path / "beam.SID_FEM")
 
 
-def test_a_cantilever_in_a_mechanism_bends_as_it_does_alone(certified):
-    body, _, loads = certified
-    force = np.array([0.0, *loads[1:3]]) / np.sqrt(2)
-    share = np.linspace(0.25, 1, 4)
-    (*_, q) = follow(body.quartic, np.outer(share, force @ body.marker("tip").translation))
-    mech, part = cantilever(body)
-    mech.force("load", part.marker("tip"), force)
-    found = rom.equilibrium(mech).q[7:]
-    assert_allclose(found, q, rtol=0, atol=1e-7 * np.abs(q).max())
-
-
 @pytest.mark.mpi
 @pytest.mark.long
 def test_energy_and_body_are_the_same_on_any_number_of_processes(tmp_path):

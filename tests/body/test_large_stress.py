@@ -258,7 +258,7 @@ def test_a_mechanism_tells_it_at_each_instant_and_a_file_shows_it(bent, tmp_path
     still = rom.snapshot(mech, state)
     expected = body.stress.field(state.q[7:])
     assert_allclose(still.stress("beam", 0), expected)
-    assert_allclose(expected, body.stress.field(q), atol=1e-4 * np.abs(expected).max())
+    assert_allclose(state.q[7:], q, rtol=0, atol=1e-7 * np.abs(q).max())  # as alone
     rom.io.write_stress_history(still, "beam", tmp_path / "beam.pvd")
     rom.io.write_stress(body, state.q[7:], tmp_path / "beam.vtu")
     series = (tmp_path / "beam" / "beam_000000.vtu").read_text()

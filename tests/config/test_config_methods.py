@@ -153,9 +153,8 @@ def test_an_entry_calls_the_method(method, soft, tmp_path, monkeypatch):
 def made_of(soft, tmp_path, more):
     if not (tmp_path / "soft.rom.npz").exists():
         (tmp_path / "soft.rom.npz").symlink_to(soft)
-    (tmp_path / "m.toml").write_text(
-        BASE[: BASE.index("[joints")] + more + "[simulation]\nt_end=1\n"
-    )
+    text = BASE[: BASE.index("[joints")] + more + "[simulation]\nt_end=1\n"
+    (tmp_path / "m.toml").write_text(text)
     return rom.read_mechanism(tmp_path / "m.toml").mechanism()
 
 

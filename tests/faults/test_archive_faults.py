@@ -1,12 +1,10 @@
 """Body, family and state files with right checksums and wrong content: typed errors only."""
 
-import json
-
 import numpy as np
 import pytest
 
 import rom
-from cases.files.damage import ARCHIVES, outcome
+from cases.files.damage import ARCHIVES, outcome, unpacked
 from rom.io.archive import write_archive
 
 WRONG = (None, -1, 1e308, "x", [1], {"x": 1}, True)
@@ -18,11 +16,7 @@ def file(request, tmp_path_factory):
     """(path, manifest, arrays, reader)."""
     make, read = ARCHIVES[request.param]
     path = make(tmp_path_factory.mktemp("files"))
-    with np.load(path) as found:
-        arrays = {name: found[name] for name in found.files}
-    manifest = json.loads(arrays.pop("manifest").tobytes())
-    del manifest["sha256"]
-    return path, manifest, arrays, read
+    return path, *unpacked(path), read
 
 
 def leaves(tree, place=()):

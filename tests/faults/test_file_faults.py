@@ -11,7 +11,7 @@ from scipy.sparse import random as random_matrix
 
 import rom
 from cases.files.damage import ARCHIVES, damaged, outcome
-from cases.files.decks import BY_HAND, DECK, IM, RE, X, dataset, header
+from cases.files.decks import BY_HAND, DECK, IM, RE, X, binary, dataset
 from cases.files.toml_files import ALL, CRANK, PENDULUM, SOLID
 from cases.mbs.mechanisms import random_body
 from cases.paths import TESTS
@@ -20,15 +20,8 @@ from rom.io.matrices.node_files import read_node_sets, read_nodes
 
 HERE = TESTS / "reference" / "foreign"
 MUTANTS = 60
+UNIVERSAL = dataset(5, 0, [X, RE, IM]) + dataset(6, 1, [RE, IM])
 pytestmark = pytest.mark.filterwarnings("ignore::rom.errors.RomWarning")
-
-
-def universal(binary):
-    if not binary:
-        return (dataset(5, 0, [X, RE, IM]) + dataset(6, 1, [RE, IM])).encode()
-    packed = np.column_stack([RE, IM]).astype("<f4").tobytes()
-    head = f"    58b{1:6d}{2:6d}{11:12d}{len(packed):12d}" + " 0 0 0 0"
-    return f"{-1:6d}\n{head}\n{header(5, 5, 1)}".encode() + packed + b"\n    -1\n"
 
 
 def typed(text):
@@ -81,11 +74,11 @@ TEXTS = {  # case: (file name, its content, reader)
     "user element of a body": ("x.inp", exported("abaqus"), rom.io.read_user_element),
     "openfast": ("x.dat", exported("openfast", ["root"]), rom.io.read_openfast),
     "openfast-4": ("x.dat", exported("openfast-4", ["root"]), rom.io.read_openfast),
-    "universal": ("x.unv", lambda folder: universal(False), rom.io.read_universal),
+    "universal": ("x.unv", typed(UNIVERSAL), rom.io.read_universal),
     "test": ("x.unv", whole("sdynpy_test.unv"), partial(rom.io.read_responses, averages=9)),
     "test binary": ("x.uff", whole("pyuff_test.uff"), partial(rom.io.read_responses, averages=9)),
     "modes": ("x.unv", whole("sdynpy_test.unv"), rom.io.read_modes),
-    "universal binary": ("x.uff", lambda folder: universal(True), rom.io.read_universal),
+    "universal binary": ("x.uff", lambda folder: binary(5, 1), rom.io.read_universal),
     "universal of another program": ("x.uff", whole("pyuff_binary.uff"), rom.io.read_universal),
     "nodes": ("x.inp", typed(DECK), read_nodes),
     "sets": ("x.inp", typed(DECK), lambda path: read_node_sets(path, ("root", "tip"))),

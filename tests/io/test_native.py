@@ -10,6 +10,7 @@ import pytest
 from numpy.testing import assert_array_equal
 
 import rom
+from cases.files.damage import unpacked
 from cases.refusals import refuses
 from cases.solid import block
 from rom.errors import ConfigError, FileFormatError, QualityGateError, RomError, UnsafeFileError
@@ -145,11 +146,7 @@ def good(tmp_path_factory):
     kinds = {"root": "rbe2", "tip": "rbe3"}
     body = rom.reduce(model, method=rom.CraigBampton(16), interfaces=kinds, reference="root")
     assert rom.check(body).ok
-    with np.load(rom.save(body, tmp_path_factory.mktemp("good") / "x.npz")) as found:
-        arrays = {name: found[name] for name in found.files}
-    manifest = json.loads(arrays.pop("manifest").tobytes())
-    del manifest["sha256"]
-    return manifest, arrays
+    return unpacked(rom.save(body, tmp_path_factory.mktemp("good") / "x.npz"))
 
 
 WORDS = ("version", "schema", "units", "name", "reference", "labels", "surface", "provenance",

@@ -173,7 +173,7 @@ test_what_openfast_would_misread_is_named = changed(
     (DIAGONAL, "", "line 14: .*row 6 of 6 has 2 words"),
     (DIAGONAL, "2.5 0 1 0 0 0\n", QualityGateError, "M is not symmetric"),
     (DIAGONAL, "0 0 0 0 0 0\n", QualityGateError, "mass must be positive"),
-    (DIAGONAL, "2,5 0 0 0 0 0\n", "line 9: .*'2,5' is not a finite"),
+    (DIAGONAL, "2,5 0 0 0 0 0\n", "line 9: .*'2,5' is no finite"),
     ("!Damping", "!Dumping", r"the blocks \['D'\] are missing"),
 )
 

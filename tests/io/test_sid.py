@@ -321,7 +321,6 @@ def test_mean_axis_bodies_have_round_off_where_nothing_stands(tmp_path):
 def test_stiffness_of_modes_is_written_as_the_diagonal_it_is(tmp_path):
     rom.export(solid.reduced(3, solid.block(), reference="root"), tmp_path / "body.SID_FEM")
     text = (tmp_path / "body.SID_FEM").read_text()
-    kinds = dict(
-        re.findall(r"\n +(\w+)\n +order [^\n]*\n(?:[^\n]*\n){4} +structure += +(\d)", text)
-    )
+    kind = r"\n +(\w+)\n +order [^\n]*\n(?:[^\n]*\n){4} +structure += +(\d)"
+    kinds = dict(re.findall(kind, text))
     assert (kinds["Ke"], kinds["Me"]) == ("1", "2")  # diagonal, symmetric

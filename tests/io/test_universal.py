@@ -1,19 +1,18 @@
 """Universal files and files for ParaView: known numbers come back, broken files are named."""
 
-import struct
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 
 import rom
-from cases.files.decks import IM, RE, X, dataset, header
+from cases.files.decks import IM, RE, X, binary, dataset
 from cases.paths import TESTS
 from cases.refusals import refuses
 from cases.solid import block, reduced
 from rom.errors import ConfigError, FileFormatError
-from rom.io.fields.universal import assemble, read_universal
+from rom.io.fields.universal import read_universal
 
 HERE = TESTS / "reference" / "foreign"
 
@@ -33,11 +32,7 @@ def test_all_eight_forms_of_numbers_are_read(kind, spacing, tmp_path):
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("kind", [5, 6])
 def test_binary_datasets_are_read_in_both_byte_orders(kind, order, tmp_path):
-    numbers = np.column_stack([RE, IM]).ravel()
-    packed = struct.pack(f"{'<>'[order - 1]}10{'fd'[kind - 5]}", *numbers)
-    head = f"    58b{order:6d}{2:6d}{11:12d}{len(packed):12d}" + " 0 0 0 0"
-    data = f"{-1:6d}\n{head}\n{header(kind, 5, 1)}".encode() + packed + b"\n    -1\n"
-    (tmp_path / "b.uff").write_bytes(data)
+    (tmp_path / "b.uff").write_bytes(binary(kind, order))
     (f,) = read_universal(tmp_path / "b.uff")
     assert_allclose(f.y, RE + 1j * IM, rtol=1e-6)
     assert_allclose(f.x, X)
@@ -65,17 +60,6 @@ def test_other_datasets_and_line_ends_do_not_disturb_accelerations_of_displaceme
     assert [f.response for f in found] == [(7, 3), (8, 1)]
     assert_allclose(found[0].y, RE + 1j * IM)
     assert_allclose(found[0].receptance(), -(RE + 1j * IM) / (2 * np.pi * X) ** 2)
-
-
-def test_functions_are_assembled_by_sensor_and_exciter(tmp_path):
-    """The exciter pushes against its direction: the sign turns."""
-    sets = [dataset(6, 1, [k * RE, IM], response=(k, -2), numerator=8) for k in (5, 9)]
-    (tmp_path / "a.unv").write_text("".join(sets))
-    functions = read_universal(tmp_path / "a.unv")
-    f, H = assemble(functions, [(9, 2), (5, 2)], [(11, 3)])
-    assert_array_equal(f, X)
-    assert_allclose(H[:, :, 0], np.column_stack([9 * RE + 1j * IM, 5 * RE + 1j * IM]))
-    refuses(ConfigError, r"\(6, 2\)", assemble, functions, [(6, 2)], [(11, 3)])
 
 
 def test_broken_files_are_named(tmp_path):

@@ -1,6 +1,6 @@
 """Stress of a body at large deflection, by the gradient of its displacement."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -45,10 +45,7 @@ class CauchyRecovery:
         return self.gradient.shape[1]
 
     def field(self, q: Array, accelerations: Array | None = None) -> Array:
-        """(p, 6) stress xx, yy, zz, yz, xz, xy [Pa] in the deformed body for coordinates q (r,).
-
-        Axes are those of its frame; no correction by accelerations is known at large deflection.
-        """
+        """(p, 6) stress xx, yy, zz, yz, xz, xy [Pa] in the deformed body, axes of its frame."""
         if accelerations is not None:
             text = "accelerations: no stress of modes left out is known at large deflection"
             raise ConfigError(f"{text}; keep as many modes as the loads excite.")
@@ -70,15 +67,6 @@ class CauchyRecovery:
     def von_mises(self, q: Array, accelerations: Array | None = None) -> Array:
         """(p,) equivalent stress [Pa]; see `field`."""
         return von_mises(self.field(q, accelerations))
-
-    def in_units(self, length: float, pressure: float, coordinate: float) -> "CauchyRecovery":
-        """In other units, whose factors are given; a coordinate is multiplied by its own."""
-        return replace(
-            self,
-            points=self.points * length,
-            gradient=self.gradient / coordinate,
-            stiffness=self.stiffness * pressure,
-        )
 
     def fits(self, r: int) -> bool:
         """Whether the arrays belong together, to r coordinates and to points that exist."""

@@ -54,10 +54,7 @@ class TurningSection:
         return np.cross(x, self.weights @ R.T).ravel()
 
     def stiffness(self, u: Array, moment: Array) -> tuple[Array, Array]:
-        """X and Y (n, 9), of which X Y^T is the derivative of the forces at a displacement [N/m].
-
-        They follow from B alone, and that is linear in u.
-        """
+        """X and Y (n, 9): X Y^T is the derivative of the forces at a displacement [N/m]."""
         B, X, Y = self.covariance(u), np.zeros((u.size, 9)), np.zeros((u.size, 9))
         for k, E in enumerate(COVARIANCE_STEP * np.eye(9).reshape(9, 3, 3)):
             change = self.force(B + E, moment) - self.force(B - E, moment)
@@ -147,7 +144,6 @@ class HeldSolid:
         return None
 
     def _moments(self, u: Array, W: Array | None) -> Iterator[tuple[TurningSection, Array]]:
-        """Each section, and the moment on it."""
         if W is None or W.size == u.size:
             return iter(())
         return zip(self.sections, W[u.size :].reshape(-1, 3), strict=True)
@@ -200,10 +196,7 @@ class HeldSolid:
     def frequencies(
         self, soft: Callable[[Array], Array] | None, *, symmetric: bool = True
     ) -> Array:
-        """(k,) lowest frequencies about the state with this softness [rad/s].
-
-        ``symmetric`` where the state bears no moments that turn.
-        """
+        """(k,) lowest frequencies [rad/s]; not symmetric under moments that turn."""
         n, held = self.M.shape[0], np.zeros(self.C.shape[0])
         if soft is None:
             return np.zeros(N_TANGENT)

@@ -73,11 +73,7 @@ ELLIPTIC_STRETCH = 3.0**-0.5
 
 @dataclass(frozen=True)
 class Bent:
-    """A reduction under way, and the range of loads by which the body is to bend far.
-
-    The basis has constraint and fixed-interface modes and the factor of K_ii; the body is seen from
-    the interface ``reference``.
-    """
+    """A reduction under way, and the range of loads by which the body is to bend far."""
 
     geometric: Geometric
     model: FEModel
@@ -136,10 +132,7 @@ class Section:
 
 
 def enriched(bent: Bent) -> Basis:
-    """The basis with the shapes that its load range asks for, seen from a reference interface.
-
-    There is a stable equilibrium everywhere within the range.
-    """
+    """The basis with the shapes of its load range, in which there are stable equilibria."""
     _refuse(bent)
     geometric, ops, basis = bent.geometric, bent.ops, bent.basis
     energy = bent.model.stresses.large_strain()
@@ -300,10 +293,7 @@ def foreseen(n: int, n_points: int) -> tuple[float, float]:
 
 
 def _refuse_collapse(geometric: Geometric, stretches: Array, counts: list[int]) -> None:
-    """Say which of the load cases compresses the material too far.
-
-    Stretches (s,) are the least ones of the states, so many on the way to each load.
-    """
+    """Say which load case compresses the material too far, by least stretches (s,) of states."""
     k = int(np.argmin(stretches))
     if stretches[k] > ELLIPTIC_STRETCH:
         return
@@ -366,8 +356,7 @@ def _states(geometric: Geometric, quartic: Quartic, shapes: Shapes) -> list[Arra
 def _turned(quartic: Quartic, shapes: Shapes, case: Array, states: Array) -> Array:
     """States (k, r) on the way to a load case, and before them that with moments that follow.
 
-    A moment as a pair of dead forces squeezes a section that has turned; what is welded to it
-    does not.
+    A moment as a pair of dead forces squeezes a section that has turned.
     """
     bent = [section for section in shapes.sections if (section.moments @ case).any()]
     if not bent:
@@ -385,9 +374,8 @@ def _turned(quartic: Quartic, shapes: Shapes, case: Array, states: Array) -> Arr
 def _warn_of_turns(geometric: Geometric, quartic: Quartic, shapes: Shapes, states: Array) -> None:
     """Say which interface turns farther than one frame carries.
 
-    Dead forces turn a section as far as its states say, by their sine. Moments of a mechanism turn
-    with it, at constant curvature as far as small ones of the same size would. Beside forces they
-    are bounds, as at the cuts of pieces, whose arms become shorter as they bend.
+    Dead forces turn a section by the sine in its states. Moments of a mechanism turn with it, as
+    far as small ones would; beside forces, whose arms become shorter, they are bounds.
     """
     N = free_motions(shapes.held)
     small = N @ np.linalg.solve(N.T @ quartic.K @ N, N.T @ shapes.loads)
@@ -411,9 +399,8 @@ def _small_motions(
 ) -> tuple[Array, Array]:
     """(s m, r) lowest modes about each state (s, r), (s l, r) what further loads do, of energy 1/2.
 
-    A beam that is bent in one plane needs companions of bending in the other one and of twisting
-    as well, however small these are. Without stiffness, at the load that makes it snap, a mode is
-    no larger than at rest.
+    A beam bent in one plane needs companions of bending in the other and of twisting as well.
+    Where it snaps, without stiffness, a mode is no larger than at rest.
     """
     N = free_motions(shapes.held)
     mass = N.T @ M @ N

@@ -10,7 +10,7 @@ import numpy as np
 from rom.arguments import Between, Count, Modes, finite, typed
 from rom.body.recovery import CENTRIFUGAL_LOADS, PRODUCTS, centrifugal
 from rom.eigen.supports import DIRECTIONS, Fixed, supports
-from rom.eigen.verbs import Operators, mean_motion
+from rom.eigen.verbs import Operators, mean_motion, own_points
 from rom.errors import ConfigError
 from rom.model import Array, FEModel
 
@@ -147,12 +147,9 @@ def axis_point(geometric: Geometric, model: FEModel, reference: str) -> Array:
 
 
 def nodal_forces(loads: list[Load], model: FEModel, ops: Operators, about: Array) -> Array:
-    """(n_local, l) forces of loads at their largest on the nodes of this process [N].
-
-    Operators are those of nodal dofs, with all the model carries; (3,) is a point of the axis.
-    """
-    F, nodes = np.zeros((ops.n_local, len(loads))), slice(ops.first // 3, None)
-    field = centrifugal(model.points[nodes][: ops.n_local // 3] - about)
+    """(n_local, l) nodal forces [N] of loads at their largest, (3,) about a point of the axis."""
+    F = np.zeros((ops.n_local, len(loads)))
+    field = centrifugal(own_points(ops, model.points) - about)
     for k, load in enumerate(loads):
         if not load.interface:
             F[:, k] = field[:, load.component]

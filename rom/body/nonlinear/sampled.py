@@ -93,11 +93,7 @@ class Sampled(Energy):
 def sampled_energy(
     body: Any, geometric: Geometric, energy: Any, E: Array
 ) -> tuple[Sampled, dict[str, float]]:
-    """The energy of a body of neo-Hookean material by a few elements, and how it was trained.
-
-    The body is seen from its reference, and has nodal shapes E (n, r); its finite elements are
-    those of `rom.fe.forms.large_strain`.
-    """
+    """Energy of a body of nodal shapes E (n, r) by a few elements, and how it was trained."""
     if energy.mesh.comm.size > 1:
         raise ParallelError("elements are sampled on one process only; leave mpirun out.")
     if np.any(geometric.spin):
@@ -126,9 +122,8 @@ def sampled_energy(
 def chosen(every: Sampled, cell: Index, states: Array, tol: float) -> tuple[Array, float]:
     """(cells,) weights of the elements, most of them zero, and the error of forces that is left.
 
-    Elements join one after the other, that which explains most of what is missing first, until the
-    relative error of the forces in the states (s, r) is below tol; weights of those that have
-    joined are the non-negative least squares. ``cell`` (p,) is the element of each point.
+    That which explains most of what is missing joins until the relative error in the states (s, r)
+    is below tol; weights are non-negative least squares. ``cell`` (p,) has the element of points.
     """
     starts = np.flatnonzero(np.r_[True, np.diff(cell) > 0])
     # forces on coordinates are as unlike as their stiffness: energies of all count alike

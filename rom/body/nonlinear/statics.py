@@ -44,18 +44,12 @@ def free_motions(rows: Array) -> Array:
 
 
 def follow(energy: Energy, loads: Array, held: Array | None = None) -> Array:
-    """(s, r) coordinates in equilibrium with loads (s, r) [N], one after the other from rest.
-
-    Supports let rows (h, r) of coordinates vanish. A load without stable equilibrium is refused.
-    """
+    """(s, r) equilibria with loads (s, r) [N] from rest, where rows (h, r) are held at zero."""
     return np.array([passed[-1] for passed in passages(energy, loads, held)])
 
 
 def passages(energy: Energy, loads: Array, held: Array | None = None) -> list[Array]:
-    """For each load the states (k, r) on the way to it, itself the last; see `follow`.
-
-    Where a body snaps, these are the states of its path by arc length, stable or not.
-    """
+    """For each load the states (k, r) on the way to it, by arc length if it snaps; itself last."""
     body = Held(energy, free_motions(np.zeros((0, energy.n)) if held is None else held))
     y, at, found = np.zeros(body.n), np.zeros(body.n), []
     for load in loads @ body.N:
@@ -156,11 +150,7 @@ class Stretch:
 
 @_found_beyond(0.0)
 def critical_shares(energy: Energy, load: Array, held: Array) -> Array:
-    """(k,) shares, at most one, of a load (r,) [N] at which a stiffness vanishes on the way.
-
-    In the order in which they are passed on the path by arc length, limits and bifurcations; one
-    that does not lead to the load is refused.
-    """
+    """(k,) shares, at most one, of a load (r,) [N] at which a stiffness vanishes on the way."""
     body = Held(energy, free_motions(held))
     rest = np.zeros(body.n)
     path, found = Stretch(body, rest, load @ body.N), list[float]()
@@ -177,10 +167,7 @@ def critical_shares(energy: Energy, load: Array, held: Array) -> Array:
 
 
 def newton(energy: Energy, q: Array, load: Array) -> Array | None:
-    """The minimum (r,) of energy less work of a load (r,) [N] near q (r,); None if there is none.
-
-    Newton's method with a search along each increment.
-    """
+    """The minimum (r,) of energy less work of a load (r,) [N] near q (r,), or None."""
     scale = np.sqrt(np.diag(energy.K))
     U, force, K = energy.expansion(q)
     for _ in range(MAX_ITERATIONS):

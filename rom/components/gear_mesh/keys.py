@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 from rom.arguments import Positive, Quantity
 from rom.config.declared import Declared
-from rom.config.keys import FilePath, Key
+from rom.config.keys import Key, file_path
 from rom.config.mechanism_keys import Markers, Section
 from rom.errors import ConfigError
 
@@ -22,7 +22,7 @@ GEAR_PAIR = Declared(
 )
 LINES = "[m]: a line of numbers with commas per place of the profile, empty lines between teeth."
 MAPS = [
-    Key(f"{wheel}_{kind}", FilePath(), f"Of the {which} flanks of the {wheel} {LINES}")
+    Key(f"{wheel}_{kind}", file_path, f"Of the {which} flanks of the {wheel} {LINES}")
     for kind, which in (("map", "working"), ("back_map", "back"))
     for wheel in ("pinion", "gear")
 ]

@@ -13,7 +13,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from rom import rotation
 from rom.io.files import write_whole
@@ -62,23 +61,17 @@ class _Document:
         self.lists.setdefault(kind, []).append(entry)
         return len(self.lists[kind]) - 1
 
-    def accessor(
-        self,
-        values: npt.ArrayLike,
-        *,
-        component: int = FLOAT_TYPE,
-        target: int | None = None,
-        bounds: bool = False,
-    ) -> int:
-        """Add an array (m,) or (m, c)."""
-        A = np.ascontiguousarray(values, dtype="<f4" if component == FLOAT_TYPE else "<u4")
+    def accessor(self, values: Array | Index, *, target: int = 0, bounds: bool = False) -> int:
+        """Add an array (m,) or (m, c), whole numbers as those without sign."""
+        whole = values.dtype.kind == "i"
+        A = np.ascontiguousarray(values, dtype="<u4" if whole else "<f4")
         view: Entry = {"buffer": 0, "byteOffset": len(self.data), "byteLength": A.nbytes}
         self.data += A.tobytes()
-        if target is not None:
+        if target:
             view["target"] = target
         entry: Entry = {
             "bufferView": self.put("bufferViews", view),
-            "componentType": component,
+            "componentType": UNSIGNED_TYPE if whole else FLOAT_TYPE,
             "count": len(A),
             "type": KINDS[A.shape[1] if A.ndim == 2 else 1],
         }
@@ -129,8 +122,7 @@ def _add(
 ) -> None:
     shapes, weights = _targets(body)
     points = document.accessor(body.points, target=VERTICES_TARGET, bounds=True)
-    corners = body.triangles.ravel()
-    indices = document.accessor(corners, component=UNSIGNED_TYPE, target=INDICES_TARGET)
+    indices = document.accessor(body.triangles.ravel(), target=INDICES_TARGET)
     primitive: Entry = {"attributes": {"POSITION": points}, "indices": indices}
     surface = {"baseColorFactor": [*body.colour, 1.0], "metallicFactor": 0.2}
     metal: Entry = {"pbrMetallicRoughness": surface | {"roughnessFactor": 0.6}, "doubleSided": True}

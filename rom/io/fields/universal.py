@@ -97,35 +97,6 @@ def scan(path: str | Path) -> tuple[tuple[Function, ...], dict[str, list[list[st
     return tuple(found), others
 
 
-def assemble(
-    functions: tuple[Function, ...],
-    responses: list[tuple[int, int]],
-    references: list[tuple[int, int]],
-) -> tuple[Array, Complex]:
-    """Frequencies (n_f,) [Hz] and receptances (n_f, n_s, n_e) [m/N] of chosen dofs.
-
-    Sensors (n_s) and exciters (n_e) are nodes and directions; a dof measured against its direction
-    counts with the opposite sign.
-    """
-    known = {_key(f): f for f in functions if f.kind == FREQUENCY_RESPONSE}
-    columns, x = list[Complex](), np.empty(0)
-    for wanted in ((r, e) for r in responses for e in references):
-        if wanted not in known:
-            raise ConfigError(f"no frequency response of {wanted[0]} to {wanted[1]}; it is needed.")
-        f = known[wanted]
-        x = x if columns else f.x
-        if f.x.shape != x.shape or not np.allclose(f.x, x, rtol=1e-5, atol=0):
-            raise ConfigError(f"{_name(f)} needs the frequencies of those before.")
-        sign = np.sign(f.response[1]) * np.sign(f.reference[1])
-        columns.append(sign * f.receptance())
-    H = np.array(columns).reshape(len(responses), len(references), -1)
-    return x, np.moveaxis(H, 2, 0)
-
-
-def _key(f: Function) -> tuple[tuple[int, int], tuple[int, int]]:
-    return (f.response[0], abs(f.response[1])), (f.reference[0], abs(f.reference[1]))
-
-
 def _name(f: Function) -> str:
     return f"function of {f.response} by {f.reference}"
 
@@ -143,7 +114,6 @@ def _mark(data: bytes, place: int) -> int:
 
 
 def _closed(data: bytes, place: int) -> int:
-    """Where a dataset ends."""
     need((end := _mark(data, place)) >= 0, "the closing -1 is missing")
     return end
 

@@ -121,10 +121,9 @@ def grid(
     at_points: Fields | None = None,
     at_cells: Fields | None = None,
 ) -> str:
-    """Text of a file with cells of one kind, VTK's number of it.
+    """Text of a file with cells (m, k) of one kind, VTK's number and order of it.
 
-    Points (n, 3) [m], their numbers in cells (m, k) in VTK's order; values {name: (n,) or (n, c)}
-    at points, {name: (m,) or (m, c)} at cells.
+    Values are {name: (n,) or (n, c)} at points, {name: (m,) or (m, c)} at cells.
     """
     m, k = cells.shape
     topology = {

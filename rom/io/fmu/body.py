@@ -71,7 +71,6 @@ def write_body_fmu(body: FlexibleBody, path: str | Path, *, fixed: tuple[str, ..
 
 
 def _tables(body: FlexibleBody, omega: Array, V: Array) -> str:
-    """The numbers of the equations as C text."""
     motions = [marker_motion(marker, body.n_modes) for marker in body.markers.values()]
     motion = np.vstack([np.hstack(parts) for parts in motions]) @ V
     fall = body.full_matrices()[0][:, :3]

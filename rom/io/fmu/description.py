@@ -8,20 +8,7 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-# exponents of kg, m, s, rad
-UNITS = {
-    "1": {},
-    "s": {"s": 1},
-    "m": {"m": 1},
-    "m/s": {"m": 1, "s": -1},
-    "m/s2": {"m": 1, "s": -2},
-    "rad": {"rad": 1},
-    "rad/s": {"rad": 1, "s": -1},
-    "rad/s2": {"rad": 1, "s": -2},
-    "N": {"kg": 1, "m": 1, "s": -2},
-    "N.m": {"kg": 1, "m": 2, "s": -2},
-    "Pa": {"kg": 1, "m": -1, "s": -2},
-}
+from rom.units import BASES, unit
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,8 +67,7 @@ def model_description(
 ) -> bytes:
     """The XML text for this very FMU, the C name of its binary and its C files.
 
-    Outputs are those of the last communication point and do not follow inputs at once, which
-    spares the caller algebraic loops.
+    Outputs do not follow inputs at once, which spares the caller algebraic loops.
     """
     root = ET.Element(
         "fmiModelDescription",
@@ -107,8 +93,10 @@ def model_description(
         ET.SubElement(files, "File", name=name)
     units = ET.SubElement(root, "UnitDefinitions")
     for name in sorted({variable.unit for variable in content.variables}):
-        powers = {key: str(value) for key, value in UNITS[name].items()}
-        ET.SubElement(ET.SubElement(units, "Unit", name=name), "BaseUnit", powers)
+        bases = zip(BASES, unit(name.replace(".", " ")).dimension, strict=True)
+        powers = sorted((pair for pair in bases if pair[1]), key=lambda pair: pair[1] < 0)
+        base = {key: str(value) for key, value in powers}
+        ET.SubElement(ET.SubElement(units, "Unit", name=name), "BaseUnit", base)
     categories = ET.SubElement(root, "LogCategories")
     for name in ("logStatusError", "logStatusWarning"):
         ET.SubElement(categories, "Category", name=name)

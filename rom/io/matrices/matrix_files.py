@@ -189,7 +189,6 @@ def read_market(path: str | Path) -> csr_matrix:
 
 
 def _sizes(line: str, n: int) -> tuple[int, ...]:
-    """Rows and columns, and entries of coordinates."""
     sizes = tuple(int(word) for word in line.split())
     possible = len(sizes) == n and min(sizes) >= 0 and min(sizes[:2]) >= 1
     need(possible, f"{line.strip()!r} are no sizes")
@@ -197,7 +196,6 @@ def _sizes(line: str, n: int) -> tuple[int, ...]:
 
 
 def _coordinates(table: Array, sizes: tuple[int, ...], _: float) -> tuple[Index, Index, Array]:
-    """Rows and columns from zero, and values."""
     fits = table.size == 3 * sizes[2] and table.shape[1] in (0, 3)
     need(fits, f"{len(table)} lines where {sizes[2]} entries are announced")
     place = table.reshape(-1, 3)[:, :2]

@@ -51,7 +51,6 @@ def _node_file(path: Path) -> tuple[Index, Array]:
 
 
 def _deck(path: Path) -> Nodes:
-    """The nodes and sets of a deck."""
     deck = Nodes(path)
     for block in deck.blocks():
         if block.keyword in NODE_KEYWORDS:
@@ -63,7 +62,6 @@ def _deck(path: Path) -> Nodes:
 
 
 def _table(path: Path) -> tuple[Index, Array]:
-    """Lines ``label, x, y, z``."""
     block = Block("NODE", {}, (check_readable(path), 1))
     with path.open(encoding="utf-8", errors="replace") as file:
         for number, line in enumerate(file, 1):

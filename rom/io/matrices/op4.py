@@ -10,7 +10,6 @@ Source:
 
 import re
 import struct
-from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import chain
@@ -66,10 +65,7 @@ class _Strings:
 
 
 class Matrices(dict[str, csr_matrix]):
-    """Matrices of a file by their names, ``NAME#1``, ``NAME#2`` where a name stands twice.
-
-    Where is the file, and places say where in it each stands.
-    """
+    """Matrices of a file by their names, ``NAME#1``, ``NAME#2`` where a name stands twice."""
 
     def __init__(self, where: str, found: Mapping[str, csr_matrix], places: Mapping[str, str]):
         super().__init__(found)
@@ -123,11 +119,11 @@ def read_op4(path: str | Path) -> Matrices:
 
 
 def _by_name(where: str, all_found: list[_Strings]) -> Matrices:
-    times, seen = Counter(found.name for found in all_found), Counter[str]()
-    keys = []
-    for name in (found.name for found in all_found):
-        seen[name] += 1
-        keys.append(name if times[name] == 1 else f"{name}#{seen[name]}")
+    names = [found.name for found in all_found]
+    keys = [
+        name if names.count(name) == 1 else f"{name}#{names[:k].count(name) + 1}"
+        for k, name in enumerate(names)
+    ]
     matrices = {key: found.matrix() for key, found in zip(keys, all_found, strict=True)}
     return Matrices(where, matrices, dict(zip(keys, (f.place for f in all_found), strict=True)))
 
@@ -215,13 +211,10 @@ class _Text:
     def _string(self, matrix: _Strings, column: int) -> int:
         """Read one sparse string; how many words it took."""
         line = self._line()
-        if matrix.long:
-            length, row, head = int(line[:8]) - 1, int(line[8:16]), 2
-        else:
-            length, row = int(line) // 65536 - 1, int(line) % 65536
-            head = 1
-        matrix.add(column, row - 1, self._values(length // self.words))
-        return length + head
+        head = (int(line[:8]), int(line[8:16])) if matrix.long else divmod(int(line), 65536)
+        length, row = head
+        matrix.add(column, row - 1, self._values((length - 1) // self.words))
+        return length + matrix.long
 
     def _values(self, n: int) -> Array:
         most = (len(self.lines) - self.number) * self.per_line
@@ -274,15 +267,12 @@ class _Binary:
     def _strings(self, matrix: _Strings, column: int, data: bytes) -> None:
         at = 0
         while at < len(data):
-            if matrix.long:
-                length, row = self._integers(data, at, 2)
-                length, at = length - 1, at + 2 * self.size
-            else:
-                (both,) = self._integers(data, at, 1)
-                length, row, at = both // 65536 - 1, both % 65536, at + self.size
-            need(length > 0, f"a string of {length} words")
-            matrix.add(column, row - 1, self._values(data[at:], length))
-            at += self.size * length
+            head = self._integers(data, at, 1 + matrix.long)
+            length, row = head if matrix.long else divmod(head[0], 65536)
+            at += self.size * len(head)
+            need(length > 1, f"a string of {length - 1} words")
+            matrix.add(column, row - 1, self._values(data[at:], length - 1))
+            at += self.size * (length - 1)
 
     def _integers(self, data: bytes, at: int, n: int) -> tuple[int, ...]:
         kind = "i" if self.size == 4 else "q"

@@ -122,10 +122,8 @@ def _rows(A: csr_matrix, dofs: Dofs | None, labels: Index) -> Index:
             )
         nodes = np.repeat(labels, per_node)
         dofs = np.column_stack([nodes, np.tile(np.arange(1, per_node + 1), labels.size)])
-    node = np.searchsorted(labels, dofs[:, 0])
-    known = labels[np.minimum(node, labels.size - 1)] == dofs[:, 0]
-    if not known.all():
-        strange = np.unique(dofs[~known, 0])[:MORE_NODES].tolist()
+    node, strange = _places(labels, dofs[:, 0])
+    if strange:
         raise FileFormatError(f"rows belong to nodes that are not given: {strange}.")
     turning = (dofs[:, 1] < 1) | (dofs[:, 1] > 3)
     if np.abs(A[turning]).sum() > 0:
@@ -135,6 +133,12 @@ def _rows(A: csr_matrix, dofs: Dofs | None, labels: Index) -> Index:
             "shells; this body has to be a solid."
         )
     return np.where(turning, -1, 3 * node + dofs[:, 1] - 1)
+
+
+def _places(labels: Index, wanted: Index) -> tuple[Index, list[int]]:
+    """Where wanted ones stand among all labels, and the first that do not."""
+    strange = np.setdiff1d(wanted, labels)[:MORE_NODES].tolist()
+    return np.searchsorted(labels, wanted), strange
 
 
 def _completed(A: csr_matrix) -> csr_matrix:
@@ -155,10 +159,8 @@ def _interface(name: str, wanted: npt.ArrayLike, labels: Index, points: Array) -
         raise InterfaceError(
             f"interface {name!r}: {repr(wanted)[:MOST_SHOWN]} must be labels of nodes."
         ) from None
-    node = np.searchsorted(labels, own)
-    known = labels[np.minimum(node, labels.size - 1)] == own
-    if not own.size or not known.all():
-        strange = own[~known][:MORE_NODES].tolist()
+    node, strange = _places(labels, own)
+    if strange or not own.size:
         raise InterfaceError(f"interface {name!r} needs nodes of the model; unknown are {strange}.")
     node = node[np.lexsort(points[node].T[::-1])]
     weights = identity(node.size, format="csr") / node.size

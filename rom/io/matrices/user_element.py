@@ -22,7 +22,7 @@ from scipy.sparse import csr_matrix, tril
 
 from rom.decks.lines import whole
 from rom.errors import ConfigError, UnsafeFileError, in_file
-from rom.io.files import lines_of, need, write_lines
+from rom.io.files import lines_of, need, number, write_lines
 from rom.io.matrices.dmig import Dofs
 from rom.model import Array
 from rom.names import ORIGIN_MARK
@@ -108,7 +108,7 @@ def _keyword(element: _Element, line: str) -> tuple[str, str]:
 
 def _data(element: _Element, keyword: str, kind: str, words: list[str]) -> None:
     if keyword == "*MATRIX":
-        element.values[kind] += [float(word.replace("D", "E").replace("d", "e")) for word in words]
+        element.values[kind] += map(number, words)
     elif keyword in ("*USER ELEMENT", NODE_LIST):
         numbers = [whole(word) for word in words]
         place, components = (numbers[0], numbers[1:]) if element.lists else (1, numbers)
@@ -128,9 +128,8 @@ def _matrices(element: _Element) -> dict[str, tuple[csr_matrix, Dofs]]:
     found = {}
     for kind, values in element.values.items():
         wanted = n * (n + 1) // 2
-        what = f"{len(values)} numbers; the upper triangle of {n} rows has {wanted}, all finite"
-        fits = len(values) == wanted and np.isfinite(values).all()
-        need(fits, f"the matrix {kind} has {what}")
+        what = f"{len(values)} numbers; the upper triangle of {n} rows has {wanted}"
+        need(len(values) == wanted, f"the matrix {kind} has {what}")
         A = np.zeros((n, n))
         A[np.tril_indices(n)] = values  # rows of this triangle are columns of the other
         found[kind] = csr_matrix(A), dofs
@@ -172,7 +171,8 @@ def _document(matrices: Mapping[str, Array], dofs: Dofs, nodes: dict[int, Array]
         before = now
     for kind, A in matrices.items():
         yield f"*MATRIX, TYPE={kind}"
-        yield from _rows(tril(A).toarray()[np.tril_indices(len(dofs))])
+        values = tril(A).toarray()[np.tril_indices(len(dofs))]
+        yield from map(_row, np.split(values, range(PER_LINE, values.size, PER_LINE)))
     yield "*ELEMENT, TYPE=U1, ELSET=BODY"
     yield from _wrapped([1, *labels])
     yield "*UEL PROPERTY, ELSET=BODY"
@@ -182,11 +182,6 @@ def _wrapped(numbers: list[int]) -> Iterator[str]:
     lines = [numbers[k : k + PER_LINE] for k in range(0, len(numbers), PER_LINE)]
     for k, line in enumerate(lines):
         yield ", ".join(map(str, line)) + ("," if k + 1 < len(lines) else "")
-
-
-def _rows(values: Array) -> Iterator[str]:
-    for k in range(0, len(values), PER_LINE):
-        yield _row(values[k : k + PER_LINE])
 
 
 def _row(values: Iterable[float]) -> str:

@@ -20,7 +20,7 @@ import numpy.typing as npt
 from rom.arguments import symmetric
 from rom.body.flexible import FlexibleBody
 from rom.errors import ConfigError, QualityGateError, UnsafeFileError
-from rom.io.files import check_readable, damaged, need, numbers_line, write_lines
+from rom.io.files import check_readable, damaged, need, number, numbers_line, write_lines
 from rom.io.programs.interface_form import InterfaceForm, interface_form
 from rom.model import Array
 from rom.names import ORIGIN_MARK, check_known
@@ -30,13 +30,11 @@ LOAD_DURATION = 1e5  # [s]; how long the loads of version 4 are constant
 GRAVITY = (0.0, 0.0, -9.81)
 UNITS = {"Mass": "kg, m", "Stiffness": "N, m", "Damping": "N, m, s"}
 OLD_FORMAT_MARK = "flex 5 format"  # second line of files for versions 2.3 to 4
-DIMENSION_LINE, STEP_LINE, DURATION_LINE = (
-    "!dimension:",
-    "!time increment in simulation:",
-    "!total simulation time in file:",
-)
+HEAD_LINES = ("!dimension:", "!time increment in simulation:", "!total simulation time in file:")
+DIMENSION_LINE, STEP_LINE, DURATION_LINE = HEAD_LINES
 MATRICES = {"!mass": "M", "!stiffness": "K", "!damping": "D", "!weight stiffness": "K_W"}
 WEIGHT_LINE, LOADING_LINE = "!weight constant", "!loading and wave elevation"
+KEYWORDS = (*HEAD_LINES, *MATRICES, WEIGHT_LINE, LOADING_LINE)
 MAX_COORDINATES = 10_000  # coordinates
 ASYMMETRY_RTOL, TIME_STEP_RTOL = 1e-6, 1e-3
 REWRITE_HINT = (
@@ -101,8 +99,7 @@ def superelement(
 ) -> Superelement:
     """The matrices and the weight, without a table of loads; see `write_openfast`.
 
-    A held body keeps its weight whatever its small motions; in the frame of a floating one gravity
-    turns, and its change with the modes is left out.
+    In the frame of a floating body gravity turns; its change with the modes is left out.
     """
     form = interface_form(body)
     rows = _rows(body, form, held)
@@ -186,17 +183,14 @@ class _Reader:
         while self.at < len(self.lines):
             line = self.lines[self.at].strip().lower()
             self.at += 1
-            key = next(
-                (k for k in (DIMENSION_LINE, STEP_LINE, DURATION_LINE) if line.startswith(k)), ""
-            )
-            block = next((name for k, name in MATRICES.items() if line.startswith(k)), "")
-            if key:
-                self.head[key] = self.number(line[len(key) :])
-            elif block:
-                self.blocks[block] = self.rows(self.n, (self.n,))
-            elif line.startswith(WEIGHT_LINE):
+            key = next((known for known in KEYWORDS if line.startswith(known)), "")
+            if key in HEAD_LINES:
+                self.head[key] = number(line[len(key) :])
+            elif key in MATRICES:
+                self.blocks[MATRICES[key]] = self.rows(self.n, (self.n,))
+            elif key == WEIGHT_LINE:
                 self.blocks["weight"] = self.rows(1, (self.n,))[0]
-            elif line.startswith(LOADING_LINE):
+            elif key == LOADING_LINE:
                 self.blocks["loads"] = self.rows(self.steps, (self.n + 1, self.n + 2))
 
     @property
@@ -225,16 +219,8 @@ class _Reader:
             self.at += 1
             fits = len(words) in widths and (not found or len(words) == len(found[0]))
             need(fits, f"row {len(found) + 1} of {k} has {len(words)} words")
-            found.append([self.number(word) for word in words])
+            found.append([number(word) for word in words])
         return np.array(found)
-
-    def number(self, word: str) -> float:
-        try:
-            value = float(word.lower().replace("d", "e"))
-        except ValueError:
-            value = np.nan
-        need(np.isfinite(value), f"{word.strip()!r} is not a finite number")
-        return value
 
     def __str__(self) -> str:
         return f"{self.path}, line {min(self.at, len(self.lines))}"

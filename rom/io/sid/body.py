@@ -34,7 +34,7 @@ def standard_input(body: FlexibleBody) -> StandardInput:
         mass=body.mass,
         coordinates=tuple(f"Eigen Mode {k + 1:4d} : {f:.6g} Hz" for k, f in enumerate(hertz)),
         nodes={name: _node(marker, K) for name, marker in body.markers.items()},
-        blocks=_inertia(body, K) | _elasticity(body),
+        blocks=_blocks(body, K),
     )
 
 
@@ -57,7 +57,7 @@ def invariants(body: FlexibleBody) -> dict[str, Array]:
     }
 
 
-def _inertia(body: FlexibleBody, K: dict[str, Array]) -> dict[str, Taylor]:
+def _blocks(body: FlexibleBody, K: dict[str, Array]) -> dict[str, Taylor]:
     r, X, S, integrals = body.n_modes, body.Ibar_kl, body.S_kl, invariants(body)
     C4 = -integrals["Inv8"].swapaxes(0, 1)  # (r, 3, 3)
     cross = integrals["Inv5"].transpose(1, 2, 0)  # of phi_j x phi_i
@@ -72,6 +72,10 @@ def _inertia(body: FlexibleBody, K: dict[str, Array]) -> dict[str, Taylor]:
         "Gr": Taylor(-2 * _by_axis(C4)),
         "Ge": Taylor(2 * _by_axis(cross)),
         "Oe": Taylor(Oe0, Oe1 + _loads(K, CENTRIFUGAL_LOADS, r)),
+        "Me": Taylor(body.M),
+        "ksigma": Taylor(np.zeros((r, 1))),
+        "Ke": Taylor(body.K),
+        "De": Taylor(body.D),
     }
 
 
@@ -88,15 +92,6 @@ def _by_axis(A: Array) -> Array:
 def _loads(K: dict[str, Array], names: tuple[str, ...], r: int) -> Array:
     """(r, r, k) geometric stiffness of k loads."""
     return np.stack([K.get(name, np.zeros((r, r))) for name in names], axis=-1)
-
-
-def _elasticity(body: FlexibleBody) -> dict[str, Taylor]:
-    return {
-        "Me": Taylor(body.M),
-        "ksigma": Taylor(np.zeros((body.n_modes, 1))),
-        "Ke": Taylor(body.K),
-        "De": Taylor(body.D),
-    }
 
 
 def _node(marker: Marker, K: dict[str, Array]) -> dict[str, Taylor]:

@@ -198,7 +198,6 @@ def _taylor(file: RawFile, raw: RawBlock, mode_second: bool) -> Taylor:
 
 
 def _tensor(six: Array) -> Array:
-    """(..., 3, 3) from (..., 6)."""
     out = np.zeros((*six.shape[:-1], 3, 3))
     for k, (i, j) in enumerate(TENSOR_ENTRIES):
         out[..., i, j] = out[..., j, i] = six[..., k]

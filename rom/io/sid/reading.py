@@ -7,8 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
+from rom.decks.lines import whole
 from rom.errors import UnsafeFileError
-from rom.io.files import check_readable, damaged, need
+from rom.io.files import Line, check_readable, damaged, need, number
 from rom.io.sid.format import BLOCKS, NODE_BLOCKS, SIZES, SYMMETRIC, UNIT, ZERO, shape_of
 from rom.model import Array
 from rom.names import ORIGIN_MARK, is_whole
@@ -46,11 +47,11 @@ class RawFile:
     blocks: dict[str, RawBlock] = field(default_factory=dict)
 
 
-class _Lines:
+class _Lines(Line):
     """Lines that are not empty, with their numbers; written in a message, the place of the last."""
 
     def __init__(self, path: Path, text: str):
-        self.path, self.number = path, 0
+        super().__init__(path)
         self._rest: Iterator[tuple[int, str]] = (
             (k, line.strip()) for k, line in enumerate(text.splitlines(), 1) if line.strip()
         )
@@ -62,15 +63,11 @@ class _Lines:
 
     def until(self, end: str) -> Iterator[str]:
         """Lines before the one that ends what they are of."""
-        while (line := self.next()) != end:
-            yield line
+        return iter(self.next, end)
 
     def expect(self, word: str) -> None:
         line = self.next()
         need(line == word, f"{word!r} was expected, found {line[:MOST_QUOTED]!r}")
-
-    def __str__(self) -> str:
-        return f"{self.path}, line {self.number}"
 
 
 def read_raw(path: str | Path) -> RawFile:
@@ -123,11 +120,11 @@ def _reference(file: RawFile, lines: _Lines) -> None:
     for line in lines.until("end refmod"):
         key, index, value = _assignment(line)
         if key == "mass":
-            file.mass = _real(value)
+            file.mass = number(value)
         elif key == "nelastq":
-            file.n_modes = _integer(value)
+            file.n_modes = whole(value)
         elif key == "ielastq":
-            file.coordinates[_integer(index)] = value
+            file.coordinates[whole(index)] = value
     exists = file.mass > 0 and file.n_modes >= 0
     need(exists, f"mass {file.mass:g} and nelastq {file.n_modes} are no body")
     if file.n_modes > MOST_MODES:
@@ -157,19 +154,19 @@ def _enter(
     for line in lines.until(f"end {name}"):
         key, index, value = _assignment(line)
         if key in SIZES and not index:
-            block.sizes[key] = _integer(value)
+            block.sizes[key] = whole(value)
             continue
         sized = len(block.sizes) == len(SIZES)
         need(sized, f"{key[:MOST_QUOTED]!r} stands before the sizes of {name}")
-        _fill(block, key, index, _real(value), file.n_modes)
+        _fill(block, key, index, number(value), file.n_modes)
     _check_sizes(file, block)
 
 
 def _fill(block: RawBlock, key: str, index: str, value: float, r: int) -> None:
     numbers, wanted = index.split(","), {"m0": 2, "m1": 3, "mn": 3}
     entry = f"{key}({index})"[:MOST_QUOTED]
-    whole = all(is_whole(n.strip()) for n in numbers)
-    need(len(numbers) == wanted.get(key) and whole, f"{entry} is no entry of a block")
+    plain = all(is_whole(n.strip()) for n in numbers)
+    need(len(numbers) == wanted.get(key) and plain, f"{entry} is no entry of a block")
     if key == "mn":
         block.dropped += 1
         return
@@ -201,17 +198,3 @@ def _assignment(line: str) -> tuple[str, str, str]:
     if found is None:
         raise ValueError(f"{line[:MOST_QUOTED]!r} is neither a block nor an assignment")
     return found[1], found[2] or "", found[3]
-
-
-def _integer(text: str) -> int:
-    need(re.fullmatch(r"\s*\d{1,9}\s*", text), f"{text[:MOST_QUOTED]!r} is no whole number")
-    return int(text)
-
-
-def _real(text: str) -> float:
-    try:
-        value = float(text.upper().replace("D", "E"))
-    except ValueError:
-        value = np.nan
-    need(np.isfinite(value), f"{text[:MOST_QUOTED]!r} is no finite number")
-    return value

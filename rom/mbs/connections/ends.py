@@ -31,11 +31,6 @@ class Ends:
         """Axes with ``axis`` last, carried by both bodies."""
         return triad(axis, self.frames)
 
-    @property
-    def gap_of_first(self) -> Array:
-        """(3,) the gap in the axes of the first body [m]."""
-        return self.frames[0].T @ self.gap
-
 
 def ends_of(whole: Whole, name: str, m1: Marker, m2: Marker) -> Ends:
     """The ends of a new joint, whose name and markers are checked."""

@@ -40,16 +40,16 @@ def cylindrical(self: Whole, name: str, m1: Marker, m2: Marker, *, axis: Directi
         axis: (3,) direction, world at the start [1].
     """
     ends = ends_of(self, name, m1, m2)
-    t, rows, displacement = _coaxial(ends, ends.direction("axis", axis))
+    t, rows, displacement = coaxial(ends, ends.direction("axis", axis))
     angle = t.angle()
     enter(self, Joint(name, "cylindrical", ends.markers, rows, angle, angle, displacement))
 
 
-def _coaxial(ends: Ends, axis: Array) -> tuple[Triad, tuple[Row, ...], Row]:
+def coaxial(ends: Ends, axis: Array) -> tuple[Triad, tuple[Row, ...], Row]:
     """Axes with one in common, on which the second point lies; rows of that, and way along it."""
     t = ends.triad(axis)
     rows = (t.along(0, NO_VECTOR), t.along(1, NO_VECTOR), t.normal(0, 2), t.normal(1, 2))
-    return t, rows, t.along(2, ends.gap_of_first)
+    return t, rows, t.along(2, ends.frames[0].T @ ends.gap)
 
 
 def screw(
@@ -74,7 +74,7 @@ def screw(
     """
     pitch = not_zero("pitch", pitch)
     ends = ends_of(self, name, m1, m2)
-    t, rows, displacement = _coaxial(ends, ends.direction("axis", axis))
+    t, rows, displacement = coaxial(ends, ends.direction("axis", axis))
     angle = t.angle()
     rows = (*rows, coupling((displacement, 1.0), (angle, -pitch / FULL_TURN)))
     enter(self, Joint(name, "screw", ends.markers, rows, angle, angle, displacement))
@@ -87,7 +87,7 @@ def prismatic(self: Whole, name: str, m1: Marker, m2: Marker, *, axis: Direction
         axis: (3,) direction, world at the start [1].
     """
     ends = ends_of(self, name, m1, m2)
-    t, rows, displacement = _coaxial(ends, ends.direction("axis", axis))
+    t, rows, displacement = coaxial(ends, ends.direction("axis", axis))
     rows = (*rows, t.normal(0, 1))
     enter(self, Joint(name, "prismatic", ends.markers, rows, displacement, None, displacement))
 

@@ -5,6 +5,7 @@ import numpy as np
 from rom.arguments import Direction, Length
 from rom.errors import ConfigError
 from rom.mbs.connections.ends import ends_of, enter
+from rom.mbs.connections.lower_pairs import coaxial
 from rom.mbs.kernels.system import DISTANCE, NORMAL, ROLL, TOUCH
 from rom.mbs.parts.bodies import Marker
 from rom.mbs.parts.joints import NO_VECTOR, Joint, Row, Whole, coincidence
@@ -20,9 +21,8 @@ def point_on_line(self: Whole, name: str, m1: Marker, m2: Marker, *, axis: Direc
         axis: (3,) direction of the line, world at the start [1].
     """
     ends = ends_of(self, name, m1, m2)
-    t = ends.triad(ends.direction("axis", axis))
-    rows, way = (t.along(0, NO_VECTOR), t.along(1, NO_VECTOR)), t.along(2, ends.gap_of_first)
-    enter(self, Joint(name, "point on line", ends.markers, rows, way, None, way))
+    _, rows, way = coaxial(ends, ends.direction("axis", axis))
+    enter(self, Joint(name, "point on line", ends.markers, rows[:2], way, None, way))
 
 
 def point_on_plane(self: Whole, name: str, m1: Marker, m2: Marker, *, normal: Direction) -> None:

@@ -64,11 +64,7 @@ def audit(solution: Solution) -> Report:
 
 
 def warn_of_failures(solution: Solution) -> None:
-    """Warn once of a motion whose balances, joints or steps the audit finds wrong.
-
-    Every fourth instant is looked at, which takes a few per cent of the time of the run. Of bodies
-    that left their range `rom.mbs.results.audit` warns.
-    """
+    """Warn once of a motion whose balances, joints or steps the audit finds wrong."""
     n = solution.t.size
     seen = np.unique([*range(0, n, LOOK_EVERY), n - 1])
     motion = {name: getattr(solution, name)[seen] for name in MOTION_ARRAYS}
@@ -82,7 +78,6 @@ def warn_of_failures(solution: Solution) -> None:
 
 
 def _of_steps(solution: Solution) -> list[Row]:
-    """What one look at all instants tells of a motion as a whole."""
     return [*_energy(solution), *_momentum(solution), *_joints(solution), *_numbers(solution)]
 
 
@@ -196,7 +191,7 @@ def warn_of_limits(solution: Solution) -> None:
             continue
         share, bent = softening(solution, name), deformation(solution, name, surface=False)
         if share >= 1.0:
-            top = np.linalg.norm(_omega(solution, name), axis=1).max()
+            top = np.linalg.norm(solution._rates(name, 3, 6), axis=1).max()
             warn(
                 f"body {name!r} turned at {top:.3g} rad/s; at {top / share:.3g} rad/s centrifugal "
                 "force has used up the stiffness of a body without geometric stiffness, which this "
@@ -222,11 +217,7 @@ def warn_of_range(mechanism: Mechanism, packed: Packed, state: State) -> None:
 
 
 def pressed(solution: Solution, name: str) -> float | None:
-    """Largest force that presses two interfaces of a body together, over what buckles it there [1].
-
-    As on hinges, with a warning of too much. Zero where geometric stiffness is known to the motion,
-    None where the body does not know its buckling loads.
-    """
+    """Largest force that presses two interfaces together, over what buckles it; None if unknown."""
     body = solution.mechanism.parts[name].flexible
     if body.K_geo or body.quartic is not None:
         return 0.0
@@ -292,15 +283,8 @@ def _top(solution: Solution, body: int) -> float:
     """Largest angular speed of a body, -1 for the ground."""
     if body < 0:
         return 0.0
-    omega = _omega(solution, solution.packed.names[body])
+    omega = solution._rates(solution.packed.names[body], 3, 6)
     return float(np.nanmax(np.linalg.norm(omega, axis=1), initial=0.0))
-
-
-def _omega(solution: Solution, name: str) -> Array:
-    """(n_t, 3) angular velocity of the frame that is integrated, in its axes [rad/s]."""
-    packed = solution.packed
-    at = packed.system.bodies.v_at[packed.names.index(name)] + 3
-    return solution.v[:, at : at + 3]
 
 
 def _spin(solution: Solution, body: int) -> Array:
@@ -318,7 +302,7 @@ def softening(solution: Solution, name: str) -> float:
     stiffens more than it softens.
     """
     part = solution.mechanism.parts[name]
-    body, omega = part.flexible, _omega(solution, name)
+    body, omega = part.flexible, solution._rates(name, 3, 6)
     omega = omega[np.isfinite(omega).all(axis=1)]
     if body.K_geo or not omega.size:
         return 0.0

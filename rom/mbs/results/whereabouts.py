@@ -84,7 +84,6 @@ class Whereabouts:
         return self._places(body, 7, 7 + self.packed.system.bodies.r[self._number(body)])
 
     def _seen(self, body: str, place: object) -> Seen:
-        """The same of a marker of a body, or of the ground."""
         if body != GROUND:
             self._number(body)
         given = place if isinstance(place, Marker) else self.mechanism.part(body).marker(place)
@@ -116,12 +115,10 @@ class Whereabouts:
         return self.packed.names.index(body)
 
     def _places(self, body: str, first: int, last: int) -> Array:
-        """Some coordinates of a body, counted from its first."""
         at = self.packed.system.bodies.q_at[self._number(body)]
         return self.q[..., at + first : at + last].copy()
 
     def _rates(self, body: str, first: int, last: int) -> Array:
-        """Some velocities of a body, counted from its first."""
         at = self.packed.system.bodies.v_at[self._number(body)]
         return self.v[..., at + first : at + last].copy()
 

@@ -1,5 +1,6 @@
 """Damage to files: what a reader must refuse by name, or read without harm."""
 
+import json
 import re
 import tracemalloc
 
@@ -72,6 +73,15 @@ def changed(text, name, read, *rows, error=rom.FileFormatError):
             read(tmp_path / name)
 
     return test
+
+
+def unpacked(path):
+    """Manifest without its checksums, and arrays of a file."""
+    with np.load(path) as found:
+        arrays = {name: found[name] for name in found.files}
+    manifest = json.loads(arrays.pop("manifest").tobytes())
+    del manifest["sha256"]
+    return manifest, arrays
 
 
 def damaged(data, rng, n, ways=WAYS):

@@ -86,3 +86,10 @@ def dataset(kind, spacing, values, **options):
 
 X = np.array([2.0, 2.5, 3.0, 3.5, 4.0])
 RE, IM = np.array([1.5, -2.25, 3e-7, 4.0, -5e6]), np.array([-1.0, 0.5, 2e-3, -7e-9, 8.0])
+
+
+def binary(kind, order):
+    """A whole binary dataset of complex values; kind 5 single, 6 double, order 1 little-endian."""
+    numbers = np.column_stack([RE, IM]).astype(f"{'<>'[order - 1]}f{4 * (kind - 4)}").tobytes()
+    head = f"    58b{order:6d}{2:6d}{11:12d}{len(numbers):12d}" + " 0 0 0 0"
+    return f"{-1:6d}\n{head}\n{header(kind, 5, 1)}".encode() + numbers + b"\n    -1\n"

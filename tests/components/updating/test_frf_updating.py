@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 from scipy.linalg import eig, eigh
 
+import rom
 from cases.components.updating import gauss
 from cases.files.decks import dataset
 from cases.refusals import refused, refuses
@@ -16,7 +17,6 @@ from rom.components.updating.airframe import airframe, torsion_constant
 from rom.components.updating.methods import update_by_output
 from rom.components.updating.models import AtSensors, Measurement, ParametricModel, modal
 from rom.errors import ConfigError, ModelError
-from rom.io.fields.universal import assemble, read_universal
 
 TRUE = np.array([0.30, -0.25, 0.0, 0.20, 0.0, -0.35, 0.0, 0.25, -0.20])
 ZETA = np.array([1.2, 0.8, 1.5, 1.0, 2.0]) / 100
@@ -137,9 +137,12 @@ def test_a_universal_file_leads_to_the_parameters(tmp_path):
         a = -(OMEGA**2) * EXACT[:, s, e]
         sets.append(dataset(6, 0, [f, a.real, a.imag], response=(s + 1, 2), reference=(e + 1, 2)))
     (tmp_path / "test.unv").write_text("".join(sets))
-    sensors, exciters = [(s + 1, 2) for s in range(8)], [(1, 2), (2, 2)]
-    f, H = assemble(read_universal(tmp_path / "test.unv"), sensors, exciters)
-    found = update_by_output(BEAM, Measurement(2 * np.pi * f, H, INPUTS), START, GUESS)
+    points = "".join(f"{k + 1},{k},0,0\n" for k in range(8))
+    (tmp_path / "p.csv").write_text(f"node,x [m],y [m],z [m]\n{points}")
+    how = {"averages": 9, "coherence": 0.9, "points": tmp_path / "p.csv"}
+    test = rom.io.read_responses(tmp_path / "test.unv", **how)
+    measurement = Measurement(2 * np.pi * test.frequencies, test.H, INPUTS)
+    found = update_by_output(BEAM, measurement, START, GUESS)
     assert np.all(np.array(errors(found)) < (1e-4, 1e-4, 1e-3))
 
 

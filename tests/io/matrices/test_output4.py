@@ -156,9 +156,7 @@ def test_headers_of_wide_numbers_and_negative_counts(wide, sign, tmp_path):
     assert_array_equal(read_op4(tmp_path / "a.op4")["A"].toarray(), sample(2))
 
 
-def test_our_writer_is_that_here_and_exponents_of_three_digits_have_no_letter(
-    tmp_path,
-):
+def test_our_writer_is_that_here_and_exponents_of_three_digits_have_no_letter(tmp_path):
     """Fortran leaves the letter out where E23.16 has no place for it."""
     path = write_op4({"A": sample(2)}, tmp_path / "d.op4")
     assert path.read_text() == text_of(sample(2), "A", "dense", 2, "1P,3E23.16")
