@@ -12,7 +12,7 @@ TASKS: dict[str, tuple[str, str]] = {
     ),
     "From geometry to matrices": (
         "A STEP file, a geometry or a mesh becomes stiffness and mass.",
-        """Material Orthotropic Layered fe.model fe.pieces fe.assemble read_component Region
+        """Material Orthotropic Layered example fe.model fe.pieces fe.assemble read_component Region
         Interface Attachment SurfaceMesh FEModel mass_properties modes Modes
         eigen.substructured_modes""",
     ),
