@@ -177,19 +177,34 @@ def _display(picture: Answer | None, ending: str) -> Finding:
 
 
 def blas(mapped: list[str]) -> list[Finding]:
-    """Which BLAS of the files a process with PETSc has mapped, or this one, and how fast it is."""
+    """Which BLAS a process with PETSc has mapped, or else this one, and how fast NumPy's is."""
     speed = _gigaflops()
-    files = sorted({f for f in mapped or mapped_files() if BLAS_FILE.search(f)})
+    files = _blas_files(mapped) or _blas_files(mapped_files())
     slow = [f for f in files if not FAST_BLAS.search(f)]
-    named = ", ".join(slow or files) or "not found in the memory map"
+    about = _told_by_threadpoolctl()
+    named = ", ".join(f + about.get(f, "") for f in slow or files) or "not found in the memory map"
     found = [Finding("BLAS", "library", named)]
     if slow:
         found = [Finding("BLAS", "library", f"reference, {named}", "note", SLOW_ADVICE)]
-    wanted = better(taken_for(), abilities())
-    if wanted:
-        advice = f"several times faster: export OPENBLAS_CORETYPE={wanted}"
-        found.append(Finding("BLAS", "processor", f"taken for a {taken_for()}", "note", advice))
+    for core in dict.fromkeys(taken_for(file) for file in files):
+        if wanted := better(core, abilities()):
+            advice = f"several times faster: export OPENBLAS_CORETYPE={wanted}"
+            found.append(Finding("BLAS", "processor", f"taken for a {core}", "note", advice))
     return [*found, Finding("BLAS", "matrix product", f"{speed:.1f} GFlop/s")]
+
+
+def _blas_files(files: list[str]) -> list[str]:
+    return sorted({f for f in files if BLAS_FILE.search(f)})
+
+
+def _told_by_threadpoolctl() -> dict[str, str]:
+    """{file: version, processor and threads} of what this process has loaded, where it is there."""
+    try:
+        from threadpoolctl import threadpool_info
+    except ImportError:
+        return {}
+    told = " (version {version}, {architecture}, threads: {num_threads})".format
+    return {one["filepath"]: told(**{"architecture": "any", **one}) for one in threadpool_info()}
 
 
 def _gigaflops(n: int = 400) -> float:
