@@ -28,8 +28,8 @@ from benchmarks.models import (
 from benchmarks.timing import timed
 from rom.arguments import one_of
 from rom.model import FEModel
+from rom.process import stopwatch as watch
 from rom.process.memory import peak_bytes
-from rom.process.stopwatch import stage_rows
 from rom.reduction.bases.method import CraigBampton
 from rom.reduction.full_model import operators
 from rom.reduction.interfaces.connection import connect
@@ -86,6 +86,17 @@ def reduction(sizes: tuple[float, ...] = (30e3, 100e3)) -> Iterator[Figure]:
             yield Figure("reduction", case, *row)
         peak = peak_bytes() / 1024**3
         yield Figure("reduction", case, "peak memory of the process", peak, "GiB", "below 12")
+
+
+def stage_rows(stages: dict[str, dict[str, float]]) -> Iterator[tuple[str, float, str]]:
+    """Quantity, value and unit of each number that stages have, seconds and flops."""
+    for stage, table in stages.items():
+        yield f"{stage}, all of it", table["seconds"], "s"
+        for name in (watch.FACTORISATION_PIECE, watch.SOLUTION_PIECE, watch.SEARCH_PIECE):
+            if name in table:
+                yield f"{stage}, {table[f'number of {name}']:g} {name}", table[name], "s"
+        if watch.FLOPS_NOTE in table:
+            yield f"{stage}, {watch.FLOPS_NOTE}", table[watch.FLOPS_NOTE] / 1e9, "Gflop"
 
 
 def large_reduction(size: float = 300e3) -> Iterator[Figure]:

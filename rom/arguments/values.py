@@ -218,22 +218,14 @@ def number(name: str, value: object, *, error: type[RomError] = ConfigError) -> 
 
 
 def positive(
-    name: str,
-    value: object,
-    *,
-    error: type[RomError] = ConfigError,
-    infinite: bool = False,
+    name: str, value: object, *, error: type[RomError] = ConfigError, infinite: bool = False
 ) -> float:
     """The value as a positive float, finite or, where that is taken, infinite."""
     return _limited(name, value, Positive(infinite=infinite), error)
 
 
 def not_negative(
-    name: str,
-    value: object,
-    *,
-    error: type[RomError] = ConfigError,
-    infinite: bool = False,
+    name: str, value: object, *, error: type[RomError] = ConfigError, infinite: bool = False
 ) -> float:
     """The value as a float of zero or more, finite or, where that is taken, infinite."""
     return _limited(name, value, NotNegative(infinite=infinite), error)

@@ -107,10 +107,7 @@ VERBS: dict[str, Schema] = {
         "the demos; of one that was run, its numbers; of a copy, its files",
         optional=("demos", "results", "files"),
         demos=by_name(by_name(text("one of them"), "its title, needs and time"), "what there is"),
-        results=by_name(
-            by_name(number("one of them"), "value, expected value and relative tolerance"),
-            "the numbers in which it ends",
-        ),
+        results=by_name(by_name(number("one of them"), "value, expected, tolerance"), "numbers"),
         files=each(text("file"), "files written"),
     ),
     "mesh": record(
@@ -199,16 +196,8 @@ VERBS: dict[str, Schema] = {
     ),
     "swing": record(
         "a part on its hinge; without one, its faces",
-        optional=(
-            "mass",
-            "gravity",
-            "axis",
-            "t_end",
-            "magnify",
-            "frequencies",
-            "certificate",
-            "faces",
-            "next",
+        optional=tuple(
+            "mass gravity axis t_end magnify frequencies certificate faces next".split()
         ),
         faces=FACES,
         next=NEXT,

@@ -51,12 +51,15 @@ def light() -> list[Finding]:
     """Python and the libraries everything needs; without them nothing of rom starts."""
     kind = "environment" if sys.prefix != sys.base_prefix else "system"
     found = [Finding("Python", "python", f"{platform.python_version()} ({kind}, {sys.prefix})")]
-    for name in ("numpy", "scipy", "numba"):
-        try:
-            found.append(Finding("Python", name, version(name)))
-        except PackageNotFoundError:
-            found.append(Finding("Python", name, "", "broken", f"pip install {name}"))
-    return found
+    names = ("numpy", "scipy", "numba")
+    return found + [_installed("Python", n, "", "broken", f"pip install {n}") for n in names]
+
+
+def _installed(topic: str, name: str, *absent: str) -> Finding:
+    try:
+        return Finding(topic, name, version(name))
+    except PackageNotFoundError:
+        return Finding(topic, name, *absent)
 
 
 def fenicsx(found: dict[str, Answer], ending: str) -> list[Finding]:
@@ -155,10 +158,7 @@ def pictures(found: dict[str, Answer], ending: str) -> list[Finding]:
 
 
 def _matplotlib() -> Finding:
-    try:
-        return Finding("pictures", "matplotlib", version("matplotlib"))
-    except PackageNotFoundError:
-        return Finding("pictures", "matplotlib", "not installed", "missing", _for_pictures())
+    return _installed("pictures", "matplotlib", "not installed", "missing", _for_pictures())
 
 
 def _for_pictures() -> str:
@@ -183,9 +183,8 @@ def blas(mapped: list[str]) -> list[Finding]:
     slow = [f for f in files if not FAST_BLAS.search(f)]
     about = _told_by_threadpoolctl()
     named = ", ".join(f + about.get(f, "") for f in slow or files) or "not found in the memory map"
-    found = [Finding("BLAS", "library", named)]
-    if slow:
-        found = [Finding("BLAS", "library", f"reference, {named}", "note", SLOW_ADVICE)]
+    told = (f"reference, {named}", "note", SLOW_ADVICE) if slow else (named,)
+    found = [Finding("BLAS", "library", *told)]
     for core in dict.fromkeys(taken_for(file) for file in files):
         if wanted := better(core, abilities()):
             advice = f"several times faster: export OPENBLAS_CORETYPE={wanted}"

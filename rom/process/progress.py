@@ -23,11 +23,11 @@ class Progress:
     def __init__(self, total: float):
         self.total = total
         self._bar: Any = None
-        if sys.stderr.isatty() and find_spec("tqdm") is not None:
-            from tqdm import tqdm
+        if _tqdm_in_notebook() or (sys.stderr.isatty() and find_spec("tqdm") is not None):
+            from tqdm.auto import tqdm
 
             size = get_terminal_size()  # of a terminal without size tqdm would ask in vain
-            at = {"ncols": size.columns - 1, "nrows": size.lines}
+            at = {} if _tqdm_in_notebook() else {"ncols": size.columns - 1, "nrows": size.lines}
             how = {"bar_format": TIME_FORMAT, "leave": False, "file": sys.stderr}
             self._bar = tqdm(total=total, **how, **at)
 
@@ -56,9 +56,15 @@ def line(text: str) -> None:
 def looked_for() -> bool:
     """Whether a line of progress is seen and wanted, where no argument says so.
 
-    On the first rank, where stderr is a terminal; not with ``-q`` or the logger "rom" at errors.
+    On the first rank, where stderr is a terminal, or tqdm shows bars in a notebook; not with ``-q``
+    or the logger "rom" at errors.
     """
-    return not ranks()[0] and sys.stderr.isatty() and log.isEnabledFor(logging.WARNING)
+    seen = sys.stderr.isatty() or _tqdm_in_notebook()
+    return not ranks()[0] and seen and log.isEnabledFor(logging.WARNING)
+
+
+def _tqdm_in_notebook() -> bool:
+    return "ipykernel" in sys.modules and find_spec("tqdm") is not None
 
 
 @contextmanager

@@ -125,14 +125,3 @@ def note(name: str, value: float) -> None:
     watch = _running.get()
     if watch is not None:
         watch.note(name, value)
-
-
-def stage_rows(stages: dict[str, dict[str, float]]) -> Iterator[tuple[str, float, str]]:
-    """Quantity, value and unit of each number that stages have, seconds and flops."""
-    for stage, table in stages.items():
-        yield f"{stage}, all of it", table["seconds"], "s"
-        for name in (FACTORISATION_PIECE, SOLUTION_PIECE, SEARCH_PIECE):
-            if name in table:
-                yield f"{stage}, {table[f'number of {name}']:g} {name}", table[name], "s"
-        if FLOPS_NOTE in table:
-            yield f"{stage}, {FLOPS_NOTE}", table[FLOPS_NOTE] / 1e9, "Gflop"

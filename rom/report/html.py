@@ -22,6 +22,8 @@ ARRAY_ELEMENT = re.compile(
     r"<script type='application/octet-stream' id='(array-[0-9a-f]+)'>[^<]*</script>"
 )
 KINDS = {".png": "image/png", ".gif": "image/gif"}
+FRAME_STYLE = "width: 100%; height: 43rem; border: 0"
+MAX_FRAME_CHARACTERS = 4_000_000  # of a page in a notebook, which keeps it
 MAX_PICTURE_BYTES = 20_000_000  # more makes a report that browsers cannot open
 
 
@@ -102,18 +104,32 @@ def write_report(sections: dict[str, Sequence[str]], path: str | Path, title: st
     body = "".join(
         f"<h2>{html.escape(heading)}</h2>{''.join(blocks)}" for heading, blocks in sections.items()
     )
+    return write_whole(path, page(f"<h1>{html.escape(title)}</h1>{body}", title).encode("utf-8"))
+
+
+def page(body: str, title: str) -> str:
+    """A whole page of blocks of the functions above."""
     turning = "<figure class='scene" in body
     scripts = [(SOURCE_FOLDER / name).read_text("utf-8") for name in SCRIPTS if turning]
-    name = html.escape(title)
-    text = (
-        f"<!DOCTYPE html><html lang='en'><head><meta charset='utf-8'><title>{name}</title>"
+    return (
+        "<!DOCTYPE html><html lang='en'><head><meta charset='utf-8'>"
+        f"<title>{html.escape(title)}</title>"
         f'<meta http-equiv="Content-Security-Policy" content="{_policy(scripts)}">'
         f"<meta name='generator' content='{ORIGIN_MARK}'>"
         f"<meta name='viewport' content='width=device-width, initial-scale=1'>"
-        f"<style>{PAGE_STYLE}</style></head><body><h1>{name}</h1>{_once_each(body)}"
+        f"<style>{PAGE_STYLE}</style></head><body>{_once_each(body)}"
         f"{''.join(f'<script>{script}</script>' for script in scripts)}</body></html>\n"
     )
-    return write_whole(path, text.encode("utf-8"))
+
+
+def framed(body: str, title: str) -> str:
+    """A page in a frame that shares nothing with the notebook around it, or what to do instead."""
+    text = html.escape(page(body, title))
+    if len(text) > MAX_FRAME_CHARACTERS:
+        return paragraph(
+            f"{title}: {len(text) / 1e6:.1f} MB, too large here; see rom.write_report."
+        )
+    return f'<iframe sandbox="allow-scripts" style="{FRAME_STYLE}" srcdoc="{text}"></iframe>'
 
 
 def _policy(scripts: Sequence[str]) -> str:

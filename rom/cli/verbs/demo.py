@@ -9,6 +9,7 @@ import shutil
 import sys
 from contextlib import redirect_stdout
 from pathlib import Path
+from runpy import run_path
 
 from rom.cli.answer import Answer, Data
 from rom.cli.options import option
@@ -64,19 +65,20 @@ def _copied(args: argparse.Namespace, script: Path | None) -> Answer:
         for name, path in examples("*.*").items()
         if script in (None, path) or (path.suffix != ".py" and name in text)
     }
-    for target, path in targets.items():
-        if target.exists() and target.read_bytes() != path.read_bytes() and not args.force:
+    for target, path in [*targets.items()]:
+        if target.exists() and target.read_bytes() == path.read_bytes():
+            del targets[target]
+        elif target.exists() and not args.force:
             text = f"{target} is there already, and differs from the one of rom"
             raise ConfigError(f"{text}; choose another folder, or replace it with --force.")
 
     def write() -> None:
         for target, path in targets.items():
             target.parent.mkdir(parents=True, exist_ok=True)
-            if not (target.exists() and target.samefile(path)):
-                shutil.copyfile(path, target)
+            shutil.copyfile(path, target)
 
     files = [str(target) for target in targets]
-    return Answer({"files": files}, "\n".join(files), write)
+    return Answer({"files": files}, "\n".join(files) or "All of them are there.", write)
 
 
 def _run(args: argparse.Namespace, script: Path) -> Answer:
@@ -84,7 +86,13 @@ def _run(args: argparse.Namespace, script: Path) -> Answer:
     claim(args)
     for name in WRITTEN.findall(script.read_text("utf-8")):
         checked(args, args.output / name)
-    results = _results(args, [str(script), "--out", str(args.output), *["--quiet"] * args.quiet])
+    before = sys.argv
+    sys.argv = [str(script), "--out", str(args.output), *["--quiet"] * args.quiet]
+    try:
+        with redirect_stdout(sys.stderr if args.json else sys.stdout):
+            results = run_path(str(script), run_name="__main__")["results"]
+    finally:
+        sys.argv = before
     keys = "value", "expected", "tolerance"
     numbers = {name: dict(zip(keys, map(float, row), strict=True)) for name, row in results.items()}
     failed = tuple(
@@ -96,16 +104,3 @@ def _run(args: argparse.Namespace, script: Path) -> Answer:
     held = f"{len(numbers) - len(failed)} of {len(numbers)} numbers are as expected."
     text = "\n".join([held, *files, f"To change it: rom demo {args.name} --copy"])
     return Answer({"results": numbers, "files": files}, text, failed=failed)
-
-
-def _results(args: argparse.Namespace, typed: list[str]) -> Data:
-    """What the script ends in, run as a program; with ``--json`` stdout is for the answer alone."""
-    from runpy import run_path
-
-    before, sys.argv = sys.argv, typed
-    try:
-        with redirect_stdout(sys.stderr if args.json else sys.stdout):
-            found: Data = run_path(typed[0], run_name="__main__")["results"]
-    finally:
-        sys.argv = before
-    return found

@@ -65,11 +65,8 @@ def run(args: argparse.Namespace) -> Answer:
         ending = path.suffix.lower()
         checked(args, path, "deck" if ending == DECK_SUFFIX else ending[1:], inputs=[file])
     if args.faces and FACE_WORD in how["faces"]:
-        raise ConfigError(
-            f"--faces lists the faces as {FACE_WORD} 1, {FACE_WORD} 2, ..., so none can be called "
-            f"{FACE_WORD!r}.",
-            hint="Give it another name, or leave --faces out.",
-        )
+        text = f"--faces lists the faces as {FACE_WORD} 1, ..., so none can be called {FACE_WORD!r}"
+        raise ConfigError(f"{text}; give it another name, or leave --faces out.")
     if args.faces:
         how["faces"] = how["faces"] | {FACE_WORD: EVERY_FACE}
     mesh = read_mesh(file, **how)
@@ -127,14 +124,9 @@ def _text(data: Data) -> str:
         for name, value in data["quality"].items()
     )
     regions = [(name, str(r["cells"]), f"{r['volume']:.6g}") for name, r in data["regions"].items()]
+    counted = "{facets} {nodes}".format_map  # of an interface
     faces = [
-        (
-            name,
-            str(f["facets"]),
-            str(f["nodes"]),
-            _words(f["middle"], size),
-            _words(f.get("axis", ())),
-        )
+        (name, *counted(f).split(), _words(f["middle"], size), _words(f.get("axis", ())))
         for name, f in data["interfaces"].items()
         if name not in numbered
     ]

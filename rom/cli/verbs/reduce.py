@@ -12,14 +12,7 @@ from typing import TYPE_CHECKING, Any
 from rom.cli.answer import Answer, Data, failures, report_data
 from rom.cli.described import component, described, keyed, rayleigh
 from rom.cli.matrices import add_matrices, read_model, solid_options
-from rom.cli.options import (
-    add_geometry,
-    add_interfaces,
-    add_solid,
-    option,
-    require,
-    unique,
-)
+from rom.cli.options import add_geometry, add_interfaces, add_solid, option, require, unique
 from rom.cli.output import add_force, checked, files_in
 from rom.config.methods import SETTINGS, chosen
 from rom.errors import ConfigError
