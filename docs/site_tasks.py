@@ -125,6 +125,12 @@ TASKS: dict[str, tuple[str, str]] = {
     ),
 }
 
+NAMES = [f"rom.{name}" for _, listed in TASKS.values() for name in listed.split()]
+CLASSES = {name.lower() for name in NAMES if not name.islower()}
+# {function whose name is a class's in small letters: file name of its page}, as some file systems
+# do not tell capitals
+FILE_NAMES = {name: f"{name}-function" for name in NAMES if name in CLASSES}
+
 SUBJECTS = {
     "Reduce a body": """beam assembly compressor_blade reference_conditions parameters large_mesh
     exchange""",
