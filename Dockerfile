@@ -11,8 +11,10 @@ RUN apt-get update -qq \
         gcc g++ pkg-config libgl1 libegl1 libxrender1 \
     && rm -rf /var/lib/apt/lists/*
 
-COPY pyproject.toml constraints.txt README.md LICENSE /opt/rom/
+COPY pyproject.toml setup.py constraints.txt README.md LICENSE /opt/rom/
 COPY rom /opt/rom/rom
+COPY demos /opt/rom/demos
+COPY meshes /opt/rom/meshes
 RUN cd /opt/rom \
     && /usr/bin/python3 -m venv --system-site-packages .venv \
     && .venv/bin/pip install -q --no-cache-dir -c constraints.txt '.[view]'

@@ -28,8 +28,8 @@ from benchmarks.models import (
 from benchmarks.timing import timed
 from rom.arguments import one_of
 from rom.model import FEModel
+from rom.process import stopwatch as watch
 from rom.process.memory import peak_bytes
-from rom.process.stopwatch import FACTORISATION_PIECE, FLOPS_NOTE, SEARCH_PIECE, SOLUTION_PIECE
 from rom.reduction.bases.method import CraigBampton
 from rom.reduction.full_model import operators
 from rom.reduction.interfaces.connection import connect
@@ -92,11 +92,11 @@ def _stage_rows(stages: dict[str, dict[str, float]]) -> Iterator[tuple[str, floa
     """Quantity, value and unit of each number that stages have, seconds and flops."""
     for stage, table in stages.items():
         yield f"{stage}, all of it", table["seconds"], "s"
-        for name in (FACTORISATION_PIECE, SOLUTION_PIECE, SEARCH_PIECE):
+        for name in (watch.FACTORISATION_PIECE, watch.SOLUTION_PIECE, watch.SEARCH_PIECE):
             if name in table:
                 yield f"{stage}, {table[f'number of {name}']:g} {name}", table[name], "s"
-        if FLOPS_NOTE in table:
-            yield f"{stage}, {FLOPS_NOTE}", table[FLOPS_NOTE] / 1e9, "Gflop"
+        if watch.FLOPS_NOTE in table:
+            yield f"{stage}, {watch.FLOPS_NOTE}", table[watch.FLOPS_NOTE] / 1e9, "Gflop"
 
 
 def large_reduction(size: float = 300e3) -> Iterator[Figure]:

@@ -6,6 +6,7 @@
 # need a tenth. At last one column gets a mesh that does not match its bore.
 #
 # Run: `python demos/demo_assembly.py`; under `mpirun` one process does the work
+# Time: 1 min
 # Writes: `assembly_errors.png` into `out/`; another folder with `--out`
 
 import argparse

@@ -7,6 +7,7 @@
 # with E lobes around the circumference meets only waves with E nodal diameters.
 #
 # Run: `python demos/demo_bladed_disk.py`, or under `mpirun -n 2`
+# Time: 30 s
 # Writes: `bladed_disk_modes.png` and `bladed_disk_diagrams.png` into `out/`; another folder with
 # `--out`
 

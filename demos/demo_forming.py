@@ -4,6 +4,7 @@
 # a half-space. Slip lines give the load of the punch, and show which triangles lock.
 #
 # Run: `python demos/demo_forming.py`
+# Time: 30 s
 # Writes: `forming.png` and `upsetting.gif` into `out/`; another folder with `--out`
 
 import argparse

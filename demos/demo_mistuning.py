@@ -5,6 +5,7 @@
 # much more only statistics can tell: a thousand wheels, each with its own random blades.
 #
 # Run: `python demos/demo_mistuning.py`, or under `mpirun -n 2`
+# Time: 30 s
 # Writes: `mistuning.png` into `out/`; another folder with `--out`
 
 import argparse

@@ -8,6 +8,7 @@
 # links that come to rest to those that still fall (Calkin and March, Am. J. Phys. 57, 1989, 154).
 #
 # Run: `python demos/demo_pendulum_chain.py`
+# Time: 30 s
 # Writes: `pendulum_chain.png` into `out/`; another folder with `--out`
 
 import argparse

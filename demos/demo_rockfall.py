@@ -7,6 +7,7 @@
 # parameters are for illustration.
 #
 # Run: `python demos/demo_rockfall.py`, or under `mpirun -n 2`
+# Time: 30 s
 # Writes: `rockfall.png`, `rockfall_capacity.png` and `rockfall.gif` into `out/`; another folder
 # with `--out`
 

@@ -8,6 +8,8 @@ from pathlib import Path
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))
 
+from site_tasks import FILE_NAMES  # noqa: E402
+
 import rom  # noqa: E402
 
 
@@ -31,6 +33,7 @@ nitpicky = True  # a name that is linked must exist
 nitpick_ignore_regex = [("py:class", ".*")]  # but for types in signatures
 suppress_warnings = ["config.cache"]
 
+autosummary_filename_map = FILE_NAMES
 autodoc_typehints_format = "short"
 autodoc_member_order = "bysource"
 autodoc_default_options = {"members": True, "inherited-members": "RomError, Exception, tuple"}
@@ -69,5 +72,6 @@ html_sidebars = {"**": ["sidebar-nav-bs"], "index": [], "generated/demos": []}
 html_static_path = ["static"]
 html_css_files = ["site.css"]
 html_math_renderer = "mathml"
+html_search_scorer = "search_scores.js"
 html_show_sourcelink = False
 html_copy_source = False

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
-from site_tasks import SUBJECTS, TASKS
+from site_tasks import FILE_NAMES, NAMES, SUBJECTS, TASKS
 from sphinx.application import Sphinx
 
 import rom
@@ -289,7 +289,7 @@ def write_all(out: Path) -> None:
     for name, text in pages.items():
         if not (out / name).exists() or (out / name).read_text() != text:
             (out / name).write_text(text)
-    names = {f"rom.{name}.rst" for _, names in TASKS.values() for name in names.split()}
+    names = {f"{FILE_NAMES.get(name, name)}.rst" for name in NAMES}
     for path in out.rglob("*.*"):  # autosummary writes the pages of single names
         if path.name not in shown | set(pages) | names:
             path.unlink()

@@ -12,7 +12,7 @@ TASKS: dict[str, tuple[str, str]] = {
     ),
     "From geometry to matrices": (
         "A STEP file, a geometry or a mesh becomes stiffness and mass.",
-        """Material Orthotropic Layered fe.model fe.pieces fe.assemble read_component Region
+        """Material Orthotropic Layered example fe.model fe.pieces fe.assemble read_component Region
         Interface Attachment SurfaceMesh FEModel mass_properties modes Modes
         eigen.substructured_modes""",
     ),
@@ -124,6 +124,12 @@ TASKS: dict[str, tuple[str, str]] = {
         QualityGateError ResourceError ParallelError InterruptedRun RomWarning""",
     ),
 }
+
+NAMES = [f"rom.{name}" for _, listed in TASKS.values() for name in listed.split()]
+CLASSES = {name.lower() for name in NAMES if not name.islower()}
+# {function whose name is a class's in small letters: file name of its page}, as some file systems
+# do not tell capitals
+FILE_NAMES = {name: f"{name}-function" for name in NAMES if name in CLASSES}
 
 SUBJECTS = {
     "Reduce a body": """beam assembly compressor_blade reference_conditions parameters large_mesh

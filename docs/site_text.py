@@ -8,7 +8,7 @@ from typing import Any
 import numpy.typing as npt
 from docutils import nodes
 from latex2mathml.converter import convert
-from site_tasks import TASKS
+from site_tasks import NAMES
 from sphinx.application import Sphinx
 from sphinx.util.typing import stringify_annotation
 
@@ -53,8 +53,7 @@ def _docstring(app: Sphinx, what: str, name: str, thing: Any, options: Any, line
 @cache
 def _public_names() -> dict[str, str]:
     """{module and name of a class: the name under which users import it}."""
-    names = [name for _, listed in TASKS.values() for name in listed.split()]
-    things = {f"rom.{name}": attrgetter(name)(rom) for name in names}
+    things = {name: attrgetter(name.removeprefix("rom."))(rom) for name in NAMES}
     return {
         f"{thing.__module__}.{thing.__qualname__}": name
         for name, thing in things.items()

@@ -132,6 +132,7 @@ from rom.model import Orthotropic as Orthotropic
 from rom.model import Region as Region
 from rom.model import Report as Report
 from rom.model import SurfaceMesh as SurfaceMesh
+from rom.places import example as example
 from rom.reduction.bases.assumed import AssumedModes as AssumedModes
 from rom.reduction.bases.balanced import BalancedTruncation as BalancedTruncation
 from rom.reduction.bases.balanced import (

@@ -149,12 +149,3 @@ def check_all_known(
     known = list(known)
     if unknown := [name for name in names if name not in known]:
         raise error(f"{text} {named(unknown)}; there are {offered(known, unknown[0])}.")
-
-
-def check_complete(
-    names: Iterable[object], wanted: Iterable[object], text: str, error: Error = ConfigError
-) -> None:
-    """Refuse names without some that are wanted, in a text that goes on with these."""
-    there = list(names)
-    if missing := [name for name in wanted if name not in there]:
-        raise error(f"{text} {named(missing)}.")

@@ -1,8 +1,11 @@
-"""How records show themselves in notebooks: short tables, nothing computed, everything escaped."""
+"""How records show themselves in notebooks: short tables, everything escaped, figures in frames."""
 
 import html
 from collections.abc import Iterable, Sequence
 from typing import Any
+
+from rom.errors import RomError
+from rom.fields import follow
 
 MAX_ROWS = 20  # rows shown
 
@@ -19,6 +22,14 @@ def html_table(title: str, header: Sequence[str], rows: Iterable[Sequence[Any]])
         f"<div><b>{html.escape(title)}</b>"
         f"<table>{head}<tbody>{''.join(lines)}</tbody></table></div>"
     )
+
+
+def with_figure(shown: object, table: str) -> str:
+    """The table of a body or a motion, below its figure that turns where there is one."""
+    try:
+        return f"{follow('rom.report.viewer:in_notebook')(shown)}{table}"
+    except (ImportError, RomError):  # a library is missing, or the body has no surface
+        return table
 
 
 def _line(tag: str, cells: Sequence[Any]) -> str:

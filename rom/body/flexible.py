@@ -20,7 +20,7 @@ from rom.eigen.supports import Fixed, Springs, spring_matrices
 from rom.eigen.verbs import modes_within
 from rom.errors import ConfigError, ModelError, warn
 from rom.model import Array, Modes
-from rom.notebook import html_table, listed
+from rom.notebook import html_table, listed, with_figure
 from rom.units import unit_system
 
 ENERGY_RTOL = 1e-6  # of states on the very edge of a range
@@ -85,7 +85,7 @@ class FlexibleBody(BodyData):
             ("certificate", evidence),
             *((f"interface {m.name}", f"{m.kind} at {m.point.tolist()}") for m in markers),
         ]
-        return html_table(f"Flexible body {self.name}", ("", ""), rows)
+        return with_figure(self, html_table(f"Flexible body {self.name}", ("", ""), rows))
 
     @property
     def interface_names(self) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ from rom.cli.options import options_of, verb_parsers
 from rom.config.keys import nearest
 from rom.errors import ConfigError, UnknownNameError
 
-VERBS = "doctor open mesh modes reduce check export simulate view report swing".split()
+VERBS = "doctor demo open mesh modes reduce check export simulate view report swing".split()
 LAST_VERBS = ["bench", "completion"]  # behind those of fields
 EXIT_CODES = """\
 exit codes:
@@ -28,6 +28,7 @@ LONGEST_MESSAGE = 500  # letters of what the parser says
 EXAMPLES = """\
 examples:
   rom doctor
+  rom demo --copy                  # meshes/ and demos/ of these examples
   rom mesh meshes/connecting_rod.geo -p lc=4e-3
   rom reduce meshes/connecting_rod.geo --E 210e9 --nu 0.3 --rho 7850 \\
       -i pin_a=rbe2 -i pin_b=rbe2 -m 20 --reference pin_a -o rod.rom.npz

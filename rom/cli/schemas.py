@@ -104,6 +104,13 @@ VERBS: dict[str, Schema] = {
             advice=text("what to type; empty if nothing"),
         ),
     ),
+    "demo": record(
+        "the demos; of one that was run, its numbers; of a copy, its files",
+        optional=("demos", "results", "files"),
+        demos=by_name(by_name(text("one of them"), "its title, needs and time"), "what there is"),
+        results=by_name(by_name(number("one of them"), "value, expected, tolerance"), "numbers"),
+        files=each(text("file"), "files written"),
+    ),
     "mesh": record(
         "what a mesh holds",
         optional=("saved", "faces"),

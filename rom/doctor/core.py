@@ -11,6 +11,8 @@ import re
 import sys
 from pathlib import Path
 
+# functions that tell, of Debian's OpenBLAS and of those in wheels
+CORE_NAMES = [f"{p}openblas_get_corename{s}" for p in ("", "scipy_") for s in ("", "64_")]
 MISTAKEN_CORES = {"Prescott", "Core2", "Generic", "generic"}
 CORE_FLAGS = {
     "SkylakeX": {"avx512f", "avx512bw", "avx512dq", "avx512vl"},
@@ -18,14 +20,16 @@ CORE_FLAGS = {
 }
 
 
-def taken_for() -> str:
-    """The processor OpenBLAS works for; empty without OpenBLAS."""
+def taken_for(file: str = "libopenblas.so.0") -> str:
+    """The processor an OpenBLAS works for; empty where the file is none."""
     try:
-        name = ctypes.CDLL("libopenblas.so.0").openblas_get_corename
-    except (OSError, AttributeError):
+        library = ctypes.CDLL(file)
+    except OSError:
         return ""
-    name.restype = ctypes.c_char_p
-    return str(name().decode())
+    for ask in filter(None, (getattr(library, name, None) for name in CORE_NAMES)):
+        ask.restype = ctypes.c_char_p
+        return str(ask().decode())
+    return ""
 
 
 def abilities(cpuinfo: Path = Path("/proc/cpuinfo")) -> set[str]:

@@ -162,20 +162,34 @@ def pictures(found: dict[str, Answer], ending: str) -> list[Finding]:
 
 
 def blas(mapped: list[str]) -> list[Finding]:
-    """Which BLAS of the files a process with PETSc has mapped, or this one, and how fast it is."""
-    files = sorted({f for f in mapped or mapped_files() if BLAS_FILE.search(f)})
+    """Which BLAS a process with PETSc has mapped, or else this one, and how fast NumPy's is."""
+    files = _blas_files(mapped) or _blas_files(mapped_files())
     slow = [f for f in files if not FAST_BLAS.search(f)]
-    found = [Finding("BLAS", "library", ", ".join(files) or "not found in the memory map")]
-    if slow:
-        named = f"reference, {', '.join(slow)}"
-        found = [Finding("BLAS", "library", named, "note", SLOW_ADVICE)]
-    wanted = better(taken_for(), abilities())
-    if wanted:
-        advice = f"several times faster: export OPENBLAS_CORETYPE={wanted}"
-        found.append(Finding("BLAS", "processor", f"taken for a {taken_for()}", "note", advice))
+    about = _told_by_threadpoolctl()
+    named = ", ".join(f + about.get(f, "") for f in slow or files) or "not found in the memory map"
+    told = (f"reference, {named}", "note", SLOW_ADVICE) if slow else (named,)
+    found = [Finding("BLAS", "library", *told)]
+    for core in dict.fromkeys(taken_for(file) for file in files):
+        if wanted := better(core, abilities()):
+            advice = f"several times faster: export OPENBLAS_CORETYPE={wanted}"
+            found.append(Finding("BLAS", "processor", f"taken for a {core}", "note", advice))
     A = np.ones((400, 400))
     seconds = timeit.repeat(lambda: A @ A, number=1, repeat=2)[1]  # the first one wakes it up
     return [*found, Finding("BLAS", "matrix product", f"{2e-9 * 400**3 / seconds:.1f} GFlop/s")]
+
+
+def _blas_files(files: list[str]) -> list[str]:
+    return sorted({f for f in files if BLAS_FILE.search(f)})
+
+
+def _told_by_threadpoolctl() -> dict[str, str]:
+    """{file: version, processor and threads} of what this process has loaded, where it is there."""
+    try:
+        from threadpoolctl import threadpool_info
+    except ImportError:
+        return {}
+    told = " (version {version}, {architecture}, threads: {num_threads})".format
+    return {one["filepath"]: told(**{"architecture": "any", **one}) for one in threadpool_info()}
 
 
 def machine() -> list[Finding]:

@@ -23,11 +23,11 @@ class Progress:
     def __init__(self, total: float):
         self.total = total
         self._bar: Any = None
-        if sys.stderr.isatty() and find_spec("tqdm") is not None:
-            from tqdm import tqdm
+        if _tqdm_in_notebook() or (sys.stderr.isatty() and find_spec("tqdm") is not None):
+            from tqdm.auto import tqdm
 
             size = get_terminal_size()  # of a terminal without size tqdm would ask in vain
-            at = {"ncols": size.columns - 1, "nrows": size.lines}
+            at = {} if _tqdm_in_notebook() else {"ncols": size.columns - 1, "nrows": size.lines}
             how = {"bar_format": TIME_FORMAT, "leave": False, "file": sys.stderr}
             self._bar = tqdm(total=total, **how, **at)
 
@@ -54,8 +54,16 @@ def line(text: str) -> None:
 
 
 def looked_for() -> bool:
-    """Whether progress is seen and wanted: on the first rank, on a terminal, without ``-q``."""
-    return not ranks()[0] and sys.stderr.isatty() and log.isEnabledFor(logging.WARNING)
+    """Whether progress is seen and wanted: on the first rank, and without ``-q``.
+
+    On a terminal, or in a notebook where tqdm is installed.
+    """
+    seen = sys.stderr.isatty() or _tqdm_in_notebook()
+    return not ranks()[0] and seen and log.isEnabledFor(logging.WARNING)
+
+
+def _tqdm_in_notebook() -> bool:
+    return "ipykernel" in sys.modules and find_spec("tqdm") is not None
 
 
 @contextmanager

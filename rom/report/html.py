@@ -22,6 +22,8 @@ ARRAY_ELEMENT = re.compile(
     r"<script type='application/octet-stream' id='(array-[0-9a-f]+)'>[^<]*</script>"
 )
 KINDS = {".png": "image/png", ".gif": "image/gif"}
+FRAME_STYLE = "width: 100%; height: 43rem; border: 0"
+MAX_FRAME_CHARACTERS = 4_000_000  # of a page in a notebook, which keeps it
 MAX_PICTURE_BYTES = 20_000_000  # more makes a report that browsers cannot open
 
 
@@ -96,14 +98,17 @@ def write_report(sections: dict[str, Sequence[str]], path: str | Path, title: st
         ResourceError: if the disk is full.
     """
     path = check_ending(path, "a report", ".html")
-    return write_whole(path, page(sections, title).encode("utf-8"))
+    return write_whole(path, page(headed(sections, title), title).encode("utf-8"))
 
 
-def page(sections: Mapping[str, Sequence[str]], title: str, script: str = "") -> str:
-    """A page of sections; a script of its own may ask the server that the page comes from."""
-    body = "".join(
-        f"<h2>{html.escape(heading)}</h2>{''.join(blocks)}" for heading, blocks in sections.items()
-    )
+def headed(sections: Mapping[str, Sequence[str]], title: str) -> str:
+    """What stands in a page: its title, and blocks under their headings."""
+    told = (f"<h2>{html.escape(name)}</h2>{''.join(some)}" for name, some in sections.items())
+    return f"<h1>{html.escape(title)}</h1>{''.join(told)}"
+
+
+def page(body: str, title: str, script: str = "") -> str:
+    """A whole page; a script of its own may ask the server that the page comes from."""
     turning = "<figure class='scene" in body
     scripts = [(SOURCE_FOLDER / name).read_text("utf-8") for name in SCRIPTS if turning]
     scripts += [script] if script else []
@@ -114,9 +119,19 @@ def page(sections: Mapping[str, Sequence[str]], title: str, script: str = "") ->
         f'<meta http-equiv="Content-Security-Policy" content="{policy}">'
         f"<meta name='generator' content='{ORIGIN_MARK}'>"
         f"<meta name='viewport' content='width=device-width, initial-scale=1'>"
-        f"<style>{PAGE_STYLE}</style></head><body><h1>{name}</h1>{_once_each(body)}"
+        f"<style>{PAGE_STYLE}</style></head><body>{_once_each(body)}"
         f"{''.join(f'<script>{one}</script>' for one in scripts)}</body></html>\n"
     )
+
+
+def framed(body: str, title: str) -> str:
+    """A page in a frame that shares nothing with the notebook around it, or what to do instead."""
+    text = html.escape(page(body, title))
+    if len(text) > MAX_FRAME_CHARACTERS:
+        return paragraph(
+            f"{title}: {len(text) / 1e6:.1f} MB, too large here; see rom.write_report."
+        )
+    return f'<iframe sandbox="allow-scripts" style="{FRAME_STYLE}" srcdoc="{text}"></iframe>'
 
 
 def _policy(scripts: Sequence[str]) -> str:

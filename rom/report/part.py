@@ -10,7 +10,7 @@ from typing import Any
 from rom.material import SOLIDS
 from rom.model import Array, Index
 from rom.names import ORIGIN_MARK
-from rom.report.html import page
+from rom.report.html import headed, page
 from rom.report.scene import faces_scene
 from rom.report.viewer import figure
 
@@ -36,7 +36,7 @@ def part_page(
         "What is chosen": [_form(), f"<script type='application/json' id='part'>{data}</script>"],
         "The swing": ["<pre id='progress' aria-live='polite'></pre><div id='result'></div>"],
     }
-    return page(sections, title, SCRIPT)
+    return page(headed(sections, title), title, SCRIPT)
 
 
 def known_faces(labels: Iterable[str], listed: Iterable[dict[str, Any]]) -> dict[str, Face]:

@@ -99,8 +99,9 @@ def motion_scene(
     magnify: float = 1.0,
     view: npt.ArrayLike | None = None,
     up: npt.ArrayLike | None = None,
+    size: int = SHAPE_BYTES,
 ) -> Scene:
-    """A motion; arguments as of `rom.view.animate`, but for ``up``: None is against gravity."""
+    """A motion, as of `rom.view.animate`, but ``up`` None is against gravity; size as above."""
     mechanism = solution.mechanism
     given = _meshes(shapes or {}, mechanism)
     positive("magnify", magnify)
@@ -116,7 +117,7 @@ def motion_scene(
     keys = "displacement", "stress"
     largest = {key: max((one[key] for one in limits), default=0.0) for key in keys}
     look = {"view": view, "up": up, "gravity": mechanism.gravity, "magnify": magnify}
-    scene = _scene(title, things, SHAPE_BYTES, look)
+    scene = _scene(title, things, size, look)
     return scene | {"times": array(t - t[0], "float32"), "start": float(t[0]), "limits": largest}
 
 

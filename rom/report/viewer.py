@@ -5,15 +5,20 @@ import html as escaping
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy.typing as npt
 
 from rom.arguments import AnyBody, AnySolution, typed
+from rom.body.flexible import FlexibleBody
 from rom.report import html
 from rom.report.scene import Scene, modes_scene, motion_scene
 from rom.view.canvas.solids import Mesh
 
+if TYPE_CHECKING:
+    from rom.mbs.results.solution import Solution
+
+NOTEBOOK_BYTES = 400_000  # of all shapes of a figure in a notebook, which keeps it
 NEEDED_WORDS = "the browser needs JavaScript and WebGL 2, which are switched off or missing here."
 MESSAGES = {
     True: f"This is a still picture: for one that turns and moves, {NEEDED_WORDS}",
@@ -68,6 +73,15 @@ def motion(
     """
     scene = motion_scene(solution, shapes=shapes, magnify=magnify, view=view, up=up)
     return figure(scene, _still(still), caption or MOTION_WORDS)
+
+
+def in_notebook(shown: "FlexibleBody | Solution") -> str:
+    """The modes of a body or a motion, in a frame, on coarser surfaces than in a report."""
+    if isinstance(shown, FlexibleBody):
+        scene = modes_scene(shown, size=NOTEBOOK_BYTES)
+    else:
+        scene = motion_scene(shown, size=NOTEBOOK_BYTES)
+    return html.framed(figure(scene, (), ""), scene["title"])
 
 
 def modes_words(name: str) -> str:

@@ -6,6 +6,7 @@ from dataclasses import asdict
 import pytest
 
 import rom
+import rom.places
 from benchmarks.benchmarks import Figure
 from cases.files.schema import answer, errors
 from cases.files.toml_files import PENDULUM
@@ -24,6 +25,7 @@ ANSWERS = {
                  "--history", "csv", "-o", "out"],
     "report": ["report", "out_of_before", "-o", "r.html"],
     "bench": ["bench", "--list"],
+    "demo": ["demo"],
     "completion": ["completion", "bash"],
 }  # fmt: skip
 
@@ -48,6 +50,26 @@ def test_an_answer_is_as_its_schema_says(case, folder, capsys, monkeypatch):
     found = answer(capsys, *ANSWERS[case], "-q", codes=(0, 5))
     assert "error" not in found and found["ok"] is ("failed" not in found)
     assert ("failed" in found) >= ("failed gate" in case)
+
+
+DEMO = """
+import sys
+from pathlib import Path
+out = Path(sys.argv[2])
+(out / "a.png").write_text("picture")
+results = {"right": (1.01, 1.0, 0.1), "wrong": (2.0, 1.0, 0.1)}
+print("spoken")
+"""
+
+
+def test_a_demo_is_run_as_a_program_and_judged_by_its_numbers(tmp_path, capsys, monkeypatch):
+    (tmp_path / "demos").mkdir()
+    (tmp_path / "demos" / "demo_two.py").write_text(DEMO)
+    monkeypatch.setattr(rom.places, "EXAMPLES", tmp_path)
+    found = answer(capsys, "demo", "two", "-o", tmp_path / "out", codes=(5,))
+    assert found["failed"] == ["wrong = 2, expected 1 within 0.1"]
+    assert found["files"] == [str(tmp_path / "out" / "a.png")]
+    assert main(["demo", "two", "-o", str(tmp_path / "out")]) == 2  # the picture is not of rom
 
 
 def test_the_checker_takes_records_that_take_long_to_make_and_finds_what_is_wrong(capsys):

@@ -15,7 +15,7 @@ from cases.command import environment, python
 from cases.command import rom as command
 from cases.long import few
 from rom.doctor import first_use, libraries
-from rom.doctor.core import abilities, better
+from rom.doctor.core import abilities, better, taken_for
 from rom.doctor.libraries import blas, damaged_files, fenicsx
 from rom.doctor.probes import compiled
 from rom.fe import GMSH_LIBRARIES, HELPER_MODULE, WHEEL_PACKAGES
@@ -143,7 +143,11 @@ def test_the_slow_reference_blas_is_told_from_fast_ones(mapped, state):
     assert library.state == state
     assert ("libopenblas0-pthread" in library.advice) == (state == "note")
     assert float(speed.value.split()[0]) > 0.1
-    assert "not found" not in blas([])[0].value  # that of this process
+    own = blas(["/usr/lib/libc.so.6"])[0].value  # that of this process
+    assert "blas" in own and "not found" not in own
+    assert any(taken_for(file.partition(" (")[0]) for file in own.split(", ")) == (
+        "openblas" in own
+    )
 
 
 @pytest.mark.parametrize(
@@ -160,7 +164,7 @@ def test_a_mistaken_openblas_is_reported_with_its_cure(monkeypatch, tmp_path):
     told = tmp_path / "cpuinfo"
     told.write_text("processor\t: 0\nflags\t\t: fma avx2\n\nprocessor\t: 1\nflags\t\t: sse\n")
     assert abilities(told) == {"fma", "avx2"} and abilities(tmp_path / "nothing") == set()
-    monkeypatch.setattr(libraries, "taken_for", lambda: "Prescott")
+    monkeypatch.setattr(libraries, "taken_for", lambda file: "Prescott")
     monkeypatch.setattr(libraries, "abilities", lambda: {"avx2", "fma"})
     note = next(finding for finding in blas([OPENBLAS]) if finding.name == "processor")
     assert (note.state, note.advice[-7:]) == ("note", "Haswell")

@@ -1,5 +1,8 @@
-"""Records in a notebook: short, escaped, and nothing is computed to show them."""
+"""Records in a notebook: short and escaped, with figures in frames of their own."""
 
+import re
+from dataclasses import replace
+from html import unescape
 from html.parser import HTMLParser
 
 import numpy as np
@@ -9,6 +12,7 @@ import rom
 from cases.solid import block, reduced
 from rom.model import Report, Row
 from rom.notebook import MAX_ROWS, html_table, listed
+from rom.report import html
 
 
 class Cells(HTMLParser):
@@ -54,6 +58,19 @@ def test_a_body():
     assert repr(bar).startswith("FlexibleBody('<b>bar': 62.8 kg, ") and len(repr(bar)) < 200
 
 
+def test_a_figure_stands_in_a_frame_and_a_large_one_or_none_in_no_way(monkeypatch):
+    bar = reduced(4, block(cells=(4, 1, 1)), name="bar")
+    text = bar._repr_html_()
+    (frame,) = re.findall(r'<iframe sandbox="allow-scripts" .*? srcdoc="([^"]*)"></iframe>', text)
+    assert len(frame) < html.MAX_FRAME_CHARACTERS < 5e6
+    page = unescape(frame)
+    assert page.count("<figure class='scene") == 1 and "script-src 'sha256" in page
+    assert "<script" not in text and "<style" not in text
+    monkeypatch.setattr(html, "MAX_FRAME_CHARACTERS", len(frame) - 1)
+    for text in (bar._repr_html_(), replace(bar, surface=None)._repr_html_()):
+        assert "<iframe" not in text and len(Cells(text).rows) > 8
+
+
 def test_a_report_begins_with_what_fails():
     report = Report("gate", (Row("good", 1.0, "<= 2", True), Row("bad", 3.0, "<= 2", False)))
     assert [row[0] for row in Cells(report._repr_html_()).rows] == ["quantity", "bad", "good"]
@@ -72,7 +89,7 @@ def test_a_motion_and_its_mechanism():
     rows = dict(Cells(motion._repr_html_()).rows)
     assert rows["instants"] == "11" and rows["bodies"] == "<bob>"
     assert rows["event never"] == "0 times"
-    assert not motion._tracks and "energy" not in vars(motion)  # nothing was followed
+    assert "energy" not in vars(motion)
     assert repr(motion) == "Solution(11 instants, 0 to 0.01 s, bodies <bob>: Reached t = 0.01 s.)"
     mechanism = motion.mechanism
     assert Cells(mechanism._repr_html_()).rows[1:] == [

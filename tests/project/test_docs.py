@@ -72,6 +72,8 @@ def public_names():
 def test_every_public_name_stands_exactly_once_among_the_tasks(pages):
     named = [name for _, names in pages.TASKS.values() for name in names.split()]
     assert set(named) == public_names() and len(named) == len(set(named))
+    files = {pages.FILE_NAMES.get(name, name).lower() for name in pages.NAMES}
+    assert len(files) == len(named)  # some file systems do not tell capitals
     shown = pages.interface_pages()
     tasks = "\n".join(text for page, text in shown.items() if page.startswith("task_"))
     listed = re.findall(r"^   rom\.(\S+)$", tasks, re.M)

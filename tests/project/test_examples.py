@@ -13,6 +13,7 @@ import pytest
 from scipy.sparse import csr_matrix
 
 import rom
+from cases.command import environment
 from cases.files.docstrings import Callable, definitions, pages_and_demos, public
 from cases.paths import ROOT
 from cases.solid import block
@@ -113,15 +114,13 @@ def values(words, text):
 def run(tmp_path_factory):
     nbformat = pytest.importorskip("nbformat", reason="notebooks need the extra [docs]")
     nbclient = pytest.importorskip("nbclient", reason="notebooks need the extra [docs]")
-    above = tmp_path_factory.mktemp("clone")
-    folder = above / "docs" / "notebooks"
-    folder.mkdir(parents=True)
-    (above / "meshes").symlink_to(ROOT / "meshes")
+    folder = tmp_path_factory.mktemp("notebooks")
 
     def text(name):
         notebook = nbformat.read(FOLDER / f"{name}.ipynb", as_version=4)
         resources = {"metadata": {"path": str(folder)}}
-        nbclient.NotebookClient(notebook, timeout=600, resources=resources).execute()
+        client = nbclient.NotebookClient(notebook, timeout=600, resources=resources)
+        client.execute(env=environment())
         return printed(notebook)
 
     return text

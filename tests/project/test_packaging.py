@@ -53,9 +53,9 @@ def shipped(tmp_path_factory):
     folder = tmp_path_factory.mktemp("shipped")
     tree = folder / "tree"
     tree.mkdir()
-    for name in ("pyproject.toml", "README.md", "LICENSE"):
+    for name in ("pyproject.toml", "setup.py", "MANIFEST.in", "README.md", "LICENSE"):
         shutil.copy(ROOT / name, tree)
-    for name in ("rom", "benchmarks"):
+    for name in ("rom", "benchmarks", "demos", "meshes"):
         shutil.copytree(ROOT / name, tree / name, ignore=shutil.ignore_patterns("__pycache__"))
     sdist = hook("build_sdist", tree, folder)
     shutil.unpack_archive(sdist, folder / "unpacked")
@@ -83,6 +83,8 @@ def test_the_wheel_holds_every_module_and_its_data(shipped):
     names = set(zipfile.ZipFile(shipped[1]).namelist())
     files = [p for p in (ROOT / "rom").rglob("*") if p.is_file() and "__pycache__" not in p.parts]
     wanted = {str(p.relative_to(ROOT)) for p in files}
+    examples = [*ROOT.glob("demos/*.[pt][yo]*"), *ROOT.glob("meshes/*.*")]
+    wanted |= {f"rom/examples/{p.relative_to(ROOT)}" for p in examples}
     parts = ("blade", "elements", "profiles")
     tables = {f"rom/components/wind/nrel5mw_{name}.csv" for name in parts}
     assert {"rom/py.typed", *tables} <= wanted <= names
@@ -98,6 +100,22 @@ def test_the_wheel_asks_pip_for_three_libraries_and_has_the_command(shipped, ins
     assert metadata["Version"] == rom.__version__
     done = started(installed, tmp_path, installed / "bin" / "rom", "--version")
     assert done.stdout.split() == ["rom", rom.__version__], done.stderr
+
+
+def test_examples_are_found_installed_as_in_a_clone_and_copied_once(installed, tmp_path):
+    for place, home in ((installed, installed / "rom" / "examples"), (ROOT, ROOT)):
+        words = ("-P", "-m", "rom", "demo", "--copy", "-o", place.name)
+        for _ in range(2):  # the same again is no harm, another file of that name is kept
+            assert started(place, tmp_path, *words).returncode == 0
+        for kind, name in (("demos", "demo_beam.py"), ("meshes", "beam.geo")):
+            copy = tmp_path / place.name / kind / name
+            assert copy.read_bytes() == (home / kind / name).read_bytes()
+        copy.write_text("mine")
+        done = started(place, tmp_path, *words)
+        assert done.returncode == 2 and f"{copy.name} is there already" in done.stderr
+        assert copy.read_text() == "mine"
+        done = started(place, tmp_path, "-P", "-c", "import rom; print(rom.example('beam.geo'))")
+        assert done.stdout.strip() == str(home / "meshes" / "beam.geo")
 
 
 def test_benchmarks_are_in_the_source_and_said_to_be_where_they_are_not(installed, tmp_path):

@@ -12,16 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.sparse import csr_matrix, identity, kron
 
-from rom.arguments import (
-    Count,
-    Positive,
-    between,
-    finite,
-    not_negative,
-    positive,
-    shortened,
-    typed,
-)
+from rom.arguments import Count, Positive, between, finite, not_negative, positive, shortened, typed
 from rom.components.assumed_strain import kernels
 from rom.components.assumed_strain.actions import Actions, dofs_of, nodal, prepared
 from rom.components.assumed_strain.triangles import (

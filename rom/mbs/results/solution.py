@@ -30,7 +30,7 @@ from rom.mbs.results.state import State
 from rom.mbs.results.whereabouts import Whereabouts
 from rom.model import Array, Index
 from rom.names import check_known
-from rom.notebook import html_table, listed
+from rom.notebook import html_table, listed, with_figure
 from rom.rotation import matrix
 
 Place = str | tuple[float, float, float]
@@ -142,7 +142,7 @@ class Solution(Whereabouts, Columns, metaclass=Open, kind="columns", bound=typed
             *plain,
             *happened,
         ]
-        return html_table(f"Motion. {self.status}", ("", ""), rows)
+        return with_figure(self, html_table(f"Motion. {self.status}", ("", ""), rows))
 
     def at(self, t: npt.ArrayLike) -> "Solution":
         """The motion at other times, with everything that can be asked of a solution.

@@ -23,11 +23,7 @@ def chained(f, f1, f2, a):
 @inner
 def product(a, b):
     """The product a b."""
-    return (
-        a[0] * b[0],
-        a[1] * b[0] + a[0] * b[1],
-        a[2] * b[0] + 2.0 * a[1] * b[1] + a[0] * b[2],
-    )
+    return (a[0] * b[0], a[1] * b[0] + a[0] * b[1], a[2] * b[0] + 2.0 * a[1] * b[1] + a[0] * b[2])
 
 
 @inner
