@@ -41,7 +41,6 @@ def file(tmp_path_factory):
 
 @pytest.fixture
 def geometry(monkeypatch):
-    pytest.importorskip("dolfinx", reason="dolfinx is not installed")
     monkeypatch.chdir(ROOT)
     return "meshes/beam.geo"
 

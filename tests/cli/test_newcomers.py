@@ -171,7 +171,6 @@ def test_outputs_have_names_of_their_own(tmp_path, monkeypatch, capsys):
 
 @pytest.mark.fenicsx
 def test_a_solid_by_name_is_that_by_numbers(tmp_path, monkeypatch, capsys):
-    pytest.importorskip("dolfinx", reason="finite elements")
     monkeypatch.chdir(tmp_path)
     step_box("bar.step", 100, 20, 10)
     base = ("modes", "bar.step", "-p", "lc=0.02", "-n", 8)
@@ -186,7 +185,6 @@ def test_a_solid_by_name_is_that_by_numbers(tmp_path, monkeypatch, capsys):
 @pytest.mark.fenicsx
 def test_solids_that_touch_are_one_where_that_is_asked_for(tmp_path, monkeypatch, capsys):
     """As the bar in one piece: the first bending frequency, to what another mesh changes."""
-    pytest.importorskip("dolfinx", reason="finite elements")
     monkeypatch.chdir(tmp_path)
     for name, at in (("touching", 100), ("apart", 101)):
         with step_part(f"{name}.step") as occ:
@@ -207,7 +205,6 @@ def test_solids_that_touch_are_one_where_that_is_asked_for(tmp_path, monkeypatch
 def test_a_part_alone_is_told_its_faces_and_the_next_command_works(tmp_path):
     """A face that is drawn, the command that is proposed, a report that turns at the end."""
     pytest.importorskip("pyvista", reason="pictures need pyvista")
-    pytest.importorskip("dolfinx", reason="finite elements")
     step_plate(tmp_path / "plate.step")
     listed = run_rom("swing", "plate.step", "--json", "-q", cwd=tmp_path)
     found = json.loads(listed.stdout)
