@@ -36,22 +36,15 @@ class Record:
 
     def write(self, paths: list[Path], solution: "rom.mbs.Solution", audit: Report) -> None:
         """Write it as the last of the files of a run."""
-        files = [path.name for path in paths]
-        text = json.dumps(self._data(files, solution, audit), indent=2)
-        write_whole(paths[-1], text.encode())
-
-    def _data(
-        self, files: list[str], solution: "rom.mbs.Solution", audit: Report
-    ) -> dict[str, Any]:
         parts, joints = solution.mechanism.parts.items(), solution.mechanism.joints.items()
-        return {
+        data = {
             "schema": "rom-run",
             "version": [1, 0],
             "name": self.name,
             "command": self.command,
             "versions": {"rom": self.version} | versions(),
             "source": self.source,
-            "files": files,
+            "files": [path.name for path in paths],
             "status": solution.status,
             "steps": len(solution.t) - 1,
             "t_end": float(solution.t[-1]),
@@ -66,6 +59,7 @@ class Record:
                 "rows": [[r.quantity, float(r.value), r.limit, bool(r.ok)] for r in audit.rows],
             },
         }
+        write_whole(paths[-1], json.dumps(data, indent=2).encode())
 
 
 @dataclass(frozen=True, slots=True)

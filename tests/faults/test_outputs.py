@@ -160,7 +160,18 @@ def test_every_verb_that_writes_has_force():
         options = {a.dest for a in sub._actions}
         have |= {verb} if "force" in options else set()
         write |= {verb} if options & {"output", "save"} else set()
-    named = {"open", "mesh", "reduce", "export", "simulate", "view", "report", "swing", "update"}
+    named = {
+        "demo",
+        "open",
+        "mesh",
+        "reduce",
+        "export",
+        "simulate",
+        "view",
+        "report",
+        "swing",
+        "update",
+    }
     assert have == write == named
 
 

@@ -39,6 +39,7 @@ STEEL = ("--E", "210e9", "--nu", "0.3", "--rho", "7850")
 REDUCE = ("box.geo", *STEEL, "-i", "root=rbe2", "-m", "4", "--reference", "root")
 VERBS = {  # verb: a line that does what the verb is for
     "doctor": (),
+    "demo": (),
     "open": ("--help",),
     "mesh": ("box.geo", "--save", "box.vtu"),
     "modes": ("box.geo", *STEEL, "-n", "4"),

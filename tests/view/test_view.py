@@ -133,6 +133,7 @@ def test_wrong_requests_are_refused(bar, tmp_path):
     wrong, film, picture = {"boll": view.box((1, 1, 1))}, tmp_path / "a.gif", tmp_path / "a.png"
     long, short = [("x", {"one": [1, 2, 3]})], [("error", {"x": ([1, 2], [1.0])})]
     odd = [("y", {"seen": ([0.0, 0.5, 1.0], [1.0, 2.0])})]
+    panel = view.Panel("", "", curves={"one": ([1, 2], [1])})
     for words, draw in {
         "ending '.jpg'": lambda: view.mode_shapes(bar, tmp_path / "modes.jpg"),
         "does not exist": lambda: view.animate(mech, sol, tmp_path / "nowhere" / "film.gif"),
@@ -142,6 +143,7 @@ def test_wrong_requests_are_refused(bar, tmp_path):
         "no two directions": lambda: view.mode_shapes(bar, picture, view=(0, 0, 1), up=(0, 0, 2)),
         "3 values of 'one' for 2 times": lambda: view.history([0, 1], long, picture),
         "2 values of 'seen' for 3 times": lambda: view.history([0, 1], odd, picture),
+        "1 values of 'one' for 2 places": lambda: view.panels([[panel]], picture),
         "1 errors of 'x' for 2 sizes": lambda: view.convergence(short, picture, xlabel="modes"),
         r"view has shape \(2,\), needed is \(3,\).*three numbers": lambda: seen(view=(0, 1)),
         "up = .*nan.* is not finite": lambda: seen(up=(0, np.nan, 1)),
@@ -174,21 +176,6 @@ def test_vtk_stays_in_the_process_that_draws_and_says_so_if_it_cannot(bar, tmp_p
 def test_ticks_too_close_for_words_have_none():
     sizes = [12, 18, 24, 30, 36, 60, 90, 96, 99, 126, 1482]
     assert _apart(sizes, 1500 / 11) == [f"{x}" * (x not in (96, 99)) for x in sizes]
-
-
-def test_panels_stand_in_rows_with_lines_points_and_bars(tmp_path):
-    x = np.linspace(0, 1, 9)
-    path = view.Panel("Path", "x [m]", "y [m]", {"one": (x, x)}, {"seen": (x, 1 - x)}, equal=True)
-    bars = view.Panel("Bars", "change [%]", bars={"first": (-2.0, 3.0), "second": (-1.0, 1.0)})
-    view.panels([[path, bars], [path]], tmp_path / "p.png", title="Title", caption="Words.")
-    blue = np.abs(pixels(tmp_path / "p.png") - BLUE).max(axis=2) < 12
-    middle = blue.shape[0] // 2
-    assert blue[middle:].sum() > 300
-    assert blue[:middle, :700].sum() > 100
-    rows = blue[:middle, 800:].sum(axis=1)
-    assert rows.max() > 1.5 * rows[rows > 50].min()  # the first bar is 2.5 times as long
-    wrong = view.Panel("", "", curves={"one": ([1, 2], [1])})
-    refuses(ConfigError, "1 values of 'one' for 2 places", view.panels, [[wrong]])
 
 
 def test_a_plane_shows_values_outlines_and_the_first_index_along_x(tmp_path):

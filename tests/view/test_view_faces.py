@@ -17,13 +17,11 @@ SIZE = (0.3, 0.2, 0.1)
 
 def box_patches():
     points, triangles = view.box(SIZE)
-    normals = [np.cross(*(points[t[1:]] - points[t[0]])) for t in triangles]
-    sides = [(k, sign) for k in range(3) for sign in (-1, 1)]
+    at = points[triangles]
     return points, {
-        "xyz"[k] + "+-"[sign < 0]: np.array(
-            [t for t, n in zip(triangles, normals, strict=True) if sign * n[k] > 1e-9]
-        )
-        for k, sign in sides
+        f"{'xyz'[k]}{'+-'[sign < 0]}": triangles[(sign * at[..., k] > 0).all(axis=1)]
+        for k in range(3)
+        for sign in (-1, 1)
     }
 
 

@@ -49,13 +49,13 @@ def fake(tmp_path, monkeypatch):
 def test_ffmpeg_is_given_all_frames_of_even_size_and_their_pace(fake, tmp_path):
     path = Film(PAGES, 0.04).save(tmp_path / "a.mp4")
     data = path.read_bytes()
-    assert data.endswith(even(PAGES).tobytes())
-    words = data[8 : -even(PAGES).size].decode().split(" ")
+    pages = even(PAGES)
+    assert data.endswith(pages.tobytes())
+    words = data[8 : -pages.size].decode().split(" ")
     said = dict(pairwise(words))
     assert (said["-f"], said["-pix_fmt"]) == ("rawvideo", "yuv420p")
     assert (said["-s"], said["-c:v"], float(said["-framerate"])) == ("8x6", "libx264", 25.0)
     assert is_ours(path, "mp4") and not is_ours(fake / "ffmpeg", "mp4")
-    pages = even(PAGES)
     assert pages.shape == (3, 6, 8, 3)
     np.testing.assert_array_equal(pages[:, :5, :7], PAGES)
     np.testing.assert_array_equal(pages[:, 5, :7], PAGES[:, 4])
@@ -112,7 +112,6 @@ def test_progress_and_stages_are_shown_on_a_terminal_and_cleared(monkeypatch):
     text = followed(monkeypatch, Terminal())
     assert "\rdrawing   20 %" in text and text.endswith("\r")
     assert text.rsplit("\r", 2)[-2].strip() == ""
-    monkeypatch.setattr(progress, "find_spec", lambda name: None)
     text = staged(monkeypatch, Terminal())
     shown = [part.strip() for part in text.split("\r")[1:]]
     assert shown == ["factor    0 %", "solve   50 %", "", ""]

@@ -229,7 +229,6 @@ def test_ground_is_hatched_all_around():
 
 @pytest.mark.once
 def test_a_plotter_is_had_where_dolfinx_is_not_loaded_only(monkeypatch):
-    pytest.importorskip("pyvista", reason="pyvista is not installed")
     monkeypatch.setitem(sys.modules, "dolfinx", ModuleType("dolfinx"))
     refuses(rom.ConfigError, "dolfinx is loaded in this process", view.plotter, lattice_bar())
 

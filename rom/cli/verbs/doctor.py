@@ -7,14 +7,11 @@ With --compile, what is compiled at first use is compiled now, and 5 says that s
 import argparse
 import logging
 from dataclasses import asdict
-from typing import TYPE_CHECKING
 
 import rom
 from rom.cli.answer import Answer
 from rom.cli.options import option
-
-if TYPE_CHECKING:
-    from rom.doctor.probes import Finding
+from rom.doctor.probes import Finding, compiled, start
 
 log = logging.getLogger("rom")
 SUMMARY = "versions, speed of the linear algebra, display, caches, advice"
@@ -41,10 +38,9 @@ def run(args: argparse.Namespace) -> Answer:
     return Answer(data, f"rom {rom.__version__}\n{_text(found)}", failed=broken)
 
 
-def _diagnosed(fix: bool) -> "list[Finding]":
+def _diagnosed(fix: bool) -> list[Finding]:
     """Findings in the order of the report; what could crash runs in a process of its own."""
     from rom.doctor import libraries
-    from rom.doctor.probes import start
 
     fe = start("rom.fe.probe", *(["--fix"] if fix else []))
     drawing = start("rom.doctor.libraries")
@@ -59,9 +55,8 @@ def _diagnosed(fix: bool) -> "list[Finding]":
     ]
 
 
-def _compiled(what: str) -> "list[Finding]":
+def _compiled(what: str) -> list[Finding]:
     from rom.doctor import first_use
-    from rom.doctor.probes import compiled
 
     cases = first_use.DEMO_CASES if what == "demo" else tuple(first_use.CASES)
     found = {}
@@ -71,7 +66,7 @@ def _compiled(what: str) -> "list[Finding]":
     return [found[case] for case in cases]
 
 
-def _text(found: "list[Finding]") -> str:
+def _text(found: list[Finding]) -> str:
     width, lines, topic = max(len(f.name) for f in found), [], ""
     for f in found:
         if f.topic != topic:

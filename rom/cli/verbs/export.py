@@ -4,7 +4,6 @@ A mechanism becomes a Functional Mock-up Unit, .fmu.
 """
 
 import argparse
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
@@ -47,12 +46,11 @@ def run(args: argparse.Namespace) -> Answer:
     from rom.io.files import check_writable
 
     check_writable(args.output)
-    write: Callable[[], object]
     if described(args):
         file, kind = mechanism(args, "inputs", "outputs"), "fmu"
         checked(args, args.output, kind, inputs=files_in(file.values))
         what, ends = f"mechanism {file.name}", {"inputs": args.inputs, "outputs": args.outputs}
-        write = partial(rom.write_mechanism_fmu, file, args.output, **ends)
+        write = partial[object](rom.write_mechanism_fmu, file, args.output, **ends)
     else:
         if wrong := [option for option in MECHANISM_OPTIONS if getattr(args, option)]:
             raise rom.ConfigError(f"--{wrong[0]} needs the .toml file of a mechanism.")

@@ -99,7 +99,6 @@ def run(args: argparse.Namespace) -> Answer:
     dt = swing.t_end / N_STEPS
     solution = rom.simulate(hung, t_end=swing.t_end, dt=dt, rho_inf=0.5)
     magnify = args.magnify or magnification(body, solution.elastic(body.name))
-    certificate = body.certificate
     data = {
         "files": [str(path) for path in files.values()],
         "mass": body.mass,
@@ -108,9 +107,9 @@ def run(args: argparse.Namespace) -> Answer:
         "t_end": swing.t_end,
         "magnify": magnify,
         "frequencies": body.frequencies(6, fixed=(hinge,)).tolist(),
-        "certificate": report_data(certificate),
+        "certificate": report_data(body.certificate),
     }
-    failed = tuple(text for text in failures(certificate) if not text.startswith("free:"))
+    failed = tuple(text for text in failures(body.certificate) if not text.startswith("free:"))
     write = partial(_write, files, body, solution, magnify, typed_command(args))
     return Answer(data, _text(body, hinge, data), write, failed)
 

@@ -15,10 +15,8 @@ def lattice_bar():
     data = lattice(stiffness=4e5)
     body = lattice_body(data)
     x = data[0]
-    triangles = [
-        (3 * s + a, 3 * s + (a + 1) % 3, 3 * s + 3 + a) for s in range(4) for a in range(3)
-    ] + [(3 * s + 3 + a, 3 * s + (a + 1) % 3, 3 * s + 3 + (a + 1) % 3)
-         for s in range(4) for a in range(3)]  # fmt: skip
+    corners = [(3 * s + a, 3 * s + (a + 1) % 3) for s in range(4) for a in range(3)]
+    triangles = [(i, j, i + 3) for i, j in corners] + [(i + 3, j, j + 3) for i, j in corners]
     shape = np.vstack([body.markers[f"n{i}"].translation for i in range(len(x))])
     return replace(body, surface=Surface(x, np.array(triangles), shape))
 
