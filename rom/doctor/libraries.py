@@ -100,7 +100,7 @@ def _launcher(library: str) -> Finding:
         return Finding("FEniCSx", mpirun.PROGRAM_NAME, "not installed", state, advice)
     launcher = mpirun.version(program)
     value = f"{program}, {launcher or 'of which MPI is not known'}"
-    kinds = [kind for kind in mpirun.KINDS if library.startswith(kind)]
+    kinds = [kind for kind, _ in mpirun.VERSIONS if library.startswith(kind)]
     if launcher and kinds and not launcher.startswith(kinds[0]):
         value += f"; Python loads {kinds[0]}, whose processes it cannot bring together"
         return Finding("FEniCSx", mpirun.PROGRAM_NAME, value, "note", command(*LAUNCHERS))
@@ -179,7 +179,8 @@ def _display(picture: Answer | None, ending: str) -> Finding:
 def blas(mapped: list[str]) -> list[Finding]:
     """Which BLAS a process with PETSc has mapped, or else this one, and how fast NumPy's is."""
     speed = _gigaflops()
-    files = _blas_files(mapped) or _blas_files(mapped_files())
+    theirs, own = ({f for f in some if BLAS_FILE.search(f)} for some in (mapped, mapped_files()))
+    files = sorted(theirs or own)
     slow = [f for f in files if not FAST_BLAS.search(f)]
     about = _told_by_threadpoolctl()
     named = ", ".join(f + about.get(f, "") for f in slow or files) or "not found in the memory map"
@@ -190,10 +191,6 @@ def blas(mapped: list[str]) -> list[Finding]:
             advice = f"several times faster: export OPENBLAS_CORETYPE={wanted}"
             found.append(Finding("BLAS", "processor", f"taken for a {core}", "note", advice))
     return [*found, Finding("BLAS", "matrix product", f"{speed:.1f} GFlop/s")]
-
-
-def _blas_files(files: list[str]) -> list[str]:
-    return sorted({f for f in files if BLAS_FILE.search(f)})
 
 
 def _told_by_threadpoolctl() -> dict[str, str]:

@@ -15,7 +15,6 @@ VERSIONS = (  # what they say of themselves
     (OPEN_MPI, re.compile(r"\(Open MPI\) (\S+)")),
     (MPICH_NAME, re.compile(r"HYDRA build details:\s+Version:\s+(\S+)")),
 )
-KINDS = (OPEN_MPI, MPICH_NAME)
 TIME_LIMIT = 20.0  # [s] for saying a version
 
 
