@@ -71,6 +71,7 @@ from rom.components.wheels.travelling import WheelCampbell as WheelCampbell
 from rom.components.wheels.travelling import travelling_modes as travelling_modes
 from rom.components.wheels.travelling import wheel_campbell as wheel_campbell
 from rom.config.component import read_component as read_component
+from rom.config.examples import example as example
 from rom.config.mechanism import read_mechanism as read_mechanism
 from rom.config.mechanism_fmu import write_mechanism_fmu as write_mechanism_fmu
 from rom.errors import ConfigError as ConfigError
@@ -132,7 +133,6 @@ from rom.model import Orthotropic as Orthotropic
 from rom.model import Region as Region
 from rom.model import Report as Report
 from rom.model import SurfaceMesh as SurfaceMesh
-from rom.places import example as example
 from rom.reduction.bases.assumed import AssumedModes as AssumedModes
 from rom.reduction.bases.balanced import BalancedTruncation as BalancedTruncation
 from rom.reduction.bases.balanced import (

@@ -3,6 +3,6 @@
 `document` knows the lines of a file, `keys` what a table of keys says of it, `declared` makes such
 a table of signatures; `component` and `mechanism` read by those of `component_keys` and
 `mechanism_keys`, with `methods` and `laws` by name; `mechanism_fmu` packs a mechanism with its
-bodies, `page` is their documentation. In mechanism files, `expressions` reads formulas,
-`python_files` runs functions if they are trusted and `connections` calls the methods.
+bodies, `page` is their documentation, `examples` come with rom. In mechanism files, `expressions`
+reads formulas, `python_files` runs functions if they are trusted, `connections` calls the methods.
 """

@@ -163,7 +163,8 @@ def pictures(found: dict[str, Answer], ending: str) -> list[Finding]:
 
 def blas(mapped: list[str]) -> list[Finding]:
     """Which BLAS a process with PETSc has mapped, or else this one, and how fast NumPy's is."""
-    files = _blas_files(mapped) or _blas_files(mapped_files())
+    theirs, own = ({f for f in some if BLAS_FILE.search(f)} for some in (mapped, mapped_files()))
+    files = sorted(theirs or own)
     slow = [f for f in files if not FAST_BLAS.search(f)]
     about = _told_by_threadpoolctl()
     named = ", ".join(f + about.get(f, "") for f in slow or files) or "not found in the memory map"
@@ -176,10 +177,6 @@ def blas(mapped: list[str]) -> list[Finding]:
     A = np.ones((400, 400))
     seconds = timeit.repeat(lambda: A @ A, number=1, repeat=2)[1]  # the first one wakes it up
     return [*found, Finding("BLAS", "matrix product", f"{2e-9 * 400**3 / seconds:.1f} GFlop/s")]
-
-
-def _blas_files(files: list[str]) -> list[str]:
-    return sorted({f for f in files if BLAS_FILE.search(f)})
 
 
 def _told_by_threadpoolctl() -> dict[str, str]:

@@ -52,13 +52,10 @@ def test_an_answer_is_as_its_schema_says(case, folder, capsys, monkeypatch):
     assert ("failed" in found) >= ("failed gate" in case)
 
 
-DEMO = """
-import sys
-from pathlib import Path
-out = Path(sys.argv[2])
+DEMO = """import pathlib, sys
+out = pathlib.Path(sys.argv[2])
 (out / "a.png").write_text("picture")
-results = {"right": (1.01, 1.0, 0.1), "wrong": (2.0, 1.0, 0.1)}
-print("spoken")
+results = {"right": (1.01, 1.0, 0.1), "wrong": (2.0, 1.0, 0.1)}; print("spoken")
 """
 
 

@@ -32,7 +32,7 @@ ALONE = {
 # inside each folder that has folders, what lies lower stands first; a file imports its own folder
 # or a lower one
 ORDERED = """
-rom: errors rotation fields notebook lazy names places readable process plausible units arguments
+rom: errors rotation places fields notebook lazy names readable process plausible units arguments
   material model rows paths decks eigen reduction body fe checks stages workflow assembly cyclic
   parametric updating prestress io mbs fmu view config report doctor cli components __main__
 cli: answer speech schemas options described matrices output verbs parser main

@@ -14,9 +14,9 @@ from runpy import run_path
 from rom.cli.answer import Answer, Data
 from rom.cli.options import option
 from rom.cli.output import add_force, checked, claim
+from rom.config.examples import examples
 from rom.errors import ConfigError
 from rom.names import check_known
-from rom.places import examples
 
 SUMMARY = "list, run or copy the demos"
 EXAMPLES = """\

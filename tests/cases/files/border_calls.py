@@ -228,6 +228,7 @@ GIVEN = {  # callable -> legal values of its own
     },
     "inverse_dynamics": lambda: {"mechanism": driven(free=False), "t": [0.0, 1e-3]},
     "linearize": dict,
+    "example": lambda: {"name": "beam.geo"},
     "load": lambda: {"path": "body.rom.npz"},
     "load_state": lambda: {"path": "state.npz"},
     "modes": lambda: {"n": 1},
