@@ -14,7 +14,7 @@ from cases.beam import gauss_hermite, hermite_beam
 from cases.long import SHARED_BY, few
 from cases.ranks.environment import written_on_each
 from cases.refusals import refuses
-from cases.solid import reduced
+from cases.solid import KINDS, reduced
 from rom.body.prestress import UnitLoads, _turning, centrifugal
 from rom.body.recovery import CENTRIFUGAL_LOADS
 from rom.body.rotating import rotating_matrices
@@ -41,7 +41,6 @@ pytestmark = [
 E, RHO, L, B, H = 70e9, 2700.0, 1.0, 0.03, 0.02
 AREA, STIFFNESS = B * H, E * B * H**3 / 12
 UNIT = np.sqrt(STIFFNESS / (RHO * AREA * L**4))  # rad/s of a dimensionless frequency of one
-ENDS = {"root": "rbe2", "tip": "rbe2"}
 FLANKS = {"flank_left": "rbe2", "flank_right": "rbe2"}
 CENTRE = np.array([0.0, 0.0, -0.25])  # of the rotor of a blade
 # first flapwise frequency by speed: exact Euler-Bernoulli beam, and the same solid clamped at its
@@ -61,7 +60,7 @@ def solid(degree=2, nu=0.3, attachments=(), **sizes):
     )  # fmt: skip
 
 
-def stiffened(model, interfaces=ENDS, reference="root", n_modes=8, stiffening=True):
+def stiffened(model, interfaces=KINDS, reference="root", n_modes=8, stiffening=True):
     how = {"interfaces": interfaces, "reference": reference, "stiffening": stiffening}
     return reduced(n_modes, model, **how)
 
@@ -150,7 +149,7 @@ def test_a_deep_cantilever_tips_over_sideways():
 
 def test_unit_loads_with_the_root_held_by_the_full_model(model, body):
     """The frame on the root turns inertia relief into reactions: the same stress, held directly."""
-    ops, c = operators(model), connect(operators(model), model, ENDS)
+    ops, c = operators(model), connect(operators(model), model, KINDS)
     fields = np.hstack([-rigid_motions(model.points), centrifugal(model.points)])
     force = ops.apply_M(fields)
     tip = np.zeros((c.ops.n, 6))
@@ -320,7 +319,7 @@ def test_the_command_line_stiffens_too(tmp_path):
 
 def test_bodies_and_questions_without_an_answer_are_refused_or_warned_of(body, model):
     refuses(ConfigError, "no finite elements, from", stiffened, replace(model, stresses=None))
-    free, z = rom.reduce(model, method=rom.FreeFree(6), interfaces=ENDS, certify=False), (0, 0, 1)
+    free, z = rom.reduce(model, method=rom.FreeFree(6), interfaces=KINDS, certify=False), (0, 0, 1)
     alone, root = "free-free modes only", {"fixed": ("root",)}
     refuses(ModelError, alone, free.rotating_frequencies, 10.0, z, **root)
     refuses(ConfigError, "needs a support", body.rotating_frequencies, 10.0, z, fixed=())

@@ -29,7 +29,6 @@ VOIGT = [(0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)]
 
 
 def tensor(voigt):
-    """(p, 3, 3) of (p, 6)."""
     xx, yy, zz, yz, xz, xy = voigt.T
     return np.moveaxis(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]), 2, 0)
 

@@ -234,7 +234,6 @@ class PlaneMesh(Mesh):
         return np.where(slices.back, back, e)
 
     def forces(self, q, theta, rate=None):
-        """Forces of the teeth on both wheels."""
         q = np.asarray(q, dtype=float)
         line = Line.of(self.pair, q)
         path = path_of_contact(self.pair, line.alpha)

@@ -3,7 +3,7 @@
 import pytest
 
 import rom
-from cases.solid import STEEL, block, reduced
+from cases.solid import KINDS, STEEL, block, reduced
 
 COUPLED = ((("left", "tip"), ("right", "root")),)
 ROOT = ("left", "root")
@@ -30,7 +30,7 @@ def joined(*arguments, **options):
 
 def whole(cells=(8, 2, 2), fixed=("root",), n=12):
     model = block(size=(1.0, 0.1, 0.08), cells=cells)
-    return rom.modes(model, n, fixed=fixed, interfaces={"root": "rbe2", "tip": "rbe2"}).frequencies
+    return rom.modes(model, n, fixed=fixed, interfaces=KINDS).frequencies
 
 
 # Two blocks of 0.5 m x 0.2 m x 0.1 m, 10 x 4 x 2 quadratic hexahedra each, joined end to end and

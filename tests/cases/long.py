@@ -14,12 +14,12 @@ components faults/test_archive_faults.py fe/mesh/test_mesh_decks.py mbs/elements
 mbs/equations/test_mbs_cache.py project/test_docs.py
 """.split()
 # marks of files about small meshes of finite elements, which are warned of
-COARSE = [
+MESHED = [
     pytest.mark.fenicsx,
-    pytest.mark.once,
     pytest.mark.filterwarnings("ignore:Number of integration points"),
     pytest.mark.filterwarnings("ignore::rom.errors.RomWarning"),
 ]
+COARSE = [*MESHED, pytest.mark.once]
 # what the light environment has not
 ABSENT = ("dolfinx", "gmsh", "h5py", "matplotlib", "meshio", "pyvista")
 # files of `make test` that begin, so that no worker is left alone with one of them at the end

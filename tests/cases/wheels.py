@@ -1,18 +1,14 @@
 """Wheels for tests: rings of masses, rings of beams, and solid bladed disks of bricks."""
 
 import numpy as np
-import pytest
 from scipy.sparse import csr_matrix, identity, kron
 
+from cases.long import MESHED
 from cases.solid import quads_of
 from rom.components.wheels.modes import cyclic_modes
 from rom.components.wheels.sector import CyclicSector
 
-MARKS = [  # of modules on wheels of finite elements
-    pytest.mark.fenicsx,
-    pytest.mark.filterwarnings("ignore::rom.errors.RomWarning"),
-    pytest.mark.filterwarnings("ignore:Number of integration points"),
-]
+MARKS = MESHED  # of modules on wheels of finite elements
 # of a brick in a grid: its lower corners, then the upper ones
 BRICK = [(*c, s) for s in (0, 1) for c in ((0, 0), (0, 1), (1, 1), (1, 0))]
 
@@ -95,15 +91,10 @@ def bladed_mesh(  # noqa: PLR0913  one keyword per size
 ):  # fmt: skip
     """Bricks of some sectors of a disk with straight blades, with the faces of what is cut.
 
-    Args:
-        N: number of sectors of the whole wheel.
-        sectors: number of sectors meshed; N closes the wheel.
-        bore, rim, tip: radii [m]; a ring without blades when the tip is the rim.
-        width: along the axis z [m].
-        cells: around, along the radius of the disk, of the blade, along the axis.
-        blade: first and last line of cells around that a blade stands on.
-        offset: shifts the nodes inside each sector, so that its faces have other nodes.
-        twist: angle of the faces that changes with z [rad].
+    N sectors close the wheel, which is a ring if its tip is the rim. Cells are around, along the
+    radius of the disk, of the blade, along the axis; a blade stands on lines of cells around, first
+    and last. An offset shifts nodes inside each sector, so that its faces have other nodes; a twist
+    [rad] turns the faces with z.
     """
     around, along, up, across = cells
     up = up if tip > rim else 0
@@ -152,14 +143,8 @@ def _meshed(points, cubes, regions, names, facets):
 def revolved_mesh(N, r, z, solid, faces):
     """Bricks of one sector of a body of revolution about z, one cell around.
 
-    Radii are of circles whose area the polygons of N corners have.
-
-    Args:
-        N: number of sectors.
-        r: (a,) lines of the grid of the section, from the bore on [m].
-        z: (b,) [m].
-        solid: (radius, z of the middle of a cell) -> name of its region, or nothing.
-        faces: {name: (z line, largest r)} of faces across the axis that are interfaces.
+    Radii r (a,) are of circles whose area polygons of N corners have. A solid is (radius, z of the
+    middle of a cell) -> its region, or nothing; faces {name: (z, largest r)} are interfaces.
     """
     angle = 2 * np.pi / N
     i, j, k = np.meshgrid(np.arange(2), np.arange(len(r)), np.arange(len(z)), indexing="ij")

@@ -9,7 +9,7 @@ from cases.command import ROOT
 from cases.files.schema import answer
 from cases.files.toml_files import SOLID
 from cases.refusals import refuses
-from cases.solid import block, reduced
+from cases.solid import KINDS, block, reduced
 from rom.cli.main import main
 from rom.config.component import read_component
 
@@ -98,8 +98,7 @@ def test_options_go_before_the_file_and_choose_the_certificate(folder, capsys):
 
 def test_modes_of_a_component_have_the_interfaces_of_its_body(folder, bar, capsys):
     found = answer(capsys, "modes", "bar.toml", "--fixed", "root", "-n", 2)
-    kinds = {"root": "rbe2", "tip": "rbe2"}
-    expected = rom.modes(bar, 2, fixed=("root",), interfaces=kinds).frequencies
+    expected = rom.modes(bar, 2, fixed=("root",), interfaces=KINDS).frequencies
     assert_allclose(found["frequencies"], expected, rtol=1e-8)
     assert found["fixed"] == ["root"]
     assert main(["modes", "bar.toml", "--scale", "1e-3"]) == 2

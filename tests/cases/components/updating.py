@@ -5,7 +5,7 @@ from numpy.testing import assert_allclose
 
 import rom
 from cases.refusals import refuses
-from cases.solid import STEEL, composite
+from cases.solid import KINDS, STEEL, composite
 from rom.components.updating.family_model import Parts, family_model
 from rom.components.updating.frf_data import estimators, noisy
 from rom.components.updating.normal_equations import responses_at
@@ -14,7 +14,6 @@ from rom.errors import ConfigError
 from rom.updating import Channels, JointSpring, Responses
 
 BEAM = (1.0, 0.1, 0.08)
-KINDS = {"root": "rbe2", "tip": "rbe2"}
 BOLTS = JointSpring(("frame", "tip"), ("arm", "root"), (4e8, 4e8, 4e8, 2e5, 1e5, 1e5), 0.1, 10.0)
 PARAMETERS = {f"E_{name}": rom.YoungsModulus(name, 0.4, 2.5) for name in ("inner", "outer")}
 PARAMETERS |= {"rho_outer": rom.Density("outer", 0.5, 2.0)}

@@ -20,7 +20,7 @@ import rom.report
 import rom.view
 from cases.files.toml_files import PENDULUM
 from cases.mbs.mechanisms import rotor
-from cases.solid import STEEL, block, composite, reduced
+from cases.solid import KINDS, STEEL, block, composite, reduced
 from cases.wheels import beam_ring, bladed_model, bladed_ring
 from rom.components import cosserat
 from rom.eigen.scipy import SciPyOperators
@@ -28,7 +28,6 @@ from rom.mbs.elements import springs
 from rom.reduction.interfaces.connection import connect
 
 X, Y, Z = np.eye(3)
-KINDS = {"root": "rbe2", "tip": "rbe2"}
 TOGETHER = ((("a", "tip"), ("b", "root")),)
 FENICSX = find_spec("dolfinx") is not None
 # classes that are public without standing in rom: what public functions return and take
@@ -178,7 +177,6 @@ def nothing(t, parameters, motion, memory, out):
 
 
 def lawful():
-    """A mechanism with a law of its own."""
     mech = driven()
     mech.law("law", nothing, mech.parts["mass"].marker("c"), compiled=False)
     return mech

@@ -78,14 +78,9 @@ def second_order(mesh):
 
 
 def write_msh(path, points, blocks, names=(), ids=None):
-    """Write version 2.2.
+    """Write version 2.2 of blocks (element type, physical tag, elementary tag, nodes from zero).
 
-    Args:
-        path: file to write.
-        points: (n, 3) coordinates.
-        blocks: (element type, physical tag, elementary tag, (m, k) nodes from zero) in turn.
-        names: (dimension, tag, name) of the physical groups.
-        ids: (n,) node numbers in the file; 1, 2, ... when not given.
+    Names are (dimension, tag, name) of the physical groups, ids (n,) node numbers in the file.
     """
     ids = np.arange(len(points)) + 1 if ids is None else np.asarray(ids)
     lines = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat"]

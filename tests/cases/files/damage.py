@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import rom
-from cases.solid import block
+from cases.solid import KINDS, block
 from rom.mbs.results.state import Memory, State
 
 NUMBER = re.compile(rb"[-+]?\d+(\.\d*)?([EDed][-+]?\d+)?")
@@ -107,9 +107,6 @@ def outcome(read, path, memory=MEMORY):
         if peak > (memory or np.inf):
             pytest.fail(f"{path}: reading took {peak / 1e6:.0f} MB")
     return None
-
-
-KINDS = {"root": "rbe2", "tip": "rbe2"}
 
 
 def body(folder):

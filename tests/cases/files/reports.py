@@ -7,7 +7,7 @@ from html.parser import HTMLParser
 import numpy as np
 
 import rom
-from cases.solid import block
+from cases.solid import KINDS, block
 from rom.body.recovery import StressRecovery
 
 PIXEL = base64.b64decode(
@@ -18,7 +18,7 @@ PIXEL = base64.b64decode(
 def bar_that_bends():
     """A body whose stress is made up: per metre, 1 GPa of xx along y, and of xy along z."""
     made = rom.reduce(block(cells=(8, 2, 2)), method=rom.CraigBampton(6), reference="root",
-                      interfaces={"root": "rbe2", "tip": "rbe2"}, name="bar")  # fmt: skip
+                      interfaces=KINDS, name="bar")  # fmt: skip
     operator = np.zeros((6 * len(made.surface.points), made.n_modes))
     operator[0::6] = 1e9 * made.surface.shape[1::3]
     operator[5::6] = 1e9 * made.surface.shape[2::3]

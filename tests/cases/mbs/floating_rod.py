@@ -48,7 +48,6 @@ class Instant:
     z: Array
 
     def packed(self):
-        """All numbers in a row."""
         return np.concatenate([self.r, self.P, self.xi.ravel(), self.theta.ravel(), self.z])
 
     @classmethod

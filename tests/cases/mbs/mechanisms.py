@@ -147,7 +147,6 @@ def random_state(rng, packed):
 
 
 def prepared(mechanism):
-    """Packed mechanism and memory."""
     packed = pack(mechanism, whole=True)
     return packed, workspace(packed.system, len(packed.signals))
 

@@ -87,7 +87,6 @@ def heavy_top():
 
 
 def free_crank():
-    """A slider-crank that falls and turns freely."""
     mech = slider_crank(gravity=G)
     mech.drives.clear()
     return mech

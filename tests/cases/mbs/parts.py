@@ -36,7 +36,6 @@ def on_axle(mech, name="wheel", *, inertia=(1, 1, 0.5), axle="axle", axis=Z, **m
 
 
 def turned(angle):
-    """Rotation about z."""
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]])
 

@@ -55,7 +55,6 @@ def reduced(model, loads, *, n_modes=4, kinds="rbe3", certify=False, active=4, *
 
 
 def cantilever(body):
-    """A mechanism of the body, its root held."""
     mech = rom.Mechanism(gravity=(0, 0, 0))
     part = mech.add_flexible("beam", body)
     mech.fixed("wall", mech.ground.marker(part.point(part.marker("root"))), part.marker("root"))

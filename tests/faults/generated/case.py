@@ -19,7 +19,6 @@ class Works:
 
 
 def require(holds: object, what: object) -> None:
-    """Refuse a result."""
     assert holds, what
 
 
@@ -55,7 +54,6 @@ def edit(name: str, old: str, new: str) -> Callable[[Path], object]:
 
 
 def write(name: str, content: str | bytes) -> Callable[[Path], object]:
-    """Writes a file."""
     data = content if isinstance(content, bytes) else content.encode()
     return lambda folder: (folder / name).write_bytes(data)
 

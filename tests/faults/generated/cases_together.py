@@ -60,7 +60,6 @@ def without(library, words):
 
 
 def threads(work, n=4):
-    """The same call in several threads."""
 
     def act(folder):
         with ThreadPoolExecutor(n) as pool:

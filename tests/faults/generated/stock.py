@@ -10,10 +10,9 @@ from cases.boxes import BOX_GEO
 from cases.files import damage
 from cases.files.cells import blocks_of, solid, write_msh
 from cases.files.toml_files import PENDULUM
-from cases.solid import block
+from cases.solid import KINDS, block
 
 PLANTED = "pwned"  # part of the name of every file that planted code makes
-KINDS = {"root": "rbe2", "tip": "rbe2"}
 MATRICES = "K.mtx --mass M.mtx --nodes deck.inp -i root=rbe2 -i tip=rbe2 --no-certificate -m 4"
 PART = """name = "part"
 [matrices]
@@ -45,7 +44,6 @@ dt = 0.005
 
 
 def fill(folder: Path) -> None:
-    """Write the stock."""
     folder.mkdir()
     geo = 'DefineConstant[ lc = {1, Name "lc"} ];\n' + BOX_GEO.replace("= 1;", "= lc;")
     texts = {"box.geo": geo, "part.toml": PART, "pendulum.toml": PENDULUM, "lock.toml": LOCK}
@@ -66,13 +64,11 @@ def model(cells: Any = (2, 1, 1)) -> Any:
 
 
 def body(**options: Any) -> Any:
-    """The block, reduced."""
     keywords = {"method": rom.CraigBampton(4), "interfaces": KINDS, "certify": False} | options
     return rom.reduce(model((4, 1, 1)), **keywords)
 
 
 def pendulum(**bob: Any) -> Any:
-    """A rigid bob on a hinge."""
     mech = rom.Mechanism(gravity=(0, -9.81, 0))
     numbers = {"mass": 1.0, "inertia": (1e-3,) * 3, "at": (0.2, 0, 0)}
     part = mech.add_rigid("bob", **(numbers | {"markers": {"pin": (-0.2, 0, 0)}} | bob))
@@ -87,7 +83,6 @@ def compile_kernels() -> None:
 
 
 def matrices(folder: Path) -> None:
-    """Stiffness and mass of the block, and its nodes."""
     made = model()
     mmwrite(str(folder / "K.mtx"), made.K, symmetry="symmetric")
     mmwrite(str(folder / "M.mtx"), made.M, symmetry="symmetric")

@@ -6,15 +6,12 @@ from numpy.testing import assert_allclose
 
 import rom
 from cases.beam import spin_up
+from cases.long import MESHED
 from cases.mbs.slender import reduced, slender
 from rom.components import cosserat
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
-pytestmark = [
-    pytest.mark.fenicsx,
-    pytest.mark.filterwarnings("ignore:Number of integration points"),
-    pytest.mark.filterwarnings("ignore::rom.errors.RomWarning"),
-]
+pytestmark = MESHED
 # exact flapwise frequencies of a rotating cantilever by speed, in sqrt(EI / m L^4); in its plane
 # their squares are less by the square of the speed
 FLAP = {5: (6.44954475, 25.4460804), 12: (13.1701505, 37.6031123)}
