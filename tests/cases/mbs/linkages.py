@@ -60,11 +60,10 @@ def five_bar_of_the_core(q, cranks, couplers, posture):
 def cross_slides_of_the_core(masses, angle):
     """PP: drives "x" along x and "y" at an angle to it."""
     mech = rom.Mechanism(gravity=(0, 0, 0))
-    first, second = (ball(mech, n, m, (0, 0), 0.01 * m) for n, m in zip("ab", masses, strict=True))
-    o = (0, 0, 0)
-    mech.prismatic("low", mech.ground.marker(o), first.marker(o), axis=(1, 0, 0))
-    guide = (np.cos(angle), np.sin(angle), 0)
-    mech.prismatic("high", first.marker(o), second.marker(o), axis=guide)
+    for name, mass in zip("ab", masses, strict=True):
+        ball(mech, name, mass, (0, 0), 0.01 * mass)
+    mech.prismatic("low", "ground", "a", axis=(1, 0, 0))
+    mech.prismatic("high", "a", "b", axis=(np.cos(angle), np.sin(angle), 0))
     mech.drive("x", "low", still)
     mech.drive("y", "high", still)
     return mech
@@ -73,9 +72,9 @@ def cross_slides_of_the_core(masses, angle):
 def slide_arm_of_the_core(slide, arm, angle):
     """PR: a slide on a rail along x, drive "x", and a rod on it at an angle, drive "turn"."""
     mech = rom.Mechanism(gravity=(0, 0, 0))
-    base, o = ball(mech, "slide", slide, (0, 0)), (0, 0, 0)
-    mech.prismatic("rail", mech.ground.marker(o), base.marker(o), axis=(1, 0, 0))
-    pinned(mech, "arm", arm, (0, 0), angle, base.marker(o))
+    ball(mech, "slide", slide, (0, 0))
+    mech.prismatic("rail", "ground", "slide", axis=(1, 0, 0))
+    pinned(mech, "arm", arm, (0, 0), angle, "slide")
     mech.drive("x", "rail", still)
     mech.drive("turn", "arm pin", still)
     return mech
@@ -94,16 +93,15 @@ def two_link_of_the_core(first, second, q):
 
 def rail_of_the_core(slide, coupler, payload, spread):
     """PRRRP on one rail along x: slides at 0 and at the spread, drives "left" and "right"."""
-    mech, o, tips = rom.Mechanism(gravity=(0, 0, 0)), (0, 0, 0), []
+    mech, tips = rom.Mechanism(gravity=(0, 0, 0)), []
     tip = np.array([spread / 2, np.sqrt(coupler[1] ** 2 - spread**2 / 4)])
     for name, x in (("left", 0.0), ("right", spread)):
-        base = ball(mech, f"{name} slide", slide, (x, 0))
-        ends = mech.ground.marker((x, 0, 0)), base.marker(o)
-        mech.prismatic(f"{name} rail", *ends, axis=(1, 0, 0))
+        base = ball(mech, f"{name} slide", slide, (x, 0)).marker((0, 0, 0))
+        mech.prismatic(f"{name} rail", mech.ground.marker((x, 0, 0)), base, axis=(1, 0, 0))
         turn = direction(tip - [x, 0])
-        rod = pinned(mech, f"{name} coupler", coupler, (x, 0), turn, base.marker(o))
+        rod = pinned(mech, f"{name} coupler", coupler, (x, 0), turn, base)
         tips.append(rod.marker("tip"))
         mech.drive(name, f"{name} rail", still)
     mech.revolute("tip", *tips, axis=Z)
-    mech.fixed("held", tips[0], ball(mech, "tool", payload, tip).marker(o))
+    mech.fixed("held", tips[0], ball(mech, "tool", payload, tip).marker((0, 0, 0)))
     return mech

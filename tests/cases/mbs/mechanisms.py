@@ -206,22 +206,21 @@ def simeon_crank(axial_mass_divisor=1.0, start=None):
     half, across = np.array([l1 / 2, 0, 0]), c["J1"] - c["m1"] * l1**2 / 4
     solid = {"mass": c["m1"], "inertia": (1e-4, across, across), "at": half}
     moving = {"velocity": (0, speed * l1 / 2, 0), "omega": (0, 0, speed)}
-    crank = mech.add_rigid("crank", **solid, markers={"o": -half, "a": half}, **moving)
+    mech.add_rigid("crank", **solid, markers={"o": -half, "a": half}, **moving)
     moving = {"velocity": (0, speed * l1, 0), "omega": (0, 0, -74.99576703969453)}
-    one = simeon_rod(axial_mass_divisor)
-    rod = mech.add_flexible("rod", one, at=(l1, 0, 0), **moving, q=q, qd=qd)
+    mech.add_flexible("rod", simeon_rod(axial_mass_divisor), at=(l1, 0, 0), **moving, q=q, qd=qd)
     solid = {"mass": c["m3"], "inertia": (1e-5,) * 3, "at": (l1 + c["l2"] + q[3], 0, 0)}
-    slider = mech.add_rigid("slider", **solid, markers={"b": (0, 0, 0)}, velocity=(qd[3], 0, 0))
-    return joined_crank(mech, crank, rod, slider, speed)
+    mech.add_rigid("slider", **solid, markers={"b": (0, 0, 0)}, velocity=(qd[3], 0, 0))
+    return joined_crank(mech, speed)
 
 
-def joined_crank(mech, crank, rod, slider, speed):
+def joined_crank(mech, speed):
     """A crank that is driven, a rod and a slider on a guide, joined."""
-    z, o = (0, 0, 1), mech.ground.marker((0, 0, 0))
-    mech.revolute("main", o, crank.marker("o"), axis=z)
-    mech.revolute("pin", crank.marker("a"), rod.marker("a"), axis=z)
-    mech.revolute("wrist", rod.marker("b"), slider.marker("b"), axis=z)
-    mech.prismatic("guide", o, slider.marker("b"), axis=(1, 0, 0))
+    z = (0, 0, 1)
+    mech.revolute("main", "ground", "crank.o", axis=z)
+    mech.revolute("pin", "crank.a", "rod.a", axis=z)
+    mech.revolute("wrist", "rod.b", "slider.b", axis=z)
+    mech.prismatic("guide", "ground", "slider.b", axis=(1, 0, 0))
     mech.drive("motor", "main", lambda t: speed * t, rate=lambda t: speed, acceleration=lambda t: 0)
     return mech
 
@@ -238,18 +237,18 @@ def slider_crank(l1=0.1, l2=0.3, speed=50.0, gravity=0.0, rod=None):
     mech = rom.Mechanism(gravity=(0, -gravity, 0))
     start = {"velocity": (0, speed * l1, 0), "omega": (0, 0, -speed * l1 / l2)}
     solid = {"mass": 1.0, "inertia": (1e-3, 1e-3, 2e-3), "at": (0, 0, 0), "omega": (0, 0, speed)}
-    crank = mech.add_rigid("crank", **solid, markers={"o": (0, 0, 0), "a": (l1, 0, 0)})
+    mech.add_rigid("crank", **solid, markers={"o": (0, 0, 0), "a": (l1, 0, 0)})
     if rod is None:
         start["velocity"] = (0, speed * l1 / 2, 0)
         solid = {"mass": 0.5, "inertia": (1e-4, 4e-3, 4e-3), "at": (l1 + l2 / 2, 0, 0)}
         ends = {"a": (-l2 / 2, 0, 0), "b": (l2 / 2, 0, 0)}
-        rod = mech.add_rigid("rod", **solid, markers=ends, **start)
+        mech.add_rigid("rod", **solid, markers=ends, **start)
     else:
         at = np.array([l1, 0, 0]) - rod.marker("a").point  # whatever its frame is
-        rod = mech.add_flexible("rod", rod, at=at, **start)
+        mech.add_flexible("rod", rod, at=at, **start)
     solid = {"mass": 0.4, "inertia": (1e-4,) * 3, "at": (l1 + l2, 0, 0)}
-    slider = mech.add_rigid("slider", **solid, markers={"b": (0, 0, 0)})
-    return joined_crank(mech, crank, rod, slider, speed)
+    mech.add_rigid("slider", **solid, markers={"b": (0, 0, 0)})
+    return joined_crank(mech, speed)
 
 
 def crank_torque(angle, l1=0.1, l2=0.3, speed=50.0, gravity=0.0):

@@ -172,8 +172,8 @@ def shallow_arch(n, slenderness, rise=0.01):
     mech.revolute("b", mech.ground.marker((1, 0, 0)), arch.marker("end"), axis=Y)
     for k in range(1, n):
         share = bend * np.pi**4 * rise * np.sin(np.pi * rod.x[k, 0]) / n
-        mech.force(f"load {k}", mech.parts[f"arch.{k}"].marker((0, 0, 0)),
-                   lambda t, share=share: (0, 0, -share * t))  # fmt: skip
+        piece = mech.parts[f"arch.{k}"].marker(ORIGIN)
+        mech.force(f"load {k}", piece, lambda t, share=share: (0, 0, -share * t))
     return mech
 
 
@@ -256,10 +256,7 @@ def test_what_makes_no_path_is_named():
     free = rom.Mechanism(gravity=(0, 0, 0))
     free.add_rigid("stone", mass=1, inertia=(1, 1, 1), at=(0, 0, 0))
     refuses(rom.ModelError, "there is no unique equilibrium", rom.continuation, free, (0.0, 1.0))
-    stray, place = (
-        rom.Mechanism().ground.marker((0, 0, 7)),
-        rom.continuation(mech, (0.0, 1.0)).position,
-    )
+    place, stray = rom.continuation(mech, (0.0, 1.0)).position, mech.ground.marker((0, 0, 7))
     refuses(rom.ConfigError, "must be a marker", place, stray)
 
 

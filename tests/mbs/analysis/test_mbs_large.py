@@ -322,7 +322,7 @@ def test_responses_of_large_mechanisms_are_those_of_dense_matrices(monkeypatch):
             rom.frequency_response(rod, state, f, force=tip, motion=tip).receptance,
             rom.frequency_response(pair, other, f, force=marks[0], motion=marks[1]).receptance,
             *(rom.transmissibility(rod, state, f, drive="shaker", motion=at)
-              for at in (tip, rod.parts["table"].marker(ORIGIN))),
+              for at in (tip, "table")),
         ))  # fmt: skip
     assert_allclose(answers[1][3][:, 0], 1.0, rtol=1e-9)  # the table moves as its drive does
     for whole, sparse in zip(*answers, strict=True):
@@ -353,7 +353,7 @@ def test_an_infinite_response_of_a_large_mechanism_is_named(monkeypatch):
     end = free.nonlinear["rod"].marker("end")
     with pytest.raises(SolverError, match="at 0 Hz is infinite"):
         rom.frequency_response(free, None, 0.0, force=end, motion=end)
-    mech.fixed("bolt", mech.ground.marker(ORIGIN), mech.parts["table"].marker(ORIGIN))
+    mech.fixed("bolt", "ground", "table")
     with pytest.warns(RomWarning), pytest.raises(ModelError, match="do not let this drive move"):
         rom.transmissibility(mech, None, 1.0, drive="shaker", motion=tip)
 

@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 import rom
 from cases.beam import FLAP, FLAP_ON_HUB, stiffened_beam
 from cases.mbs.mechanisms import random_body, rotor
-from cases.mbs.parts import ORIGIN, X, Y, Z, below, on_guide, on_hinge
+from cases.mbs.parts import ORIGIN, X, Y, Z, below, on_axle, on_guide, on_hinge
 from cases.mbs.trusses import HUB_INERTIA, MASS, REST, SPRING, dumbbell
 from cases.refusals import refuses
 from rom.mbs.analysis.few_modes import modes
@@ -144,10 +144,9 @@ def turning_beam(eta, axis, hub=0.0):
     turn = eta * np.array(axis, dtype=float)
     at = np.array([hub, 0, 0])
     motion = {"velocity": np.cross(turn, at), "omega": turn}
-    beam = mech.add_flexible("beam", stiffened_beam(), at=at, **motion)
-    disc = mech.add_rigid("hub", mass=1.0, inertia=(1, 1, 1), at=ORIGIN, omega=turn)
-    mech.fixed("clamp", disc.marker(at), beam.marker("root"))
-    mech.revolute("axle", mech.ground.marker(ORIGIN), disc.marker(ORIGIN), axis=axis)
+    mech.add_flexible("beam", stiffened_beam(), at=at, **motion)
+    on_axle(mech, "hub", inertia=(1, 1, 1), omega=turn, axis=axis)
+    mech.fixed("clamp", mech.part("hub").marker(at), "beam.root")
     mech.drive("motor", "axle", lambda t: eta * t, rate=lambda t: eta, acceleration=lambda t: 0)
     return mech
 
@@ -264,9 +263,9 @@ def test_a_state_of_a_run_is_good_enough():
 
 def test_a_wheel_that_rolls_is_linearised_at_rest_only():
     mech = rom.Mechanism(gravity=(0, 0, -g))
-    wheel = mech.add_rigid("wheel", mass=1.0, inertia=(1, 1, 1), at=Z / 2).marker(ORIGIN)
-    mech.rolling("road", mech.ground.marker(ORIGIN), wheel, radius=0.5, normal=Z)
-    mech.spring_damper("rope", mech.ground.marker((2, 0, 0.5)), wheel, stiffness=80.0)
+    mech.add_rigid("wheel", mass=1.0, inertia=(1, 1, 1), at=Z / 2)
+    mech.rolling("road", "ground", "wheel", radius=0.5, normal=Z)
+    mech.spring_damper("rope", mech.ground.marker((2, 0, 0.5)), "wheel", stiffness=80.0)
     swing = 2 * np.pi * rom.linearize(mech).frequencies
     assert_allclose(swing[-1], np.sqrt(80.0 / (1.0 + 1.0 / 0.25)), rtol=1e-8)
     assert_allclose(swing[:-1], 0.0)
@@ -276,10 +275,10 @@ def dry_pendulum(angle, rate):
     """A pendulum under way whose hinge rubs by its load, with a damper to the ground."""
     mech, at = rom.Mechanism(gravity=(0, 0, -g)), below(angle, 0.7)
     moving = {"omega": (0, -rate, 0), "velocity": np.cross((0, -rate, 0), at)}
-    bob = on_hinge(mech, at, inertia=(0.3, 0.2, 0.3), **moving)
+    on_hinge(mech, at, inertia=(0.3, 0.2, 0.3), **moving)
     mech.friction("rub", "hinge", transition_speed=2.0, mu=0.4, radius=0.1, coulomb=0.3)
-    mech.spring_damper("rope", mech.ground.marker((1, 0, -1)), bob.marker("c"), stiffness=9.0,
-                       damping=4.0, free_length=0.8)  # fmt: skip
+    law = {"stiffness": 9.0, "damping": 4.0, "free_length": 0.8}
+    mech.spring_damper("rope", mech.ground.marker((1, 0, -1)), "bob", **law)
     return mech
 
 

@@ -106,9 +106,8 @@ test_gears_that_are_others_after_their_turns_are_refused = refused(
 
 def test_a_flexible_body_takes_whole_turns_only():
     mech = rom.Mechanism(gravity=(0, 0, 0))
-    part = mech.add_flexible("blade", stiffened_beam(n_modes=2, stiffened=False))
-    root = part.marker(part.names[0])
-    mech.revolute("axle", mech.ground.marker(ORIGIN), root, axis=Z)
+    mech.add_flexible("blade", stiffened_beam(n_modes=2, stiffened=False))
+    mech.revolute("axle", "ground", "blade.root", axis=Z)
     mech.drive("speed", "axle", lambda t: 0.1 * t)
     with pytest.raises(ModelError, match=r"1.5708 rad .*'blade' is another one: it is flexible"):
         rom.periodic_motion(mech, period=5 * np.pi, turns={"axle": np.pi / 2})
@@ -129,24 +128,23 @@ def test_a_wheel_beside_its_axis_is_refused():
 def rotor(spin, mass=2.0, stiffness=800.0, damping=3.0, away=0.0):
     """A disc in the plane z = 0, driven about z, its mass centre beside the axis."""
     mech = rom.Mechanism(gravity=(0, 0, 0))
-    disc = mech.add_rigid("disc", mass=mass, inertia=(0.5, 0.5, 1.0), at=(away, 0, 0),
-                          markers={"axis": (-away, 0, 0)})  # fmt: skip
-    mech.planar("plane", mech.ground.marker(ORIGIN), disc.marker("axis"), normal=Z)
+    mech.add_rigid("disc", mass=mass, inertia=(0.5, 0.5, 1.0), at=(away, 0, 0),
+                   markers={"axis": (-away, 0, 0)})  # fmt: skip
+    mech.planar("plane", "ground", "disc.axis", normal=Z)
     mech.drive("spin", "plane", lambda t: spin * t, rate=lambda t: spin + 0 * t,
                acceleration=lambda t: 0 * t)  # fmt: skip
     if stiffness:
-        mech.bushing("shaft", mech.ground.marker(ORIGIN), disc.marker("axis"),
-                     stiffness=(stiffness, stiffness, 0, 0, 0, 0),
-                     damping=(damping, damping, 0, 0, 0, 0))  # fmt: skip
-    return mech, disc
+        across = np.array([1.0, 1.0, 0, 0, 0, 0])
+        both = {"stiffness": stiffness * across, "damping": damping * across}
+        mech.bushing("shaft", "ground", "disc.axis", **both)
+    return mech
 
 
 @pytest.mark.parametrize("spin", [12.0, 30.0])
 def test_jeffcott_s_rotor_whirls_on_its_circle(spin):
     """e w^2 / (k/m - w^2 + i c w / m), below and above its critical speed of 20 rad/s."""
     away = 1e-3
-    mech, _ = rotor(spin, away=away)
-    found = rom.periodic_motion(mech, period=2 * np.pi / spin, steps=400)
+    found = rom.periodic_motion(rotor(spin, away=away), period=2 * np.pi / spin, steps=400)
     s = found.solution
     axis = s.position("disc", "axis")
     exact = away * spin**2 / (400 - spin**2 + 1.5j * spin) * np.exp(1j * spin * s.t)
@@ -159,12 +157,11 @@ def test_jeffcott_s_rotor_whirls_on_its_circle(spin):
 def test_a_shaft_in_a_ball_bearing_vibrates_as_balls_pass():
     """Against equations of two coordinates with the balls where the cage has them."""
     spin, mass, load, damping = 200.0, 2.0, 400.0, 900.0
-    mech, disc = rotor(spin, mass=mass, stiffness=0.0)
-    center = disc.marker("axis")
-    mech.rolling_bearing("bearing", center, mech.ground.marker(ORIGIN), axis=Z, bearing=BALLS)
+    mech = rotor(spin, mass=mass, stiffness=0.0)
+    mech.rolling_bearing("bearing", "disc.axis", "ground", axis=Z, bearing=BALLS)
     six = damping, damping, 0, 0, 0, 0
-    mech.bushing("damper", mech.ground.marker(ORIGIN), center, stiffness=np.zeros(6), damping=six)
-    mech.force("load", center, (load, 0, 0))
+    mech.bushing("damper", "ground", "disc.axis", stiffness=np.zeros(6), damping=six)
+    mech.force("load", "disc.axis", (load, 0, 0))
     passing = 2 * np.pi / BALLS.balls / BALLS.cage
     T = passing / spin
     found = rom.periodic_motion(mech, period=T, turns={"plane": passing}, steps=400)
@@ -186,7 +183,7 @@ def test_a_shaft_in_a_ball_bearing_vibrates_as_balls_pass():
 
 
 def test_a_spring_that_is_wound_up_does_not_repeat():
-    mech, _ = rotor(30.0)
+    mech = rotor(30.0)
     mech.rotational_spring("coil", "plane", stiffness=5.0)
     with pytest.raises(ModelError, match=r"other forces act on 'disc' in the same place: 31.4"):
         rom.periodic_motion(mech, period=2 * np.pi / 30)
@@ -195,8 +192,8 @@ def test_a_spring_that_is_wound_up_does_not_repeat():
 def test_a_round_rotor_closes_after_any_angle_of_its_spin():
     """A balanced rotor that is shaken along x while it turns by no part of a turn."""
     spin, w, F = 17.0, 5.0, 0.2
-    mech, disc = rotor(spin)
-    mech.force("shaker", disc.marker("axis"), lambda t: (F * np.cos(w * t), 0, 0))
+    mech = rotor(spin)
+    mech.force("shaker", "disc.axis", lambda t: (F * np.cos(w * t), 0, 0))
     refuses(ModelError, "'spin' does not repeat", rom.periodic_motion, mech, period=2 * np.pi / w)
     exact = F / (800 - 2 * w**2 + 3j * w)
     for turns in ({"plane": None}, {"disc": spin * 2 * np.pi / w}):
@@ -207,8 +204,8 @@ def test_a_round_rotor_closes_after_any_angle_of_its_spin():
 
 def test_a_joint_whose_second_side_is_the_ground_counts_the_other_way():
     mech = rom.Mechanism(gravity=(0, 0, 0))
-    wheel = mech.add_rigid("wheel", mass=1.0, inertia=(1, 1, 2), at=ORIGIN).marker(ORIGIN)
-    mech.revolute("axle", wheel, mech.ground.marker(ORIGIN), axis=Z)
+    mech.add_rigid("wheel", mass=1.0, inertia=(1, 1, 2), at=ORIGIN)
+    mech.revolute("axle", "wheel", "ground", axis=Z)
     mech.drive("speed", "axle", lambda t: 2.0 * t)
     found = rom.periodic_motion(mech, period=0.4, turns={"axle": 0.8})
     assert found.turns == (-0.8,) and found.gap < 1e-9
@@ -220,13 +217,12 @@ def test_a_gyroscope_precesses_as_a_rotating_moment_has_it(spin):
     """(k - I w^2 + J W w + i c w) u = F for the tip of a disc that spins freely on a ball joint."""
     k, c, I, J, w, F = 900.0, 20.0, 1.0, 1.6, 11.0, 0.05
     mech = rom.Mechanism(gravity=(0, 0, 0))
-    disc = mech.add_rigid("disc", mass=1.0, inertia=(I, I, J), at=ORIGIN, omega=(0, 0, spin),
-                          markers={"c": ORIGIN, "tip": (0, 0, 1)})  # fmt: skip
-    mech.spherical("socket", mech.ground.marker(ORIGIN), disc.marker("c"))
-    tip = disc.marker("tip")
+    mech.add_rigid("disc", mass=1.0, inertia=(I, I, J), at=ORIGIN, omega=(0, 0, spin),
+                   markers={"tip": (0, 0, 1)})  # fmt: skip
+    mech.spherical("socket", "ground", "disc")
     for name, end in (("x", (-1e3, 0, 1)), ("y", (0, -1e3, 1))):
-        mech.spring_damper(name, mech.ground.marker(end), tip, stiffness=k, damping=c)
-    mech.force("push", tip, lambda t: (F * np.cos(w * t), F * np.sin(w * t), 0))
+        mech.spring_damper(name, mech.ground.marker(end), "disc.tip", stiffness=k, damping=c)
+    mech.force("push", "disc.tip", lambda t: (F * np.cos(w * t), F * np.sin(w * t), 0))
     T = 2 * np.pi / w
     found = rom.periodic_motion(mech, period=T, turns={"disc": abs(spin) * T}, steps=400)
     s = found.solution

@@ -21,17 +21,13 @@ S, I = BLADE_MASS * ARM, BLADE_INERTIA + BLADE_MASS * ARM**2  # about the hinge
 
 
 def turning(n, speed, *, hinge, damping=0.0, azimuth=0.3):
-    """Blades hinged to a hub that a drive turns on a nacelle on springs, and their steady motion.
-
-    The axis of the hub and lag hinges are upright; flap hinges lie in the plane across the blade.
-    """
+    """Blades hinged to a hub that turns on a nacelle on springs, and their steady motion."""
     mech = rom.Mechanism(gravity=ORIGIN)
-    nacelle = mech.add_rigid("nacelle", mass=NACELLE_MASS, inertia=(5.0,) * 3, at=ORIGIN)
-    ground, centre = mech.ground.marker(ORIGIN), nacelle.marker(ORIGIN)
-    mech.planar("table", ground, centre, normal=(0, 0, 1))
-    mech.bushing("support", ground, centre, stiffness=(SUPPORT, SUPPORT, 0, 0, 0, 1e6))
+    mech.add_rigid("nacelle", mass=NACELLE_MASS, inertia=(5.0,) * 3, at=ORIGIN)
+    mech.planar("table", "ground", "nacelle", normal=Z)
+    mech.bushing("support", "ground", "nacelle", stiffness=(SUPPORT, SUPPORT, 0, 0, 0, 1e6))
     hub = mech.add_rigid("hub", mass=HUB_MASS, inertia=(1.0, 1.0, 2.0), at=ORIGIN)
-    mech.revolute("bearing", centre, hub.marker(ORIGIN), axis=Z)
+    mech.revolute("bearing", "nacelle", "hub", axis=Z)
     mech.drive("speed", "bearing", lambda t: speed * t, rate=lambda t: speed)
     for k in range(n):
         axis = Z if hinge == "lag" else Y
@@ -116,9 +112,8 @@ def leaning(speed, springs=300.0):
     """Flapping blades on a nacelle that a force and a moment push out of its place."""
     mech = rom.Mechanism(gravity=ORIGIN)
     nacelle = mech.add_rigid("nacelle", mass=50.0, inertia=(5.0,) * 3, at=(0.2, 0.1, 0))
-    ground = mech.ground.marker(ORIGIN)
     stiff = (3e4, 4e4, 5e4, 2e4, 3e4, 4e4)
-    mech.bushing("support", ground, nacelle.marker((-0.2, -0.1, 0)), stiffness=stiff)
+    mech.bushing("support", "ground", nacelle.marker((-0.2, -0.1, 0)), stiffness=stiff)
     mech.force("push", nacelle.marker(ORIGIN), (1800.0, -1000.0, 2000.0))
     hub = mech.add_rigid("hub", mass=20.0, inertia=(1.0, 1.0, 2.0), at=(0.2, 0.1, 0.5))
     mech.revolute("bearing", nacelle.marker((0, 0, 0.5)), hub.marker(ORIGIN), axis=Z)
@@ -149,8 +144,7 @@ def test_what_turns_as_a_whole_may_be_told_either_way():
     mech = leaning(7.0)
     for name in ("support", "push"):
         del mech.elements[name]
-    foot = mech.parts["nacelle"].marker(ORIGIN)
-    mech.fixed("support", mech.ground.marker((0.2, 0.1, 0)), foot)
+    mech.fixed("support", mech.ground.marker((0.2, 0.1, 0)), "nacelle")
     whole = rom.equilibrium(mech, spin=(0, 0, 7.0), about=(0.2, 0.1, 0))
     behind = rom.equilibrium(mech, spin={"bearing": 7.0})
     assert_allclose(behind.q, whole.q, atol=1e-12)
@@ -159,10 +153,9 @@ def test_what_turns_as_a_whole_may_be_told_either_way():
 def adrift():
     """A disc that springs alone hold, to a rotor and to its support."""
     mech = leaning(1.0)
-    disc = mech.add_rigid("disc", mass=1.0, inertia=(0.1,) * 3, at=(0, 0, 2))
+    mech.add_rigid("disc", mass=1.0, inertia=(0.1,) * 3, at=(0, 0, 2))
     for name in ("nacelle", "hub"):
-        ends = mech.parts[name].marker(ORIGIN), disc.marker(ORIGIN)
-        mech.bushing(f"to {name}", *ends, stiffness=(1e3,) * 6)
+        mech.bushing(f"to {name}", name, "disc", stiffness=(1e3,) * 6)
     return mech
 
 

@@ -16,9 +16,8 @@ def wheel(kind, speed):
     across, along = (share * MASS * R**2 for share in SHARES[kind])
     mech = rom.Mechanism(gravity=(0, 0, -G))
     motion = {"at": (0, 0, R), "velocity": (speed, 0, 0), "omega": (0, speed / R, 0)}
-    body = mech.add_rigid("wheel", mass=MASS, inertia=(across, along, across), **motion)
-    floor, centre = mech.ground.marker(ORIGIN), body.marker(ORIGIN)
-    mech.rolling("roll", floor, centre, normal=Z, radius=R, axis=Y)
+    mech.add_rigid("wheel", mass=MASS, inertia=(across, along, across), **motion)
+    mech.rolling("roll", "ground", "wheel", normal=Z, radius=R, axis=Y)
     return mech
 
 
@@ -58,9 +57,8 @@ def test_the_lean_grows_in_a_simulation_as_the_eigenvalue_says():
 def rotor(speed):
     """An overhung disc on a shaft of springs: gyroscopic, but nothing rolls."""
     mech, solid = rom.Mechanism(gravity=ORIGIN), {"mass": 3.0, "inertia": (0.03, 0.03, 0.05)}
-    hub = mech.add_rigid("disc", **solid, at=ORIGIN, omega=speed * Z).marker(ORIGIN)
-    stiffness = (2e4, 2e4, 3e4, 90.0, 90.0, 0.0)
-    mech.bushing("shaft", mech.ground.marker(ORIGIN), hub, stiffness=stiffness)
+    mech.add_rigid("disc", **solid, at=ORIGIN, omega=speed * Z)
+    mech.bushing("shaft", "ground", "disc", stiffness=(2e4, 2e4, 3e4, 90.0, 90.0, 0.0))
     return mech
 
 

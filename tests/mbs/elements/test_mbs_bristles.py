@@ -25,11 +25,10 @@ def block(angle, law=LAW, speed=0.0):
     """A block on three points, on an incline down along x."""
     mech = rom.Mechanism(gravity=(g * np.sin(angle), 0, -g * np.cos(angle)))
     sink = MASS * g * np.cos(angle) / 3 / law.stiffness
-    part = mech.add_rigid("block", mass=MASS, inertia=(0.01,) * 3, at=(0, 0, HEIGHT + 1e-6 - sink),
-                          velocity=(speed, 0, 0), markers=FEET)  # fmt: skip
+    mech.add_rigid("block", mass=MASS, inertia=(0.01,) * 3, at=(0, 0, HEIGHT + 1e-6 - sink),
+                   velocity=(speed, 0, 0), markers=FEET)  # fmt: skip
     for foot in FEET:
-        ends = mech.ground.marker(ORIGIN), part.marker(foot)
-        mech.sphere_on_plane(foot, *ends, law, normal=Z, radius=1e-6)
+        mech.sphere_on_plane(foot, "ground", f"block.{foot}", law, normal=Z, radius=1e-6)
     return mech
 
 
@@ -144,8 +143,8 @@ def test_a_mass_on_a_spring_loses_two_limits_of_its_amplitude_each_half_swing():
     d = MU * load / K
     law = replace(LAW, tangential_stiffness=1e6, tangential_damping=300.0)
     mech = sled(law, load, x=5.5 * d)
-    ends = mech.ground.marker((-1.0, 0, mech.part("sled").at[2])), mech.part("sled").marker(ORIGIN)
-    mech.spring_damper("spring", *ends, stiffness=K, free_length=1.0)
+    hook = mech.ground.marker((-1.0, 0, mech.part("sled").at[2]))
+    mech.spring_damper("spring", hook, "sled", stiffness=K, free_length=1.0)
     sol = rom.simulate(mech, t_end=0.6, dt=5e-5)
     x, e = sol.position("sled")[:, 0] / d, sol.energy
     assert_allclose([x[0], x.min()], [5.5, -3.5], rtol=1e-3)
@@ -162,9 +161,8 @@ def test_a_ball_rolls_down_an_incline_with_five_sevenths():
     law = replace(LAW, tangential_damping=5.0)
     sink = m * g * np.cos(angle) / law.stiffness
     J = 0.4 * m * radius**2
-    ball = mech.add_rigid("ball", mass=m, inertia=(J,) * 3, at=(0, 0, radius - sink))
-    mech.sphere_on_plane("floor", mech.ground.marker(ORIGIN), ball.marker(ORIGIN), law, normal=Z,
-                         radius=radius)  # fmt: skip
+    mech.add_rigid("ball", mass=m, inertia=(J,) * 3, at=(0, 0, radius - sink))
+    mech.sphere_on_plane("floor", "ground", "ball", law, normal=Z, radius=radius)
     sol = rom.simulate(mech, t_end=1.0, dt=5e-4)
     assert_allclose(sol.velocity("ball")[-1, 0], 5 / 7 * g * np.sin(angle), rtol=1e-4)
     force = 2 / 7 * m * g * np.sin(angle)
@@ -184,10 +182,9 @@ def pair(law, shove=0.0, spin=(0.0, 0.0, 0.0)):
     for name, z, v in (("one", 0.0, 0.0), ("two", 0.0199, shove)):
         mech.add_rigid(name, mass=0.1, inertia=(1e-5,) * 3, at=(0, 0, z), omega=turning,
                        velocity=np.cross(turning, (0, 0, z)) + v * X)  # fmt: skip
-    m1, m2 = (mech.parts[name].marker(ORIGIN) for name in ("one", "two"))
-    mech.capsule_on_capsule("touch", m1, m2, law, radius1=0.01, radius2=0.01, axis1=X, axis2=Y,
-                            length1=0.1, length2=0.1)  # fmt: skip
-    mech.spring_damper("clamp", m1, m2, stiffness=1e3, free_length=0.01)
+    sizes = dict.fromkeys(("radius1", "radius2"), 0.01) | dict.fromkeys(("length1", "length2"), 0.1)
+    mech.capsule_on_capsule("touch", "one", "two", law, axis1=X, axis2=Y, **sizes)
+    mech.spring_damper("clamp", "one", "two", stiffness=1e3, free_length=0.01)
     return mech
 
 

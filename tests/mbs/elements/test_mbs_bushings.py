@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 import rom
 from cases.mbs.mechanisms import prepared, two_soft
-from cases.mbs.parts import ORIGIN, Z, boxed, refused_on
+from cases.mbs.parts import Z, boxed, on_axle, refused_on
 from cases.mbs.tangents import by_velocity, check_tangents, energy_gradient, forces_at, near
 from rom import rotation
 from rom.mbs.elements import bushings
@@ -68,8 +68,8 @@ def test_small_vibrations_have_the_frequency_of_a_spring(k):
     omega = np.sqrt(DIAGONAL[k] / np.array([2.0, 2.0, 2.0, 0.3, 0.5, 0.7])[k])
     mech = rom.Mechanism(gravity=(0, 0, 0))
     kick = 1e-6 * np.eye(6)[k]
-    part = box(mech, velocity=kick[:3], omega=kick[3:])
-    mech.bushing("rubber", mech.ground.marker(ORIGIN), part.marker(ORIGIN), stiffness=DIAGONAL)
+    box(mech, velocity=kick[:3], omega=kick[3:])
+    mech.bushing("rubber", "ground", "box", stiffness=DIAGONAL)
     sol = rom.simulate(mech, t_end=1.0, dt=0.01, method="dop853", rtol=1e-10, atol=1e-18)
     wanted = kick[k] * np.cos(omega * sol.t)
     assert_allclose(sol.v[:, k], wanted, atol=1e-5 * kick[k])
@@ -79,9 +79,9 @@ def alike(joint, t_end, ways, **start):
     """Motions of a box on a joint along z, to which each way adds something of its own."""
     for add in ways:
         mech = rom.Mechanism(gravity=(0, 0, -9.81))
-        ends = mech.ground.marker((0, 0, 0)), box(mech, **start).marker((0, 0, 0))
-        getattr(mech, joint)("joint", *ends, axis=Z)
-        add(mech, *ends)
+        box(mech, **start)
+        getattr(mech, joint)("joint", "ground", "box", axis=Z)
+        add(mech, "ground", "box")
         yield rom.simulate(mech, t_end=t_end, dt=1e-3)
 
 
@@ -110,12 +110,11 @@ def test_a_load_at_rest_is_carried_by_the_full_matrix():
     rng = np.random.default_rng(2)
     K = full_matrix(rng, 3e5)
     mech = rom.Mechanism(gravity=(0, 0, 0))
-    part = box(mech)
-    o = part.marker((0, 0, 0))
-    mech.bushing("rubber", mech.ground.marker((0, 0, 0)), o, stiffness=K, damping=1e-2 * K)
+    box(mech)
+    mech.bushing("rubber", "ground", "box", stiffness=K, damping=1e-2 * K)
     load = np.array([1.0, -2.0, 0.5, 0.3, 0.2, -0.4])
-    mech.force("force", o, load[:3])
-    mech.torque("torque", o, load[3:])
+    mech.force("force", "box", load[:3])
+    mech.torque("torque", "box", load[3:])
     q = rom.simulate(mech, t_end=2.0, dt=1e-2, rho_inf=0.3).q[-1]
     assert_allclose(np.r_[q[:3], 2 * q[4:7]], np.linalg.solve(K, load), rtol=1e-4, atol=1e-10)
 
@@ -123,13 +122,11 @@ def test_a_load_at_rest_is_carried_by_the_full_matrix():
 def test_a_curve_of_points_on_a_line_is_a_spring_and_a_bent_one_keeps_its_energy():
     x = np.array([-0.2, -0.05, 0.1, 0.2])
     runs = {}
-    for kind in ("spring", "line", "bent"):
+    for kind, stiffness, curves in (("spring", 200.0, None), ("line", 0.0, {"x": (x, 200 * x)}),
+                                    ("bent", 0.0, {"x": (x, 200 * x + 4e4 * x**3)})):  # fmt: skip
         mech = rom.Mechanism(gravity=(0, 0, 0))
-        part = box(mech, velocity=(3.0, 0, 0))
-        force = 200 * x + (4e4 * x**3 if kind == "bent" else 0)
-        mech.bushing("rubber", mech.ground.marker((0, 0, 0)), part.marker((0, 0, 0)),
-                     stiffness=(200.0 * (kind == "spring"), 0, 0, 0, 0, 0),
-                     curves=None if kind == "spring" else {"x": (x, force)})  # fmt: skip
+        box(mech, velocity=(3.0, 0, 0))
+        mech.bushing("rubber", "ground", "box", stiffness=stiffness * np.eye(6)[0], curves=curves)
         runs[kind] = rom.simulate(mech, t_end=2.0, dt=1e-3, rho_inf=1.0)
     assert np.abs(runs["spring"].q[:, 0]).max() > 0.25  # beyond the points
     assert_allclose(runs["line"].q, runs["spring"].q, atol=1e-10)
@@ -157,10 +154,8 @@ test_wrong_bushings_are_refused_by_name = refused_on(boxed, {
 @pytest.mark.parametrize(("end", "told"), [(0.45, False), (0.6, True)])
 def test_a_bushing_turned_by_half_a_turn_is_told(end, told):
     mech = rom.Mechanism(gravity=(0, 0, 0))
-    rod = mech.add_rigid("rod", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0), omega=(0, 0, 2 * np.pi))
-    pin, hub = mech.ground.marker((0, 0, 0)), rod.marker((0, 0, 0))
-    mech.revolute("pin", pin, hub, axis=(0, 0, 1))
-    mech.bushing("rubber", pin, hub, stiffness=(0, 0, 0, 0, 0, 10.0))
+    on_axle(mech, "rod", axle="pin", omega=(0, 0, 2 * np.pi))
+    mech.bushing("rubber", "ground", "rod", stiffness=(0, 0, 0, 0, 0, 10.0))
     mech.drive("turn", "pin", lambda t: 2 * np.pi * t)
     with warnings.catch_warnings(record=True, action="always") as caught:
         rom.simulate(mech, t_end=end, dt=1e-2)

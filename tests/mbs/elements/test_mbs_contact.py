@@ -98,9 +98,8 @@ def test_what_is_lost_is_what_the_forces_take(kind):
 def ball(law, height=0.5, radius=0.1, mass=2.0, **more):
     mech = rom.Mechanism(gravity=(0, 0, -g))
     J = 0.4 * mass * radius**2
-    part = mech.add_rigid("ball", mass=mass, inertia=(J, J, J), at=(0, 0, height + radius), **more)
-    mech.sphere_on_plane("floor", mech.ground.marker((0, 0, 0)), part.marker((0, 0, 0)), law,
-                         normal=Z, radius=radius)  # fmt: skip
+    mech.add_rigid("ball", mass=mass, inertia=(J, J, J), at=(0, 0, height + radius), **more)
+    mech.sphere_on_plane("floor", "ground", "ball", law, normal=Z, radius=radius)
     return mech
 
 
@@ -207,10 +206,9 @@ def test_a_ball_slides_to_and_fro_in_a_bore_like_a_pendulum():
     a = 1e-3
     sink = (g / k) ** (2 / 3)
     arm = R - r + sink
-    part = mech.add_rigid("ball", mass=1.0, inertia=(1e-2,) * 3,
-                          at=(0, arm * np.sin(a), -arm * np.cos(a)))  # fmt: skip
-    mech.sphere_on_cylinder("bore", mech.ground.marker((0, 0, 0)), part.marker((0, 0, 0)),
-                            Impact(k), axis=X, radius1=R, radius2=r, inside=True)  # fmt: skip
+    at, sizes = (0, arm * np.sin(a), -arm * np.cos(a)), {"radius1": R, "radius2": r}
+    mech.add_rigid("ball", mass=1.0, inertia=(1e-2,) * 3, at=at)
+    mech.sphere_on_cylinder("bore", "ground", "ball", Impact(k), axis=X, **sizes, **INSIDE)
     sol = rom.simulate(mech, t_end=1.0, dt=1e-3)
     wanted = arm * a * np.cos(np.sqrt(g / arm) * sol.t)
     assert_allclose(sol.position("ball")[:, 1], wanted, atol=1e-3 * arm * a)
@@ -222,12 +220,11 @@ def test_two_discs_are_a_cylinder_that_rolls_down_a_slope():
     mech = rom.Mechanism(gravity=(g * np.sin(angle), 0, -g * np.cos(angle)))
     sink = 0.5 * 2.0 * g * np.cos(angle) / 1e5
     ends = {"left": (0, 0.2, 0), "right": (0, -0.2, 0)}
-    part = mech.add_rigid("roller", mass=2.0, inertia=(0.03, 0.5 * 2.0 * radius**2, 0.03),
-                          at=(0, 0, radius - sink), markers=ends)  # fmt: skip
+    inertia = (0.03, 0.5 * 2.0 * radius**2, 0.03)
+    mech.add_rigid("roller", mass=2.0, inertia=inertia, at=(0, 0, radius - sink), markers=ends)
     law = Impact(1e5, exponent=1.0, damping=5.0, mu=0.5, transition_speed=1e-2)
     for end in ends:
-        mech.disc_on_plane(end, mech.ground.marker((0, 0, 0)), part.marker(end), law,
-                           normal=Z, axis=Y, radius=radius)  # fmt: skip
+        mech.disc_on_plane(end, "ground", f"roller.{end}", law, normal=Z, axis=Y, radius=radius)
     sol = rom.simulate(mech, t_end=1.0, dt=1e-3)
     a = 2 / 3 * g * np.sin(angle)
     assert_allclose(sol.velocity("roller")[-1, 0], a, rtol=2e-3)
@@ -287,11 +284,10 @@ def test_parallel_capsules_touch_in_the_middle_of_where_they_are_side_by_side(wa
 def crossing(law, *, mass=1.0, x=0.0, depth=0.0, velocity=(0, 0, 0)):
     """A bar along y, which hardly turns, on a fixed bar along x."""
     mech = rom.Mechanism(gravity=(0, 0, -g))
-    bar = mech.add_rigid("bar", mass=mass, inertia=(1e6,) * 3, at=(x, 0, 0.15 - depth),
-                         velocity=velocity)  # fmt: skip
-    mech.capsule_on_capsule("c", mech.ground.marker((0, 0, 0)), bar.marker((0, 0, 0)), law,
-                            radius1=0.1, radius2=0.05, axis1=X, axis2=Y, length1=4.0,
-                            length2=1.0)  # fmt: skip
+    motion = {"at": (x, 0, 0.15 - depth), "velocity": velocity}
+    mech.add_rigid("bar", mass=mass, inertia=(1e6,) * 3, **motion)
+    mech.capsule_on_capsule("c", "ground", "bar", law, radius1=0.1, radius2=0.05, axis1=X, axis2=Y,
+                            length1=4.0, length2=1.0)  # fmt: skip
     return mech
 
 
@@ -312,19 +308,13 @@ def test_a_bar_that_slides_along_another_is_slowed_by_coulomb():
 
 @pytest.mark.parametrize("kind", ["sphere_on_sphere", "capsule_on_capsule"])
 def test_balls_of_steel_meet_as_hertz_says(kind):
-    """Deepest penetration and duration of an impact; momenta before and after.
-
-    Source: Johnson, Contact Mechanics (1985), equations 11.22 to 11.24.
-    """
+    """Deepest penetration and duration: Johnson, Contact Mechanics (1985), 11.22 to 11.24."""
     E, nu, R, m, v = 210e9, 0.3, 0.02, 0.26, 0.5
     k = hertz_stiffness(E, nu, E, nu, R / 2)
     mech = rom.Mechanism(gravity=(0, 0, 0))
-    ends = [
+    for name, x, u in (("one", 0, v), ("two", 2 * R + 1e-6, 0)):
         mech.add_rigid(name, mass=m, inertia=(1e-5,) * 3, at=(x, 0, 0), velocity=(u, 0, 0))
-        for name, x, u in (("one", 0, v), ("two", 2 * R + 1e-6, 0))
-    ]
-    ends = (part.marker((0, 0, 0)) for part in ends)
-    getattr(mech, kind)("c", *ends, Impact(k, mu=0.0), radius1=R, radius2=R)
+    getattr(mech, kind)("c", "one", "two", Impact(k, mu=0.0), radius1=R, radius2=R)
     sol = rom.simulate(mech, t_end=2e-4, dt=1e-7, method="dop853")
     depth = 2 * R - (sol.position("two") - sol.position("one"))[:, 0]
     deepest = (15 * (m / 2) * v**2 / (16 * np.sqrt(R / 2) * (E / (1 - nu**2) / 2))) ** 0.4
@@ -338,11 +328,11 @@ def test_balls_of_steel_meet_as_hertz_says(kind):
 def test_momentum_and_energy_of_capsules_that_meet_in_space():
     mech = rom.Mechanism(gravity=(0, 0, 0))
     law = Impact(1e5, damping=0.3, mu=0.4, transition_speed=1e-2)
-    one = mech.add_rigid("one", mass=1.0, inertia=(1e-2, 1e-2, 1e-3), at=(0, 0, 0))
-    two = mech.add_rigid("two", mass=0.5, inertia=(1e-3, 5e-3, 5e-3), at=(0.05, 0.2, 0.1),
-                         velocity=(0.3, -2.0, 0.2), omega=(0, 1.0, 0))  # fmt: skip
-    mech.capsule_on_capsule("c", one.marker((0, 0, 0)), two.marker((0, 0, 0)), law, radius1=0.05,
-                            radius2=0.04, axis1=Z, axis2=X, length1=0.5, length2=0.3)  # fmt: skip
+    mech.add_rigid("one", mass=1.0, inertia=(1e-2, 1e-2, 1e-3), at=(0, 0, 0))
+    mech.add_rigid("two", mass=0.5, inertia=(1e-3, 5e-3, 5e-3), at=(0.05, 0.2, 0.1),
+                   velocity=(0.3, -2.0, 0.2), omega=(0, 1.0, 0))  # fmt: skip
+    mech.capsule_on_capsule("c", "one", "two", law, radius1=0.05, radius2=0.04, axis1=Z, axis2=X,
+                            length1=0.5, length2=0.3)  # fmt: skip
     sol = rom.simulate(mech, t_end=0.2, dt=1e-4, method="dop853")
     linear, angular = sol.momentum
     assert np.ptp(sol.velocity("one")[:, 1]) > 0.3
@@ -361,12 +351,11 @@ def test_a_clamped_bar_creeps_or_slips_as_the_law_says(share):
     law = Impact(k, exponent=1.0, mu=mu, transition_speed=v0)
     mech = rom.Mechanism(gravity=(0, 0, -g))
     depth = N / k
-    bar = mech.add_rigid("bar", mass=weight / g, inertia=(1.0,) * 3, at=(0, 0, 0))
+    mech.add_rigid("bar", mass=weight / g, inertia=(1.0,) * 3, at=(0, 0, 0))
     for side in (-1, 1):
         jaw = mech.ground.marker((0, side * (2 * radius - depth), 0))
-        mech.capsule_on_capsule(f"jaw {side}", jaw, bar.marker((0, 0, 0)), law, radius1=radius,
-                                radius2=radius, axis1=X, axis2=Z, length1=0.4,
-                                length2=4.0)  # fmt: skip
+        mech.capsule_on_capsule(f"jaw {side}", jaw, "bar", law, radius1=radius, radius2=radius,
+                                axis1=X, axis2=Z, length1=0.4, length2=4.0)  # fmt: skip
     sol = rom.simulate(mech, t_end=0.1, dt=2e-4, rho_inf=0.5)
     v = sol.velocity("bar")[:, 2]
     if share < 1.0:
@@ -393,8 +382,7 @@ def brick():
 def on_floor(brick, law=LAW, **start):
     mech = rom.Mechanism(gravity=(0, 0, -g))
     part = mech.add_flexible("brick", brick, **start)
-    floor = mech.ground.marker((0.0, 0.0, 0.0))
-    mech.surface_on_plane("floor", floor, part, law, normal=(0, 0, 1), where=below)
+    mech.surface_on_plane("floor", "ground", part, law, normal=(0, 0, 1), where=below)
     return mech, part
 
 

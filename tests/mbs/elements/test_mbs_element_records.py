@@ -5,9 +5,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
-from cases.mbs.parts import RECORD, slipping
+from cases.mbs.parts import RECORD, held_rod, on_guide, on_hinge, slipping
 from cases.refusals import refuses
-from rom.components import cosserat
 from rom.io.history import channels
 
 STIFFNESS, DAMPING, LOAD, LEVEL, MU = 100.0, 3.0, 1.0, 0.5, 0.1
@@ -17,10 +16,8 @@ X_AXIS, Z_AXIS = (1, 0, 0), (0, 0, 1)
 def slide():
     """A block on a guide along x between springs, under loads of all kinds."""
     mech = rom.Mechanism(gravity=(0, 0, 0))
-    block = mech.add_rigid("block", mass=2.0, inertia=(1, 1, 1), at=(0, 0, 0), velocity=X_AXIS,
-                           markers={"hook": (0, 0, 0)})  # fmt: skip
-    wall, hook = mech.ground.marker((-1, 0, 0)), block.marker("hook")
-    mech.prismatic("guide", wall, hook, axis=X_AXIS)
+    wall = mech.ground.marker((-1, 0, 0))
+    hook = on_guide(mech, "block", mass=2.0, velocity=X_AXIS, base=wall)
     mech.spring_damper("spring", wall, hook, stiffness=STIFFNESS, damping=DAMPING)
     mech.spring_damper("other", mech.ground.marker((2, 0, 0)), hook, stiffness=50.0)
     mech.motor("motor", "guide", lambda t, x, rate: -5 * np.sin(3 * t) - rate)
@@ -76,7 +73,7 @@ def test_together_they_are_what_acts_on_the_block_and_what_is_stored_and_lost(sl
         found = slid.element(name)
         on_block = [marker.body == "block" for marker in found.markers]
         total += found.force[:, on_block].sum(axis=1)
-    assert_allclose(total, slid.interface_loads("block")["hook"][:, :3], atol=1e-9)
+    assert_allclose(total, slid.interface_loads("block")[(0.0, 0.0, 0.0)][:, :3], atol=1e-9)
     assert set(slid.elements) == set(slide().elements)
     every = [slid.element(name) for name in slid.elements]
     assert_allclose(sum(one.energy for one in every), slid.energy.strain, atol=1e-9)
@@ -96,11 +93,9 @@ def test_tables_of_a_motion_have_all_forces_and_asking_changes_nothing(slid):
 
 def test_torques_about_joints_and_between_bodies():
     mech = rom.Mechanism(gravity=(0, -9.81, 0))
-    bob = mech.add_rigid("bob", mass=1.0, inertia=(0.1, 0.1, 0.1), at=(0.4, 0, 0))
-    eye, foot = bob.marker((-0.4, 0, 0)), mech.ground.marker((0, 0, 0))
-    mech.revolute("hinge", foot, eye, axis=Z_AXIS)
+    on_hinge(mech, (0.4, 0, 0), mass=1.0, inertia=(0.1, 0.1, 0.1), axis=Z_AXIS)
     mech.rotational_spring("turn", "hinge", stiffness=7.0, damping=0.2, free_angle=0.1)
-    mech.bushing("bushing", foot, eye, stiffness=(1e3,) * 3 + (2.0,) * 3, damping=(0,) * 6)
+    mech.bushing("bushing", "ground", "bob.pin", stiffness=(1e3,) * 3 + (2.0,) * 3)
     sol = rom.simulate(mech, t_end=0.3, dt=1e-3)
     joint, turn = sol.joint("hinge"), sol.element("turn")
     torque = -7.0 * (joint.angle - 0.1) - 0.2 * joint.angle_rate
@@ -118,9 +113,7 @@ def test_torques_about_joints_and_between_bodies():
 
 def test_what_has_no_markers_is_refused():
     section = {"stretch": 1e6, "bend": 50.0, "mass": 0.1, "inertia": (1e-4, 1e-4, 2e-4)}
-    mech = rom.Mechanism(gravity=(0, 0, 0))
-    rod = mech.add_nonlinear("rod", cosserat.body(cosserat.straight(1.0, 4, **section)))
-    mech.fixed("clamp", mech.ground.marker((0, 0, 0)), rod.marker("start"))
+    mech, rod = held_rod(4, **section)
     mech.force("push", rod.marker("end"), (0.05, 0, 0))
     sol = rom.simulate(mech, t_end=2e-3, dt=1e-3)
     assert sol.elements == ("push",)

@@ -146,8 +146,7 @@ def test_its_energy_and_losses_balance(add):
 @pytest.mark.parametrize("add", WAYS)
 def test_it_stands_where_it_carries_the_weight_and_swings_with_the_frequency_of_the_mass(add):
     mech = bob(add, at=(0, 0, -0.01))
-    mech.prismatic("guide", mech.ground.marker((0, 0, 0)), mech.parts["bob"].marker("c"),
-                   axis=(0, 0, 1))  # fmt: skip
+    mech.prismatic("guide", "ground", "bob.c", axis=(0, 0, 1))
     state = rom.equilibrium(mech)
     np.testing.assert_allclose(state.q[:3], [0, 0, -9.81 * MASS / K], atol=1e-10)
     found = rom.linearize(mech, state)

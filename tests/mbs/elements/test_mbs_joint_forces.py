@@ -215,8 +215,7 @@ def test_friction_by_load_takes_few_newton_passes():
     """The change of the friction with the multipliers is in the iteration matrix."""
     mech = block(speed=1.5)
     mech.friction("shoes", "guide", mu=0.3, transition_speed=0.05)
-    mech.force("push", mech.parts["block"].marker((0, 0, 0)),
-               lambda t: (0.0, 4.0 * np.sin(40 * t), 3 * t))  # fmt: skip
+    mech.force("push", "block", lambda t: (0.0, 4.0 * np.sin(40 * t), 3 * t))
     sol = simulate(mech, t_end=0.3, dt=1e-3)
     assert sol.statistics["iterations"] < 3.2 * sol.statistics["steps"]
 
@@ -225,8 +224,8 @@ def test_friction_by_load_takes_few_newton_passes():
 def test_a_motor_pushes_the_second_body_and_holds_back_the_first(way):
     """Two blocks on one rail: equal and opposite momentum, and the work is force times way."""
     mech, force = block(mass=2.0, gravity=0.0), 3.0 * way
-    other = mech.add_rigid("other", mass=5.0, inertia=(1, 1, 1), at=(1, 0, 0))
-    mech.prismatic("rail", mech.parts["block"].marker((0, 0, 0)), other.marker((0, 0, 0)), axis=X)
+    mech.add_rigid("other", mass=5.0, inertia=(1, 1, 1), at=(1, 0, 0))
+    mech.prismatic("rail", "block", "other", axis=X)
     mech.motor("jack", "rail", lambda t, x, rate: force)
     sol = simulate(mech, t_end=1.0, dt=1e-2)
     assert_allclose(sol.velocity("other")[:, 0], force / 5.0 * sol.t, atol=1e-9)
@@ -253,9 +252,8 @@ def test_a_block_with_coulomb_friction_slides_down_a_slope(method):
 def test_an_oscillator_with_dry_friction_loses_four_f_over_k_per_cycle():
     k, F, x0 = 200.0, 2.0, 0.3
     mech = block(mass=2.0, gravity=0.0)
-    part = mech.parts["block"]
-    mech.spring_damper("spring", mech.ground.marker((-1, 0, 0)), part.marker((0, 0, 0)),
-                       stiffness=k, free_length=1.0 - x0)  # fmt: skip
+    hook = mech.ground.marker((-1, 0, 0))
+    mech.spring_damper("spring", hook, "block", stiffness=k, free_length=1.0 - x0)
     mech.friction("shoes", "guide", coulomb=F, transition_speed=1e-3)
     sol = simulate(mech, t_end=3 * 2 * np.pi * np.sqrt(2.0 / k), dt=2e-4)
     x = sol.position("block")[:, 0] + x0
@@ -295,27 +293,22 @@ def test_friction_by_load_among_joints_that_repeat_others_is_refused_and_of_a_gi
 def spatial_crank():
     """Motor, drive, load-dependent friction, a screw and a bushing, nothing redundant."""
     mech = rom.Mechanism()
-    crank = mech.add_rigid("crank", mass=1.0, inertia=(0.01, 0.01, 0.02), at=(0, 0, 0),
-                           omega=(0, 0, 10.0),
-                           markers={"o": (0, 0, 0), "a": (0.1, 0, 0)})  # fmt: skip
-    rod = mech.add_rigid("rod", mass=0.5, inertia=(1e-3, 4e-3, 4e-3), at=(0.25, 0, 0),
-                         markers={"a": (-0.15, 0, 0), "b": (0.15, 0, 0)})  # fmt: skip
-    slider, nut = (
-        mech.add_rigid(name, mass=m, inertia=(1e-3,) * 3, at=(0.4, 0, z)).marker((0, 0, 0))
-        for name, m, z in (("slider", 0.4, 0.0), ("nut", 0.3, 0.2))
-    )
-    o = mech.ground.marker((0, 0, 0))
-    mech.revolute("main", o, crank.marker("o"), axis=Z)
-    mech.universal("pin", crank.marker("a"), rod.marker("a"), axis1=Z, axis2=Y)
-    mech.spherical("wrist", rod.marker("b"), slider)
-    mech.prismatic("guide", o, slider, axis=X)
-    mech.screw("thread", slider, nut, axis=Z, pitch=0.1)
+    on_axle(mech, "crank", inertia=(0.01, 0.01, 0.02), axle="main", omega=(0, 0, 10.0),
+            markers={"a": (0.1, 0, 0)})  # fmt: skip
+    mech.add_rigid("rod", mass=0.5, inertia=(1e-3, 4e-3, 4e-3), at=(0.25, 0, 0),
+                   markers={"a": (-0.15, 0, 0), "b": (0.15, 0, 0)})  # fmt: skip
+    for name, m, z in (("slider", 0.4, 0.0), ("nut", 0.3, 0.2)):
+        mech.add_rigid(name, mass=m, inertia=(1e-3,) * 3, at=(0.4, 0, z))
+    mech.universal("pin", "crank.a", "rod.a", axis1=Z, axis2=Y)
+    mech.spherical("wrist", "rod.b", "slider")
+    mech.prismatic("guide", "ground", "slider", axis=X)
+    mech.screw("thread", "slider", "nut", axis=Z, pitch=0.1)
     mech.motor("motor", "main", lambda t, angle, rate: 2.0 * (10.0 - rate) + 0.2 * np.sin(5 * t))
     mech.friction("bearing", "main", mu=0.05, radius=0.02, transition_speed=0.5)
     mech.friction("shoes", "guide", mu=0.2, transition_speed=0.2, viscous=0.1, static=1.3,
                   stribeck_speed=0.5)  # fmt: skip
-    mech.bushing("rubber", slider, nut, stiffness=(0, 0, 40.0, 0, 0, 0),
-                 damping=(0, 0, 1.0, 0, 0, 0.01))  # fmt: skip
+    damping = (0, 0, 1.0, 0, 0, 0.01)
+    mech.bushing("rubber", "slider", "nut", stiffness=40.0 * np.eye(6)[2], damping=damping)
     return mech
 
 
@@ -373,9 +366,8 @@ def test_a_stop_on_an_angle_acts_after_whole_turns():
 
 def joints_of_three_kinds():
     mech = wheel()
-    ends = mech.ground.marker((0, 0, 0)), mech.parts["wheel"].marker((0, 0, 0))
-    mech.spherical("ball", *ends)
-    mech.cylindrical("tube", *ends, axis=Z)
+    mech.spherical("ball", "ground", "wheel")
+    mech.cylindrical("tube", "ground", "wheel", axis=Z)
     return (mech,)
 
 

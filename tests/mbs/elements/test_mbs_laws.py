@@ -30,10 +30,10 @@ ENERGY, LOSSES, OWN_MEMORY, BEYOND, COUNTS, NAN = range(1, 7)
 
 def shaken(*, compiled=True, law=slipping, **options):
     mech = rom.Mechanism(gravity=(0, 0, 0))
-    ground, end = mech.ground.marker((0, 0, 0)), on_guide(mech, "block")
+    on_guide(mech, "block")
     mech.drive("shake", "guide", lambda t: REACH * np.sin(2 * np.pi * t))
     more = {"parameters": (STIFFNESS, YIELD), "memory": [0.0]} | RECORD
-    mech.law("damper", law, ground, end, compiled=compiled, **more | options)
+    mech.law("damper", law, "ground", "block", compiled=compiled, **more | options)
     return mech
 
 
@@ -151,10 +151,7 @@ def test_a_law_in_c_is_the_spring_of_the_package(tmp_path, slopes):
 
 
 def twisted(t, parameters, motion, memory, out):
-    """Forces and moments on three markers that depend on all of their motion, if it is asked for.
-
-    Else on places and axes alone.
-    """
+    """Forces and moments on three markers by all of their motion, or by places and axes alone."""
     for k in range(3):
         j, moving = (k + 1) % 3, parameters[0]
         gap, axis = motion.position[j] - motion.position[k], motion.axes[k, :, 0]

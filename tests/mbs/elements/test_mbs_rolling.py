@@ -20,6 +20,7 @@ from rom.errors import ConfigError, ModelError
 ORIGIN, Z = (0, 0, 0), (0, 0, 1)
 BALLS = rom.mbs.BallBearing(9, 12.7e-3, 65e-3, clearance=15e-6)  # a 6209
 ANGULAR = rom.mbs.BallBearing(13, 12.7e-3, 65e-3, contact_angle=np.radians(25))
+MOUNT = {"stiffness": (1e3, 1e3, 1e6, 1e3, 1e3, 0), "damping": (2e3, 2e3, 2e3, 20.0, 20.0, 0)}
 ROLLERS = rom.mbs.RollerBearing(14, 10e-3, 10e-3, 65e-3, clearance=-4e-6)
 
 
@@ -63,22 +64,20 @@ def test_curvatures_of_a_6209_are_those_of_harris():
 
 def bearing(kind, loads=None, axis=Z, **more):
     mech = rom.Mechanism(gravity=(0, 0, 0))
-    shaft = mech.add_rigid("shaft", mass=1.0, inertia=(1e-2,) * 3, at=ORIGIN)
-    mech.rolling_bearing("bearing", shaft.marker(ORIGIN), mech.ground.marker(ORIGIN), axis=axis,
-                         bearing=kind, **more)  # fmt: skip
+    mech.add_rigid("shaft", mass=1.0, inertia=(1e-2,) * 3, at=ORIGIN)
+    mech.rolling_bearing("bearing", "shaft", "ground", axis=axis, bearing=kind, **more)
     if loads is not None:
-        mech.force("load", shaft.marker(ORIGIN), loads)
+        mech.force("load", "shaft", loads)
     return mech
 
 
 def free_pair(kind, rng, **more):
     """Two free rings, near each other."""
     mech = rom.Mechanism(gravity=(0, 0, 0))
-    made = [mech.add_rigid(name, mass=1.0, inertia=(1e-3, 2e-3, 3e-3), at=(1, 2, 3),
-                           velocity=0.02 * rng.normal(size=3), omega=omega)
-            for name, omega in (("inner", (0.1, 0.2, 40)), ("outer", (0.0, 0.1, -3)))]  # fmt: skip
-    mech.rolling_bearing("bearing", *(part.marker(ORIGIN) for part in made), axis=(0, 0, 1),
-                         bearing=kind, **more)  # fmt: skip
+    solid = {"mass": 1.0, "inertia": (1e-3, 2e-3, 3e-3), "at": (1, 2, 3)}
+    for name, omega in (("inner", (0.1, 0.2, 40)), ("outer", (0.0, 0.1, -3))):
+        mech.add_rigid(name, **solid, velocity=0.02 * rng.normal(size=3), omega=omega)
+    mech.rolling_bearing("bearing", "inner", "outer", axis=Z, bearing=kind, **more)
     return mech
 
 
@@ -127,8 +126,7 @@ def test_the_largest_load_is_that_of_stribeck(kind, number):
 
 def resting(mech):
     """Equilibrium of a shaft that a soft coil keeps from turning."""
-    mech.bushing("soft", mech.ground.marker(ORIGIN), mech.parts["shaft"].marker(ORIGIN),
-                 stiffness=(1e-3, 1e-3, 1e-3, 1e6, 1e6, 1e6))  # fmt: skip
+    mech.bushing("soft", "ground", "shaft", stiffness=(1e-3, 1e-3, 1e-3, 1e6, 1e6, 1e6))
     return rom.equilibrium(mech)
 
 
@@ -158,9 +156,7 @@ def test_balls_that_pass_below_the_load_shake_the_shaft_with_their_frequency():
     """Z times the speed of the cage, 1/2 (1 - d / D) of that of the shaft."""
     speed = 2 * np.pi * 25
     mech = bearing(BALLS, (-3000.0, 0, 0), damping=2.0)
-    shaft = mech.parts["shaft"].marker(ORIGIN)
-    mech.bushing("mount", mech.ground.marker(ORIGIN), shaft, stiffness=(1e3, 1e3, 1e6, 1e3, 1e3, 0),
-                 damping=(2e3, 2e3, 2e3, 20.0, 20.0, 0))  # fmt: skip
+    mech.bushing("mount", "ground", "shaft", **MOUNT)
     mech.parts["shaft"].omega[:] = 0, 0, speed
     sol = rom.simulate(mech, t_end=0.4, dt=2e-5, progress=False, save_every=2)
     late = sol.t > 0.1
@@ -178,13 +174,11 @@ def test_balls_pass_alike_under_a_shaft_that_spins_in_its_frame():
     found = []
     for way in ("omega", "spin"):
         mech = rom.Mechanism(gravity=(0, 0, 0))
-        shaft = mech.add_rigid("shaft", mass=2.0, inertia=(0.01, 0.01, 0.008), at=ORIGIN,
-                               **{way: (0, 0, 150.0)}).marker(ORIGIN)  # fmt: skip
-        mech.rolling_bearing("bearing", shaft, mech.ground.marker(ORIGIN), axis=Z, bearing=BALLS,
-                             damping=2.0)  # fmt: skip
-        mech.bushing("mount", mech.ground.marker(ORIGIN), shaft, damping=(2e3, 2e3, 2e3, 20, 20, 0),
-                     stiffness=(1e3, 1e3, 1e6, 1e3, 1e3, 0))  # fmt: skip
-        mech.force("load", shaft, (-3000.0, 0, 0))
+        solid = {"mass": 2.0, "inertia": (0.01, 0.01, 0.008), "at": ORIGIN}
+        mech.add_rigid("shaft", **solid, **{way: (0, 0, 150.0)})
+        mech.rolling_bearing("bearing", "shaft", "ground", axis=Z, bearing=BALLS, damping=2.0)
+        mech.bushing("mount", "ground", "shaft", **MOUNT)
+        mech.force("load", "shaft", (-3000.0, 0, 0))
         sol = rom.simulate(mech, t_end=0.02, dt=1e-5, save_every=10)
         found.append(sol.position("shaft"))
         assert rom.audit(sol).ok, rom.audit(sol)
@@ -237,12 +231,12 @@ test_what_is_no_bearing_is_refused = refused(
 
 def test_rings_that_are_not_at_one_place_are_refused():
     mech = rom.Mechanism()
-    a = mech.add_rigid("shaft", mass=1.0, inertia=(1e-2,) * 3, at=ORIGIN).marker(ORIGIN)
-    b, ground = mech.ground.marker((0, 0, 2e-3)), mech.ground.marker(ORIGIN)
-    for other, axis, words in ((b, Z, "rings of bearing 'b' are 2 mm apart"),
-                               (ground, ORIGIN, "axis of b has length zero"),
-                               (a, Z, "connects body 'shaft' with itself")):  # fmt: skip
-        refuses(ConfigError, words, mech.rolling_bearing, "b", a, other, axis=axis, bearing=BALLS)
+    mech.add_rigid("shaft", mass=1.0, inertia=(1e-2,) * 3, at=ORIGIN)
+    far, add = mech.ground.marker((0, 0, 2e-3)), mech.rolling_bearing
+    for other, axis, words in ((far, Z, "rings of bearing 'b' are 2 mm apart"),
+                               ("ground", ORIGIN, "axis of b has length zero"),
+                               ("shaft", Z, "connects body 'shaft' with itself")):  # fmt: skip
+        refuses(ConfigError, words, add, "b", "shaft", other, axis=axis, bearing=BALLS)
     assert not mech.rolling_bearings
 
 

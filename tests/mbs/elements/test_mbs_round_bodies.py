@@ -1,7 +1,7 @@
 """Round bodies that turn in frames which do not: against frames that turn, and closed forms."""
 
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from scipy.linalg import eigvals
 
 import rom
 from cases.mbs.tubes import tube
-from cases.refusals import refused
+from cases.refusals import refused, refuses
 from rom.body.damping import damped
 from rom.components.gear_mesh import GearPair
 from rom.rotation import matrix
@@ -36,8 +36,8 @@ def test_a_heavy_top_precesses_and_nods_alike_in_both_frames():
     found = []
     for way in ("omega", "spin"):
         mech, body = rotor(way, 40.0, orientation=p)
-        mech.spherical("tip", mech.ground.marker(mech.design_point(body.marker("low"))),
-                       body.marker("low"))  # fmt: skip
+        place = mech.design_point(body.marker("low"))
+        mech.spherical("tip", mech.ground.marker(place), "rotor.low")
         sol = rom.simulate(mech, t_end=0.5, dt=2e-4, save_every=50)
         found.append([matrix(q[3:7])[:, 2] for q in sol.q])
     assert sol.q[-1, 6] ** 2 + sol.q[-1, 3] ** 2 > 0.1
@@ -130,10 +130,7 @@ def test_waves_of_a_turning_ring_travel_as_bryan_found(n):
 
 
 def test_damping_inside_a_shaft_feeds_whirl_beyond_the_critical_speed():
-    """From w (1 + c_e / c_i) on, as of Jeffcott's rotor, w that of the whirl with the rotation.
-
-    Both dampings are measured by the decay at rest.
-    """
+    """From w (1 + c_e / c_i) on, as of Jeffcott's rotor, w that of the whirl with the rotation."""
 
     def growth(speed, **loss):
         values = rom.linearize(held("spin", speed, k=1e7, **loss)).eigenvalues
@@ -184,16 +181,13 @@ test_what_is_not_round_is_refused = refused(
 @pytest.mark.parametrize("ratio", [0.6, 1.4])
 @pytest.mark.parametrize("way", ["omega", "spin"])
 def test_an_unbalance_turns_on_its_orbit_as_the_hint_says(way, ratio):
-    """Jeffcott's rotor from rest: an orbit of e r^2 / (1 - r^2) and a whirl that the start leaves.
-
-    By a frame that turns about a point beside the mass centre, and by a force that turns.
-    """
+    """Jeffcott's rotor from rest: an orbit of e r^2 / (1 - r^2) and a whirl from its start."""
     mech, free = rom.Mechanism(gravity=ORIGIN), np.sqrt(STIFF / MASS)
     speed, e = ratio * free, ECCENTRICITY if way == "omega" else 0.0
     rotor = mech.add_rigid("rotor", mass=MASS, inertia=(ACROSS, ACROSS, ABOUT), at=(e, 0, 0),
                            velocity=(0, speed * e, 0), **{way: (0, 0, speed)})  # fmt: skip
-    mech.bushing("shaft", mech.ground.marker(ORIGIN), rotor.marker((-e, 0, 0)),
-                 stiffness=(STIFF, STIFF, 1e6, 0, 0, 0))  # fmt: skip
+    end, stiffness = rotor.marker((-e, 0, 0)), (STIFF, STIFF, 1e6, 0, 0, 0)
+    mech.bushing("shaft", "ground", end, stiffness=stiffness)
     if way == "spin":
         pull = MASS * ECCENTRICITY * speed**2
         mech.force("unbalance", rotor.marker(ORIGIN),
@@ -228,25 +222,20 @@ def test_what_holds_a_spinning_body_beside_its_axis_is_refused(how):
         x = ECCENTRICITY if beside else 0.0
         rotor = mech.add_rigid("rotor", mass=MASS, inertia=(ACROSS, ACROSS, ABOUT), at=(-x, 0, 0),
                                spin=(0, 0, 50.0))  # fmt: skip
-        ends = mech.ground.marker(ORIGIN), rotor.marker((x, 0, 0))
+        place = rotor.marker((x, 0, 0))
         if not beside:
-            HOLDS[how](mech, *ends)
+            HOLDS[how](mech, "ground", place)
             continue
         with pytest.raises(rom.ModelError, match=r"0.0002 m beside the axis.*0.0006 kg m") as error:
-            HOLDS[how](mech, *ends)
+            HOLDS[how](mech, "ground", place)
         assert "1.5 N at this speed" in error.value.hint
     mech.force("belt", rotor.marker((0.1, 0, 0)), (0, 1, 0))  # a place in space
 
 
-@pytest.mark.parametrize("what", ["contact", "rolling"])
-def test_surfaces_of_spinning_bodies_that_slide_or_roll_are_refused(what):
+def test_surfaces_of_spinning_bodies_that_slide_or_roll_are_refused():
     """Their friction would see a surface at rest."""
-    mech = rom.Mechanism()
-    ball = mech.add_rigid("ball", mass=1, inertia=(1e-3,) * 3, at=(0, 0, 0.05), spin=(0, 9.0, 0))
-    ends = mech.ground.marker(ORIGIN), ball.marker(ORIGIN)
-    with pytest.raises(rom.ConfigError, match="'ball', which spins in its frame"):
-        if what == "rolling":
-            mech.rolling("touch", *ends, normal=Z, radius=0.05)
-        else:
-            law = rom.mbs.Impact(stiffness=1e6, mu=0.2)
-            mech.sphere_on_plane("touch", *ends, normal=Z, radius=0.05, law=law)
+    mech, law = rom.Mechanism(), rom.mbs.Impact(stiffness=1e6, mu=0.2)
+    mech.add_rigid("ball", mass=1, inertia=(1e-3,) * 3, at=(0, 0, 0.05), spin=(0, 9.0, 0))
+    for add in (mech.rolling, partial(mech.sphere_on_plane, law=law)):
+        given = {"normal": Z, "radius": 0.05}
+        refuses(rom.ConfigError, "'ball', which spins", add, "touch", "ground", "ball", **given)

@@ -333,6 +333,7 @@ STRAIGHT = route()
 WRONG = [  # path, numbers, what is said
     (lambda m: [place(m, 0, 0, 0)], {"EA": 1.0}, "needs at least two places, got 1"),
     (lambda m: [], {"EA": 1.0}, "got 0"),
+    (lambda m: ["ground", rom.mbs.Marker("far", ORIGIN)], {"EA": 1.0}, "no body 'far'"),
     (lambda m: [place(m, 0, 0, 0), wheel(m, 1.0)], {"EA": 1.0}, "ends at a pulley"),
     (route(lambda m: place(m, 1.0, 0.0, 0.0)), {"EA": 1.0}, "places 2 and 3 .* are at one point"),
     (route(lambda m: wheel(m, 0.9)), {"EA": 1.0}, "no room"),
@@ -357,11 +358,8 @@ def test_what_is_no_cable_is_refused(path, numbers, said):
     assert not mech.tendons
 
 
-def test_a_marker_of_another_mechanism_is_refused_and_much_friction_is_doubted():
+def test_much_friction_is_doubted():
     mech = rom.Mechanism()
-    other = rom.Mechanism().add_rigid("far", mass=1.0, inertia=SMALL, at=ORIGIN)
-    with pytest.raises(ConfigError, match="no body 'far'"):
-        mech.tendon("rope", [place(mech, 0, 0, 0), other.marker(ORIGIN)], EA=1.0)
     with pytest.warns(RomWarning, match="coefficient of friction of .*'rope' is 30"):
         mech.tendon("rope", route(lambda m: place(m, 0.0, 1.0, 0.0))(mech), EA=1.0, friction=30.0,
                     transition_speed=1.0)  # fmt: skip

@@ -147,11 +147,11 @@ def test_a_state_of_the_same_bodies_with_other_joints_is_refused(build):
 
 
 def test_a_state_without_the_coil_is_refused():
-    bare, wound = coil(), coil()
+    bare = coil()
     bare.turns.clear()
     state = rom.simulate(bare, t_end=0.01, dt=1e-3).final
     words = "0 followed joint coordinates and remembered numbers; this mechanism has 1"
-    refuses(ConfigError, words, rom.simulate, wound, t_end=0.02, dt=1e-3, state=state)
+    refuses(ConfigError, words, rom.simulate, coil(), t_end=0.02, dt=1e-3, state=state)
 
 
 def ladder(n, *, repeated=True):
@@ -228,15 +228,13 @@ def test_statics_and_small_motions_are_those_of_joints_that_repeat_nothing():
 def test_a_start_in_line_is_refused(others):
     """A parallelogram folded flat, alone or among others: it could go on either way."""
     mech = ladder(others) if others else rom.Mechanism(gravity=(0, 0, 0))
-    arm, far, bar = (
-        mech.add_rigid(name, mass=1.0, inertia=(0.1,) * 3, at=(x, 0, 0))
-        for name, x in (("arm", 5.5), ("far", 7.5), ("bar", 6.5))
-    )
-    ground = [mech.ground.marker((x, 0, 0)) for x in (5.0, 7.0)]
-    mech.revolute("a", ground[0], arm.marker((-0.5, 0, 0)), axis=(0, 1, 0))
-    mech.revolute("b", ground[1], far.marker((-0.5, 0, 0)), axis=(0, 1, 0))
-    mech.revolute("c", arm.marker((0.5, 0, 0)), bar.marker((-0.5, 0, 0)), axis=(0, 1, 0))
-    mech.revolute("d", far.marker((0.5, 0, 0)), bar.marker((1.5, 0, 0)), axis=(0, 1, 0))
+    ends = {"low": -X / 2, "high": X / 2, "far": 1.5 * X}
+    for name, x in (("arm", 5.5), ("far", 7.5), ("bar", 6.5)):
+        mech.add_rigid(name, mass=1.0, inertia=(0.1,) * 3, at=(x, 0, 0), markers=ends)
+    mech.revolute("a", mech.ground.marker((5.0, 0, 0)), "arm.low", axis=Y)
+    mech.revolute("b", mech.ground.marker((7.0, 0, 0)), "far.low", axis=Y)
+    mech.revolute("c", "arm.high", "bar.low", axis=Y)
+    mech.revolute("d", "far.high", "bar.far", axis=Y)
     refuses(ModelError, "singular position", rom.simulate, mech, t_end=0.1, dt=1e-3)
 
 
@@ -265,13 +263,12 @@ def train(n, slope=0.2, apart=0.0):
             mech.spherical(f"link {k}", behind.marker((0.5, 0, 0)), bar.marker((-0.5, 0, 0)))
         for y in (-1, 1) if k % 3 == 2 else ():
             at = {"at": (k, y, 0.3), "inertia": (0.05, 0.1, 0.05)}
-            other = mech.add_rigid(f"wheel {k}.{y}", mass=2.0, **at)
-            centre = other.marker((0, 0, 0))
+            centre = mech.add_rigid(f"wheel {k}.{y}", mass=2.0, **at).marker((0, 0, 0))
             mech.rolling(f"roll {k}.{y}", floor, centre, normal=Z, radius=0.3, axis=Y)
             mech.revolute(f"axle {k}.{y}", bar.marker((-0.5, y, 0)), centre, axis=(0, 1, 0))
         behind = bar
-    mech.point_on_plane("end", mech.ground.marker((0, 0, 0.3)), behind.marker((0.5, 0, 0)),
-                        normal=(0, 0, 1))  # fmt: skip
+    end = behind.marker((0.5, 0, 0))
+    mech.point_on_plane("end", mech.ground.marker((0, 0, 0.3)), end, normal=Z)
     return mech
 
 

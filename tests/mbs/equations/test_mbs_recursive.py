@@ -53,12 +53,11 @@ def chain(n, *, flexible=True, held=True, gravity=GRAVITY, moving=None):
 def tied_chain(n=8):
     """A chain with springs between links far apart and to the ground, and a damped hinge."""
     mech = chain(n)
-    parts = list(mech.parts.values())
     for k in range(0, n - 4, 2):
-        ends = parts[k].marker("b"), parts[k + 4].marker("b")
+        ends = f"link {k}.b", f"link {k + 4}.b"
         mech.spring_damper(f"tie {k}", *ends, stiffness=30.0, damping=0.1, free_length=1.0)
     hook = mech.ground.marker((0.5, 1, 0))
-    mech.spring_damper("rope", hook, parts[-1].marker("b"), stiffness=10.0)
+    mech.spring_damper("rope", hook, f"link {n - 1}.b", stiffness=10.0)
     mech.rotational_spring("coil", "pin 3", stiffness=2.0, damping=0.02)
     return mech
 
@@ -150,12 +149,12 @@ def side_by_side(n, flexible=lambda k: True):
 def bridge():
     """Two bodies on universal joints of their own, and a ball joint between them."""
     mech = rom.Mechanism(gravity=(0, 0, -GRAVITY))
-    one = add_link(mech, "one", (0, 0, 0), flexible=False)
+    add_link(mech, "one", (0, 0, 0), flexible=False)
     two = add_link(mech, "two", (0.3, 0, 0), flexible=False)
-    mech.universal("left", mech.ground.marker((0, 0, 0)), one.marker("a"), axis1=Z, axis2=(0, 1, 0))
+    mech.universal("left", "ground", "one.a", axis1=Z, axis2=(0, 1, 0))
     ends = mech.ground.marker((0.5, 0.1, 0)), two.marker((0.05, 0.1, 0))
     mech.universal("right", *ends, axis1=(1, 0, 0), axis2=Z)
-    mech.spherical("ball", one.marker("b"), two.marker("a"))
+    mech.spherical("ball", "one.b", "two.a")
     return mech
 
 
@@ -319,15 +318,13 @@ def test_a_few_bodies_keep_whole_matrices():
 
 def test_joints_that_repeat_others_are_found_in_a_long_chain(solved):
     mech = chain(7, flexible=False)
-    end = mech.parts["link 6"].marker("a")
-    one = add_link(mech, "one", (1.8, 0.3, 0), flexible=False)
+    add_link(mech, "one", (1.8, 0.3, 0), flexible=False)
     side = {"mass": 0.1, "inertia": (1e-3,) * 3, "markers": {"a": (0, -0.15, 0), "b": (0, 0.15, 0)}}
-    left = mech.add_rigid("left", at=(1.8, 0.15, 0), **side)
-    right = mech.add_rigid("right", at=(2.1, 0.15, 0), **side)
-    mech.revolute("corner 0", end, left.marker("a"), axis=Z)
-    mech.revolute("corner 1", left.marker("b"), one.marker("a"), axis=Z)
-    mech.revolute("corner 2", one.marker("b"), right.marker("b"), axis=Z)
-    mech.revolute("corner 3", right.marker("a"), mech.parts["link 6"].marker("b"), axis=Z)
+    mech.add_rigid("left", at=(1.8, 0.15, 0), **side)
+    mech.add_rigid("right", at=(2.1, 0.15, 0), **side)
+    corners = "link 6.a", "left.a", "left.b", "one.a", "one.b", "right.b", "right.a", "link 6.b"
+    for k in range(4):
+        mech.revolute(f"corner {k}", *corners[2 * k : 2 * k + 2], axis=Z)
     found = []
     for blocks in (True, False):
         with pytest.warns(RomWarning, match="3 of 55 constraints repeat others; joints corner 0"):
@@ -339,8 +336,7 @@ def test_joints_that_repeat_others_are_found_in_a_long_chain(solved):
 def test_a_chain_that_cannot_be_closed_is_refused(monkeypatch):
     monkeypatch.setattr(graph, "BLOCK_GAIN", 1e-12)
     mech = chain(5)
-    ends = mech.ground.marker((9, 0.1, 0)), mech.parts["link 4"].marker("b")
-    mech.distance("rope", *ends, length=1.0)
+    mech.distance("rope", mech.ground.marker((9, 0.1, 0)), "link 4.b", length=1.0)
     with pytest.raises(ModelError, match="cannot be assembled"):
         initial_state(pack(mech))
 

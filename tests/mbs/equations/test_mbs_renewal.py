@@ -22,12 +22,12 @@ def shaft(cavitation="reynolds"):
     film = rom.mbs.JournalBearing(0.1, 0.05, 1e-4, [rom.mbs.Groove(np.pi / 2, 0.35)], cells=(36, 4),
                           cavitation=cavitation)  # fmt: skip
     for k, side in enumerate((-0.2, 0.3)):
-        bush = mech.add_rigid(f"bush {k}", mass=5.0, inertia=(0.1,) * 3, at=(0, 0, side))
+        mech.add_rigid(f"bush {k}", mass=5.0, inertia=(0.1,) * 3, at=(0, 0, side))
         ground = mech.ground.marker((0, 0, side))
         stiffness, rate = (1e8, 1e8, 1e8, 1e5, 1e5, 1e5), (1e3, 1e3, 1e3, 1.0, 1.0, 1.0)
-        mech.bushing(f"seat {k}", ground, bush.marker((0, 0, 0)), axes=np.eye(3),
-                     stiffness=stiffness, damping=rate)  # fmt: skip
-        ends = body.marker((0, 0, side)), bush.marker((0, 0, 0))
+        seat = {"axes": np.eye(3), "stiffness": stiffness, "damping": rate}
+        mech.bushing(f"seat {k}", ground, f"bush {k}", **seat)
+        ends = body.marker((0, 0, side)), f"bush {k}"
         mech.journal_bearing(f"film {k}", *ends, axis=Z, bearing=film, oil=0.03)
     return mech
 

@@ -74,17 +74,10 @@ def test_an_array_that_compiled_code_would_misread_is_refused(wrong):
 def pair():
     """Two bodies that slide on a line, for elements between them."""
     mech = rom.Mechanism(gravity=(0, 0, -9.81))
-    bodies = [
-        mech.add_rigid(n, mass=1.0, inertia=(0.1,) * 3, at=(x, 0, 0), markers={"p": (0, 0, 0)})
-        for n, x in (("a", 0.0), ("b", 1.0))
-    ]
-    a, b = (body.marker("p") for body in bodies)
-    mech.prismatic("slide", a, b, axis=(1, 0, 0))
-    return mech, a, b
-
-
-def ground(mech):
-    return mech.ground.marker((0, 0, 0))
+    for name, x in (("a", 0.0), ("b", 1.0)):
+        mech.add_rigid(name, mass=1.0, inertia=(0.1,) * 3, at=(x, 0, 0))
+    mech.prismatic("slide", "a", "b", axis=(1, 0, 0))
+    return mech, "a", "b"
 
 
 def flexible_body(mech, **kind):
@@ -108,7 +101,7 @@ def bending_body(mech, *, sampled=False):
 
 
 def geared_body(mech, a, b):
-    mech.prismatic("other", mech.ground.marker((0, 0, 0)), b, axis=(1, 0, 0))
+    mech.prismatic("other", "ground", b, axis=(1, 0, 0))
     mech.gear("e", "slide", "other", ratio=2.0)
 
 
@@ -134,8 +127,8 @@ ELEMENTS = {  # family -> what asks for it
     "bodies of sampled elements": lambda m, a, b: bending_body(m, sampled=True),
     "tendons": lambda m, a, b: m.tendon("e", [a, b], EA=1.0),
     "gear_meshes": lambda m, a, b: m.gear_mesh("e", a, b, **WHEELS),
-    "rolling_bearings": lambda m, a, b: m.rolling_bearing("e", a, ground(m), **BALLS),
-    "journal_bearings": lambda m, a, b: m.journal_bearing("e", a, ground(m), **FILM),
+    "rolling_bearings": lambda m, a, b: m.rolling_bearing("e", a, "ground", **BALLS),
+    "journal_bearings": lambda m, a, b: m.journal_bearing("e", a, "ground", **FILM),
     "spins": lambda m, a, b: m.add_rigid("e", **WHEEL),
 }
 KERNELS = ("residuals", "tangents", "energy", "multiplier_columns", "pair_tangents")
@@ -157,8 +150,8 @@ METHODS = [  # options of a run, stages that its steps need
 
 
 def hinge(mech, b):
-    wheel = mech.add_rigid("wheel", mass=1.0, inertia=(0.1,) * 3, at=(1, 0, 0))
-    mech.revolute("hinge", b, wheel.marker((0, 0, 0)), axis=(0, 0, 1))
+    mech.add_rigid("wheel", mass=1.0, inertia=(0.1,) * 3, at=(1, 0, 0))
+    mech.revolute("hinge", b, "wheel", axis=(0, 0, 1))
     return "hinge"
 
 

@@ -65,9 +65,9 @@ def test_deformations_beyond_linear_elasticity_are_seen():
 def weight_on_a_spring(**steps):
     """4 Hz, 0.1 m."""
     mech = rom.Mechanism(gravity=(0, 0, 0))
-    ball = mech.add_rigid("ball", mass=1.0, inertia=(1, 1, 1), at=(0.6, 0, 0))
-    mech.spring_damper("spring", mech.ground.marker((0, 0, 0)), ball.marker((0, 0, 0)),
-                       stiffness=(8 * np.pi) ** 2, free_length=0.5)  # fmt: skip
+    mech.add_rigid("ball", mass=1.0, inertia=(1, 1, 1), at=(0.6, 0, 0))
+    law = {"stiffness": (8 * np.pi) ** 2, "free_length": 0.5}
+    mech.spring_damper("spring", "ground", "ball", **law)
     return rom.simulate(mech, t_end=1.0, **steps)
 
 
@@ -84,9 +84,8 @@ def test_a_run_tells_itself_what_the_audit_finds_wrong():
 def test_an_element_from_outside_says_itself_what_it_cannot_bear():
     """No list of elements in the core: the family answers for its own."""
     mech = rom.Mechanism(gravity=(0, 0, 0))
-    ball = mech.add_rigid("ball", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0), omega=(0, 0, 7.0))
-    mech.bushing("rubber", mech.ground.marker((0, 0, 0)), ball.marker((0, 0, 0)),
-                 stiffness=(1e3, 1e3, 1e3, 0, 0, 1e-3))  # fmt: skip
+    mech.add_rigid("ball", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0), omega=(0, 0, 7.0))
+    mech.bushing("rubber", "ground", "ball", stiffness=(1e3, 1e3, 1e3, 0, 0, 1e-3))
     mine = replace(bushings.BUSHINGS_FAMILY, hooks=family.Hooks(beyond=lambda name, _e, t, axes: (
         f"{name} after {t[-1]:g} s at {axes('ball')[-1, 0, 0]:.3f}")))  # fmt: skip
     mech.elements["rubber"] = mine, mech.elements["rubber"][1]

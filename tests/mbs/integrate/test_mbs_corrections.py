@@ -8,16 +8,15 @@ import rom
 from benchmarks.units import as_mechanism
 from cases.gear_unit import rigid_unit
 from cases.long import few
+from cases.mbs.parts import ORIGIN, on_axle, on_guide
 
-ORIGIN, X, g = (0, 0, 0), (1, 0, 0), 9.81
 METHODS = ("generalized-alpha", "bdf")
-MU, SPEED = 0.3, 0.35
+MU, SPEED, g = 0.3, 0.35, 9.81
 
 
 def block(mass=1.0, speed=SPEED):
     mech, moving = rom.Mechanism(gravity=(0, 0, -g)), (speed, 0, 0)
-    part = mech.add_rigid("block", mass=mass, inertia=(mass,) * 3, at=ORIGIN, velocity=moving)
-    mech.prismatic("guide", mech.ground.marker(ORIGIN), part.marker(ORIGIN), axis=X)
+    on_guide(mech, "block", mass=mass, velocity=moving)
     return mech
 
 
@@ -40,7 +39,7 @@ def test_friction_stops_a_block_in_steps_longer_than_its_speed_turns_in(method, 
 def test_a_steep_motor_is_found_at_the_speed_at_which_it_balances_a_load(method):
     mech, steep, load = block(), 1e6, 2.0
     mech.motor("motor", "guide", lambda t, x, v: -5.0 * np.tanh(steep * v), compiled=True)
-    mech.force("load", mech.part("block").marker(ORIGIN), (load, 0, 0))
+    mech.force("load", "block", (load, 0, 0))
     sol = rom.simulate(mech, t_end=0.5, dt=2e-2, method=method, rho_inf=0.0)
     wanted = np.arctanh(load / 5.0) / steep
     assert sol.velocity("block")[-1, 0] == pytest.approx(wanted, rel=1e-3)
@@ -50,8 +49,7 @@ def test_a_steep_motor_is_found_at_the_speed_at_which_it_balances_a_load(method)
 def test_a_light_rotor_is_led_against_a_torque_that_grows_with_speed_faster_than_inertia(method):
     """Torque of the drive is I alpha - c omega."""
     mech, inertia, c = rom.Mechanism(gravity=ORIGIN), 1e-4, 1.0
-    rotor = mech.add_rigid("rotor", mass=1.0, inertia=(inertia,) * 3, at=ORIGIN)
-    mech.revolute("shaft", mech.ground.marker(ORIGIN), rotor.marker(ORIGIN), axis=(0, 0, 1))
+    on_axle(mech, "rotor", inertia=(inertia,) * 3, axle="shaft")
     mech.motor("machine", "shaft", lambda t, x, v: c * v, compiled=True)
     mech.drive("brake", "shaft", np.sin, rate=np.cos, acceleration=lambda t: -np.sin(t))
     sol = rom.simulate(mech, t_end=1.0, dt=1e-2, method=method)
@@ -76,7 +74,7 @@ def test_a_block_that_strikes_a_stop_in_long_steps_comes_to_rest_on_it(k, restit
     mech, load = block(0.01, 0.3), 0.2
     law = rom.mbs.Impact(k, 1.0, restitution=restitution, impact_speed=0.3)
     mech.stop("stop", "guide", law, lower=-1e-3, upper=1e-3)
-    mech.force("load", mech.part("block").marker(ORIGIN), (load, 0, 0))
+    mech.force("load", "block", (load, 0, 0))
     sol = rom.simulate(mech, t_end=1.0, dt=h, rho_inf=0.0)
     depth = sol.position("block")[-1, 0] - 1e-3
     assert depth == pytest.approx(load / k, rel=1e-6)

@@ -40,8 +40,8 @@ def chain(rng, frame):
         else:
             mech.spherical(f"ball {k}", last, part.marker("root"))
         last = part.marker("tip")
-    ends = mech.ground.marker(at + np.array([0, 0.4, 0.2])), last
-    mech.spring_damper("spring", *ends, stiffness=rng.uniform(10, 40), damping=0.2)
+    hook = mech.ground.marker(at + np.array([0, 0.4, 0.2]))
+    mech.spring_damper("spring", hook, last, stiffness=rng.uniform(10, 40), damping=0.2)
     return mech
 
 
@@ -57,17 +57,14 @@ def hub(rng, frame):
     mech = rom.Mechanism(gravity=(0, 0, 0))
     turning = np.r_[rng.normal(size=2) * 0.3, rng.uniform(1, 4)]
     arms = {"right": (0.3, 0, 0), "left": (-0.3, 0, 0)}
-    centre = mech.add_rigid("hub", mass=5, inertia=(0.4, 0.5, 0.6), at=(0, 0, 0), markers=arms,
-                            velocity=rng.normal(size=3), omega=turning)  # fmt: skip
-    velocity = mech.parts["hub"].velocity
+    solid, velocity = {"mass": 5, "inertia": (0.4, 0.5, 0.6)}, rng.normal(size=3)
+    mech.add_rigid("hub", **solid, at=(0, 0, 0), markers=arms, velocity=velocity, omega=turning)
     panels = zip(("right", "left"), (0, np.pi), beams(rng, frame, rng.integers(1, 3)), strict=False)
     for name, angle, body in panels:
         A, at = turned(angle), np.array(arms[name])
-        panel = mech.add_flexible(
-            f"{name} panel", body, at=at, orientation=A, omega=A.T @ turning,
-            velocity=velocity + np.cross(turning, at),
-        )  # fmt: skip
-        mech.revolute(f"{name} hinge", centre.marker(name), panel.marker("root"), axis=Z)
+        moving = {"omega": A.T @ turning, "velocity": velocity + np.cross(turning, at)}
+        mech.add_flexible(f"{name} panel", body, at=at, orientation=A, **moving)
+        mech.revolute(f"{name} hinge", f"hub.{name}", f"{name} panel.root", axis=Z)
         mech.rotational_spring(f"{name} coil", f"{name} hinge", stiffness=rng.uniform(5, 50))
     return mech
 

@@ -78,9 +78,8 @@ def test_velocities_fit_the_constraints_to_round_off(build, method):
 def test_rolling_goes_with_it(options):
     """Acceleration g sin / (1 + I / m r^2)."""
     mech = rom.Mechanism(gravity=(3.0, 0, -9.0))
-    ball = mech.add_rigid("ball", mass=2.0, inertia=(0.008,) * 3, at=(0, 0, 0.1))
-    ends = mech.ground.marker((0, 0, 0)), ball.marker((0, 0, 0))
-    mech.rolling("roll", *ends, radius=0.1, normal=(0, 0, 1))
+    mech.add_rigid("ball", mass=2.0, inertia=(0.008,) * 3, at=(0, 0, 0.1))
+    mech.rolling("roll", "ground", "ball", radius=0.1, normal=(0, 0, 1))
     sol = simulate_quietly(mech, t_end=0.5, dt=5e-3, **options)
     assert_allclose(sol.position("ball")[-1, 0], 0.5 * 3.0 / 1.4 * 0.25, rtol=1e-9)
     assert velocity_gap(sol) < 1e-12

@@ -20,9 +20,9 @@ def rod_on_a_pin(gap=0.0, angle=0.0, omega=0.0, rate=None):
     """A rod of 1 m, whose hinge is drawn open, and a drive that begins elsewhere."""
     mech = rom.Mechanism(gravity=(0, -9.81, 0))
     inertia, ends = (1e-3, 1 / 12, 1 / 12), {"a": (-0.5, 0, 0), "b": (0.5, 0, 0)}
-    rod = mech.add_rigid("rod", mass=1.0, inertia=inertia, at=(0.5 + gap, 0, 0), markers=ends,
-                         velocity=(0, 0.5 * omega, 0), omega=(0, 0, omega))  # fmt: skip
-    mech.revolute("pin", mech.ground.marker((0, 0, 0)), rod.marker("a"), axis=Z)
+    moving = {"at": (0.5 + gap, 0, 0), "velocity": (0, 0.5 * omega, 0), "omega": (0, 0, omega)}
+    mech.add_rigid("rod", mass=1.0, inertia=inertia, markers=ends, **moving)
+    mech.revolute("pin", "ground", "rod.a", axis=Z)
     if angle or rate is not None:
         mech.drive("turn", "pin", lambda t: angle + (rate or 0.0) * t)
     return mech
@@ -33,8 +33,7 @@ def moved(mech, **options):
 
 
 def response(mech, **options):
-    end = mech.part("rod").marker("b")
-    return rom.frequency_response(mech, None, [1.0], force=end, motion=end, **options)
+    return rom.frequency_response(mech, None, [1.0], force="rod.b", motion="rod.b", **options)
 
 
 @pytest.mark.parametrize("asked", [moved, rom.linearize, rom.steady_motion, response])

@@ -19,10 +19,7 @@ BALL = (0.2, 0.2, 0.2)
 
 @pytest.mark.parametrize("seed", range(3))
 def test_gradient_and_convective_term_are_derivatives(seed):
-    """dG/dt = 0 along every motion: the gradient times the velocity is the rate of the residual.
-
-    Of every connection of this page, between flexible bodies, a rigid one and the ground.
-    """
+    """dG/dt = 0 along every motion: the gradient times the velocity is the rate of the residual."""
     rng = np.random.default_rng(seed)
     mech, one, two = two_soft(rng, GRAVITY)
     box = mech.add_rigid("box", mass=2.0, inertia=(1.0, 1.5, 2.0),
@@ -137,9 +134,9 @@ def test_a_screw_turns_torque_into_thrust(pitch):
     """Right- and left-hand: (J + m (p / 2 pi)^2) alpha = T; so many turns, so many pitches."""
     J, m, torque = 2e-3, 4.0, 0.5
     mech = rom.Mechanism(gravity=(0, 0, 0))
-    bolt = mech.add_rigid("bolt", mass=m, inertia=(J, J, J), at=(0, 0, 0))
-    mech.screw("thread", mech.ground.marker((0, 0, 0)), bolt.marker((0, 0, 0)), axis=X, pitch=pitch)
-    mech.torque("spanner", bolt.marker((0, 0, 0)), torque * X)
+    mech.add_rigid("bolt", mass=m, inertia=(J, J, J), at=(0, 0, 0))
+    mech.screw("thread", "ground", "bolt", axis=X, pitch=pitch)
+    mech.torque("spanner", "bolt", torque * X)
     sol = rom.simulate(mech, t_end=1.0, dt=1e-2)
     alpha = torque / (J + m * (pitch / (2 * np.pi)) ** 2)
     assert_allclose(sol.omega("bolt")[:, 0], alpha * sol.t, rtol=1e-9, atol=1e-8)
@@ -155,19 +152,15 @@ def test_a_planetary_gear_turns_as_willis_says():
     sun_teeth, ring_teeth = 20, 64
     planet_teeth = (ring_teeth - sun_teeth) // 2
     mech = rom.Mechanism(gravity=(0, 0, 0))
-    wheels = {}
     for name, x in (("sun", 0.0), ("carrier", 0.0), ("planet", 0.3)):
-        wheels[name] = mech.add_rigid(name, mass=1.0, inertia=BALL, at=(x, 0, 0),
-                                      markers={"o": (0, 0, 0), "p": (0.3, 0, 0)})  # fmt: skip
-    o = mech.ground.marker((0, 0, 0))
-    mech.revolute("arm", o, wheels["carrier"].marker("o"), axis=Z)
-    carrier = wheels["carrier"].marker("o")
-    mech.revolute("sun axle", carrier, wheels["sun"].marker("o"), axis=Z)
-    mech.revolute("pin", wheels["carrier"].marker("p"), wheels["planet"].marker("o"), axis=Z)
+        mech.add_rigid(name, mass=1.0, inertia=BALL, at=(x, 0, 0), markers={"p": (0.3, 0, 0)})
+    mech.revolute("arm", "ground", "carrier", axis=Z)
+    mech.revolute("sun axle", "carrier", "sun", axis=Z)
+    mech.revolute("pin", "carrier.p", "planet", axis=Z)
     # seen from the carrier the ring, which is the ground, turns backwards
     mech.gear("ring", "arm", "pin", ratio=-ring_teeth / planet_teeth)
     mech.gear("teeth", "sun axle", "pin", ratio=-sun_teeth / planet_teeth)
-    mech.torque("engine", wheels["sun"].marker("o"), (0, 0, 1.0))
+    mech.torque("engine", "sun", (0, 0, 1.0))
     sol = rom.simulate(mech, t_end=2.0, dt=2e-3)
     share = sun_teeth / (sun_teeth + ring_teeth)
     sun = sol.omega("sun")[-1, 2]
@@ -180,9 +173,8 @@ def test_a_planetary_gear_turns_as_willis_says():
 def test_what_rolls_down_a_slope_has_the_acceleration_of_the_closed_form(axis, J, method):
     """A = g sin / (1 + J / (m r^2)): 5/7 for the ball, 2/3 for the disc."""
     mech = rom.Mechanism(gravity=(9.81 * np.sin(0.3), 0, -9.81 * np.cos(0.3)))
-    body = mech.add_rigid("body", mass=1.0, inertia=(J * 0.2**2,) * 3, at=(0, 0, 0.2))
-    floor, centre = mech.ground.marker((0, 0, 0)), body.marker((0, 0, 0))
-    mech.rolling("roll", floor, centre, normal=Z, radius=0.2, axis=axis)
+    mech.add_rigid("body", mass=1.0, inertia=(J * 0.2**2,) * 3, at=(0, 0, 0.2))
+    mech.rolling("roll", "ground", "body", normal=Z, radius=0.2, axis=axis)
     sol = rom.simulate(mech, t_end=1.0, dt=1e-3, method=method)
     a = 9.81 * np.sin(0.3) / (1 + J)
     assert_allclose(sol.position("body")[:, 0], 0.5 * a * sol.t**2, atol=1e-8)
@@ -222,12 +214,11 @@ def test_a_thrown_hoop_wobbles_without_loss_and_touches_the_plane():
     mech = rom.Mechanism()
     J = 0.5 * 0.3**2
     tilt = np.array([np.cos(0.1), np.sin(0.1), 0, 0])
-    hoop = mech.add_rigid("hoop", mass=1.0, inertia=(J, 2 * J, J), orientation=tilt,
-                          at=(0, 0, 0.3 * np.cos(0.2)), velocity=(2.0, 0, 0), omega=(0.2, 6.0, 0.5),
-                          markers={"o": (0, 0, 0)})  # fmt: skip
+    mech.add_rigid("hoop", mass=1.0, inertia=(J, 2 * J, J), orientation=tilt,
+                   at=(0, 0, 0.3 * np.cos(0.2)), velocity=(2.0, 0, 0), omega=(0.2, 6.0, 0.5),
+                   markers={"o": (0, 0, 0)})  # fmt: skip
     axle = np.array([0, np.cos(0.2), np.sin(0.2)])
-    mech.rolling("roll", mech.ground.marker((0, 0, 0)), hoop.marker("o"), normal=Z, radius=0.3,
-                 axis=axle)  # fmt: skip
+    mech.rolling("roll", "ground", "hoop.o", normal=Z, radius=0.3, axis=axle)
     sol = rom.simulate(mech, t_end=2.0, dt=0.01, method="dop853", assemble=True)
     assert np.abs(sol.energy.balance).max() < 1e-8 * sol.energy.kinetic.max()
     s = np.einsum("tij,j->ti", sol.axes("hoop", "o"), [0, 1.0, 0])

@@ -94,15 +94,11 @@ def test_cardan_shafts_turn_with_the_ratio_of_the_closed_form():
     out = np.array([np.cos(beta), np.sin(beta), 0.0])
     mech = rom.Mechanism(gravity=(0, 0, 0))
     turn = rotation.matrix(np.array([np.cos(beta / 2), 0, 0, np.sin(beta / 2)]))
-    ground, origin = mech.ground, {"c": (0, 0, 0)}
     start = speed * np.cos(beta)  # the cross stands at phi = 90 degrees
-    one = mech.add_rigid("one", mass=1, inertia=(1e-3,) * 3, at=(0, 0, 0), markers=origin,
-                         omega=(speed, 0, 0))  # fmt: skip
-    two = mech.add_rigid("two", mass=1, inertia=(1e-3,) * 3, at=(0, 0, 0), orientation=turn,
-                         markers=origin, omega=(start, 0, 0))  # fmt: skip
-    mech.revolute("in", ground.marker((0, 0, 0)), one.marker("c"), axis=(1, 0, 0))
-    mech.revolute("out", ground.marker((0, 0, 0)), two.marker("c"), axis=out)
-    mech.universal("cross", one.marker("c"), two.marker("c"), axis1=Z, axis2=np.cross(Z, out))
+    on_axle(mech, "one", inertia=(1e-3,) * 3, axle="in", axis=(1, 0, 0), omega=(speed, 0, 0))
+    moving = {"orientation": turn, "omega": (start, 0, 0)}
+    on_axle(mech, "two", inertia=(1e-3,) * 3, axle="out", axis=out, **moving)
+    mech.universal("cross", "one", "two", axis1=Z, axis2=np.cross(Z, out))
     mech.drive("motor", "in", lambda t: speed * t)
     sol = simulate_quietly(mech, t_end=1.0, dt=0.01, method="dop853")
     phi = speed * sol.t + np.pi / 2  # the first pin starts across the plane of the shafts

@@ -88,8 +88,7 @@ def test_spinning_bar_stretches_as_the_unreduced_model_does():
     mech = rom.Mechanism(gravity=(0, 0, 0))
     mech.add_flexible("bar", lattice_body(data), omega=spin, velocity=np.cross(spin, -centre))
     # nodes as joints of nothing: springs without stiffness make them markers of the run
-    bar = mech.parts["bar"]
-    mech.spring_damper("probe", bar.marker("n0"), bar.marker("n14"), stiffness=0.0)
+    mech.spring_damper("probe", "bar.n0", "bar.n14", stiffness=0.0)
     sol = rom.simulate(mech, t_end=0.05, dt=1e-3, **EXACT)
     length = np.linalg.norm(sol.position("bar", "n14") - sol.position("bar", "n0"), axis=1)
     wanted = np.linalg.norm(full[:, 14] - full[:, 0], axis=1)
@@ -105,17 +104,13 @@ def chain_of_two(gravity=(0.0, 0.0, -9.81), turn=None, shift=(0.0, 0.0, 0.0)):
     A = np.eye(3) if turn is None else turn
     shift, tip = np.asarray(shift), data[0][14]
     mech = rom.Mechanism(gravity=A @ gravity)
-    bar = mech.add_flexible(
-        "bar", lattice_body(data), at=shift, orientation=A, omega=(0.5, 0, 1.0),
-        velocity=A @ np.cross((0.5, 0, 1.0), -data[0][0]),
-    )  # fmt: skip
-    at = shift + A @ (tip + np.array([0.1, 0, 0]))
-    ball = mech.add_rigid(
-        "ball", mass=0.5, inertia=(1e-3, 2e-3, 2.5e-3), at=at, orientation=A,
-        markers={"c": (-0.1, 0, 0)},
-    )  # fmt: skip
-    mech.spherical("hook", mech.ground.marker(tuple(shift + A @ data[0][0])), bar.marker("n0"))
-    mech.revolute("hinge", bar.marker("n14"), ball.marker("c"), axis=A @ [0, 1.0, 0])
+    moving = {"omega": (0.5, 0, 1.0), "velocity": A @ np.cross((0.5, 0, 1.0), -data[0][0])}
+    mech.add_flexible("bar", lattice_body(data), at=shift, orientation=A, **moving)
+    placed = {"at": shift + A @ (tip + np.array([0.1, 0, 0])), "orientation": A}
+    solid = {"mass": 0.5, "inertia": (1e-3, 2e-3, 2.5e-3), "markers": {"c": (-0.1, 0, 0)}}
+    mech.add_rigid("ball", **solid, **placed)
+    mech.spherical("hook", mech.ground.marker(tuple(shift + A @ data[0][0])), "bar.n0")
+    mech.revolute("hinge", "bar.n14", "ball.c", axis=A @ [0, 1.0, 0])
     return mech
 
 
@@ -172,10 +167,10 @@ def beam():
 def hinged(length, add):
     """What ``add`` makes a bar, on a hinge about z with a ball at its tip, gravity across."""
     mech = rom.Mechanism(gravity=(0, -9.81, 0))
-    bar = add(mech)
-    ball = mech.add_rigid("ball", mass=0.5, inertia=(1e-4,) * 3, at=length)
-    mech.revolute("hinge", mech.ground.marker((0, 0, 0)), bar.marker("root"), axis=(0, 0, 1))
-    mech.fixed("weld", bar.marker("tip"), ball.marker((0, 0, 0)))
+    add(mech)
+    mech.add_rigid("ball", mass=0.5, inertia=(1e-4,) * 3, at=length)
+    mech.revolute("hinge", "ground", "bar.root", axis=(0, 0, 1))
+    mech.fixed("weld", "bar.tip", "ball")
     return mech
 
 
@@ -193,9 +188,9 @@ def test_small_swings_have_the_frequencies_of_the_hinged_body(beam):
     mech = rom.Mechanism(gravity=(0, 0, 0))
     start = amplitude * shape[:, k]
     place = {"at": start[:3] - beam.marker("root").point, "orientation": rotation.exp(start[3:6])}
-    bar = mech.add_flexible("bar", beam, **place, q=start[6:])
-    mech.revolute("hinge", mech.ground.marker((0, 0, 0)), bar.marker("root"), axis=(0, 0, 1))
-    mech.spring_damper("probe", bar.marker("root"), bar.marker("tip"), stiffness=0.0)
+    mech.add_flexible("bar", beam, **place, q=start[6:])
+    mech.revolute("hinge", "ground", "bar.root", axis=(0, 0, 1))
+    mech.spring_damper("probe", "bar.root", "bar.tip", stiffness=0.0)
     period = 2 * np.pi / omega[k]
     sol = rom.simulate(mech, t_end=3 * period, dt=period / 200, rho_inf=1.0)
     y = sol.position("bar", "tip")[:, 1]

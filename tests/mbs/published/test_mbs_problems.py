@@ -34,8 +34,8 @@ def rod_points(a, b, mass=1.0):
 def test_a_simple_pendulum_from_the_horizontal_for_ten_seconds(options, limit):
     """A01: sin(theta / 2) = k cd(omega t, k) from an amplitude of 90 degrees, k = sin 45."""
     mech = rom.Mechanism(gravity=(0, -g, 0))
-    bob = mech.add_rigid("bob", mass=1.0, inertia=(1, 1, 1), at=-X)
-    mech.distance("rod", mech.ground.marker((0, 0, 0)), bob.marker((0, 0, 0)))
+    mech.add_rigid("bob", mass=1.0, inertia=(1, 1, 1), at=-X)
+    mech.distance("rod", "ground", "bob")
     sol = rom.simulate(mech, t_end=10.0, **options)
     sn, _, _, _ = ellipj(ellipk(0.5) - np.sqrt(g) * sol.t, 0.5)
     theta = -2 * np.arcsin(np.sqrt(0.5) * sn)
@@ -135,22 +135,21 @@ def squeezer():
               3: {"B": S["B"], "F": F, "D": D}, 4: {"G": G, "F": F}, 5: {"A": S["A"], "G": G},
               6: {"H": H, "F": F}, 7: {"A": S["A"], "H": H}}  # fmt: skip
     mech = rom.Mechanism(gravity=(0, 0, 0))
-    body = {}
     for k, places in points.items():
         J, R = S["I"][k - 1], turned(angles[k - 1])
-        body[k] = mech.add_rigid(
+        mech.add_rigid(
             f"K{k}", mass=S["m"][k - 1], inertia=(J, J, J), at=(*centres[k - 1], 0), orientation=R,
             markers={n: R.T @ (*(x - centres[k - 1]), 0) for n, x in places.items()},
         )  # fmt: skip
     ground = mech.ground
     for k, name in ((1, "O"), (3, "B"), (5, "A"), (7, "A")):
         at = {"O": np.zeros(2)} | S
-        mech.revolute(f"{name}{k}", ground.marker((*at[name], 0)), body[k].marker(name), axis=Z)
+        mech.revolute(f"{name}{k}", ground.marker((*at[name], 0)), f"K{k}.{name}", axis=Z)
     pairs = {(1, 2): "pin", (2, 3): "F", (2, 4): "F", (2, 6): "F", (4, 5): "G", (6, 7): "H"}
     for (i, j), name in pairs.items():
-        mech.revolute(f"{name}{i}{j}", body[i].marker(name), body[j].marker(name), axis=Z)
-    mech.spring_damper("spring", ground.marker((*S["C"], 0)), body[3].marker("D"),
-                       stiffness=S["c0"], free_length=S["l0"])  # fmt: skip
+        mech.revolute(f"{name}{i}{j}", f"K{i}.{name}", f"K{j}.{name}", axis=Z)
+    law = {"stiffness": S["c0"], "free_length": S["l0"]}
+    mech.spring_damper("spring", ground.marker((*S["C"], 0)), "K3.D", **law)
     mech.motor("motor", "O1", lambda t, angle, rate: 0.033)
     return mech
 
@@ -255,28 +254,27 @@ def test_a_flyball_governor_with_stiff_couplers():
 
     mech = rom.Mechanism(gravity=(0, -g, 0))
     J = m / 12
-    shaft = mech.add_rigid("shaft", mass=m, inertia=(J, m * width**2 / 6, J), at=-0.5 * Y,
-                           markers={"top": 0.5 * Y}, omega=speed * Y)  # fmt: skip
-    mech.revolute("bearing", mech.ground.marker((0, 0, 0)), shaft.marker("top"), axis=Y)
+    mech.add_rigid("shaft", mass=m, inertia=(J, m * width**2 / 6, J), at=-0.5 * Y,
+                   markers={"top": 0.5 * Y}, omega=speed * Y)  # fmt: skip
+    mech.revolute("bearing", "ground", "shaft.top", axis=Y)
     start = np.array([0.0, lean, np.cos(lean)])
-    S = slide * 0.1**2 / 6
-    slider = mech.add_rigid("slider", mass=slide, inertia=(S, S, S), at=-start[2] * Y,
-                            markers={"o": (0, 0, 0)}, omega=speed * Y)  # fmt: skip
-    mech.prismatic("guide", shaft.marker("top"), slider.marker("o"), axis=-Y)
+    turning = {"inertia": (slide * 0.1**2 / 6,) * 3, "omega": speed * Y}
+    mech.add_rigid("slider", mass=slide, at=-start[2] * Y, **turning)
+    mech.prismatic("guide", "shaft.top", "slider", axis=-Y)
     centre, whole = (0.5 * m + ball) / (m + ball), m + ball
     moment = m / 3 + m * width**2 / 12 + ball - whole * centre**2
     for side in (0, 1):
         R = np.column_stack(arm(np.pi * side, lean)).T[[0, 2, 1]].T
         R[:, 2] = np.cross(R[:, 0], R[:, 1])
-        part = mech.add_rigid(
+        mech.add_rigid(
             f"arm {side}", mass=whole, inertia=(m * width**2 / 6, moment, moment),
             at=centre * R[:, 0], orientation=R, omega=R.T @ (speed * Y),
             velocity=np.cross(speed * Y, centre * R[:, 0]),
             markers={"top": -centre * X, "middle": (0.5 - centre) * X, "ball": (1 - centre) * X},
         )  # fmt: skip
-        mech.revolute(f"hinge {side}", shaft.marker("top"), part.marker("top"), axis=R[:, 2])
-        mech.spring_damper(f"coupler {side}", part.marker("middle"), slider.marker("o"),
-                           stiffness=k, damping=c, free_length=rest)  # fmt: skip
+        mech.revolute(f"hinge {side}", "shaft.top", f"arm {side}.top", axis=R[:, 2])
+        law = {"stiffness": k, "damping": c, "free_length": rest}
+        mech.spring_damper(f"coupler {side}", f"arm {side}.middle", "slider", **law)
     sol = rom.simulate(mech, t_end=2.0, dt=2e-3)
     q = lagrange(points, force, start, speed * np.array([1.0, 0, 0]), sol.t[::100],
                  method="LSODA", rtol=1e-9)  # fmt: skip

@@ -103,9 +103,9 @@ def pair(law, reference="mean-axis"):
     """
     mech = rom.Mechanism(gravity=ORIGIN)
     own = {"mass": 0.2, "inertia": (1e-4, 2e-4, 3e-4)}
-    other = mech.add_rigid("other", **own, at=ORIGIN)
-    mech.journal_bearing("first", other.marker(ORIGIN), mech.ground.marker(ORIGIN),
-                         axis=(0, 0, 1), bearing=bearing((40, 4)), oil=OIL)  # fmt: skip
+    mech.add_rigid("other", **own, at=ORIGIN)
+    full = {"axis": (0, 0, 1), "bearing": bearing((40, 4)), "oil": OIL}
+    mech.journal_bearing("first", "other", "ground", **full)
     turned = np.array([0.8, 0.3, -0.4, 0.33])
     at = {"at": (0.3, -0.2, 0.1), "orientation": turned / np.linalg.norm(turned)}
     part = mech.add_flexible("bush", bush(rom.FourierLegendre(3, 2), SOFT, (16, 1, 6), reference),
@@ -172,11 +172,10 @@ def test_a_free_pair_keeps_momentum_and_energy():
     """What the film takes is heat; what it gives to the bore is in the bore."""
     mech = rom.Mechanism(gravity=ORIGIN)
     body = bush(rom.FourierLegendre(2, 1), SOFT, (16, 1, 6), "mean-axis")
-    part = mech.add_flexible("bush", body, at=ORIGIN, omega=(0, 0, -20.0), velocity=(0.4, 0, 0))
-    journal = mech.add_rigid("journal", mass=0.3, inertia=(1e-4, 1e-4, 2e-4), at=(1e-5, 2e-5, 0),
-                             omega=(0, 0, 300.0), velocity=(0.4, 0.01, 0))  # fmt: skip
-    ends = journal.marker(ORIGIN), part.marker("bore")
-    mech.journal_bearing("film", *ends, bearing=bearing((30, 4)), **SOFT_FILM)
+    mech.add_flexible("bush", body, at=ORIGIN, omega=(0, 0, -20.0), velocity=(0.4, 0, 0))
+    mech.add_rigid("journal", mass=0.3, inertia=(1e-4, 1e-4, 2e-4), at=(1e-5, 2e-5, 0),
+                   omega=(0, 0, 300.0), velocity=(0.4, 0.01, 0))  # fmt: skip
+    mech.journal_bearing("film", "journal", "bush.bore", bearing=bearing((30, 4)), **SOFT_FILM)
     sol = rom.simulate(mech, t_end=2e-3, dt=2e-6, method="bdf", save_every=20, progress=False)
     p, L = sol.momentum
     assert_allclose(p, np.tile(p[0], (len(p), 1)), atol=1e-9 * np.abs(p[0]).max())
@@ -317,14 +316,13 @@ def test_a_bearing_with_a_liner_is_that_of_ross(load, E, eccentricity, attitude,
     ({"bearing": JournalBearing(DIAMETER, 0.05, CLEARANCE)}, "ends 5 mm before the bearing does"),
 ])  # fmt: skip
 def test_what_is_no_elastic_bush_is_refused_by_name(given, words):
-    given = {"kind": rom.FourierLegendre(1, 1), "on": "bush", "bearing": bearing()} | given
+    given = {"kind": rom.FourierLegendre(1, 1), "on": "bush.bore", "bearing": bearing()} | given
     mech, solid = rom.Mechanism(gravity=ORIGIN), {"mass": 1.0, "inertia": (0.1,) * 3, "at": ORIGIN}
     mech.add_flexible("bush", bush(given.pop("kind"), SOFT, (16, 1, 6)), at=ORIGIN)
-    shaft, _ = (mech.add_rigid(name, **solid) for name in ("shaft", "block"))
-    on = given.pop("on")
-    end = mech.part(on).marker("bore" if on == "bush" else ORIGIN)
-    with pytest.raises(rom.ConfigError, match=words):
-        mech.journal_bearing("mainbearing", shaft.marker(ORIGIN), end, **SOFT_FILM | given)
+    for name in ("shaft", "block"):
+        mech.add_rigid(name, **solid)
+    add, ends = mech.journal_bearing, ("shaft", given.pop("on"))
+    refuses(rom.ConfigError, words, add, "mainbearing", *ends, **SOFT_FILM | given)
 
 
 ENTRY = """
@@ -353,10 +351,9 @@ def test_a_file_asks_for_an_elastic_bush(tmp_path):
     (tmp_path / "m.toml").write_text(ENTRY)
     made = rom.read_mechanism(tmp_path / "m.toml").mechanism().journal_bearings["film"]
     mech = rom.Mechanism()
-    part = mech.add_flexible("bush", body, at=ORIGIN)
-    shaft = mech.add_rigid("shaft", mass=1.0, inertia=(0.1,) * 3, at=ORIGIN)
-    ends = shaft.marker(ORIGIN), part.marker("bore")
-    mech.journal_bearing("film", *ends, bearing=bearing((120, 8)), **SOFT_FILM)
+    mech.add_flexible("bush", body, at=ORIGIN)
+    mech.add_rigid("shaft", mass=1.0, inertia=(0.1,) * 3, at=ORIGIN)
+    mech.journal_bearing("film", "shaft", "bush.bore", bearing=bearing((120, 8)), **SOFT_FILM)
     same = mech.journal_bearings["film"].bore
     assert_allclose(made.bore[0] @ made.bore[1], same[0] @ same[1], atol=1e-12)
     assert np.abs(same[0] @ same[1]).max() > 1e-6

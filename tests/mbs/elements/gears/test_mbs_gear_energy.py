@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose
 import rom
 from cases.components.geared import ORIGIN, Z, free_wheels
 from cases.mbs.mechanisms import prepared
+from cases.mbs.parts import on_axle
 from cases.mbs.tangents import assert_forces_are_the_gradient, by_position, by_velocity, shifted
 from rom.components.gear_mesh import Correction, GearPair, Hertz
 from rom.components.gear_mesh.gears.meshes import GEAR_MESHES_FAMILY
@@ -136,17 +137,16 @@ def test_a_pinion_in_oil_films_whose_teeth_rub_hit_and_part_keeps_the_energy():
     pair, mech = GearPair((26, 40), 4e-3, 0.03, 0.2, thinning=5e-6), rom.Mechanism()
     pinion = mech.add_rigid("pinion", mass=4.0, inertia=(8e-3, 8e-3, 5e-3), at=ORIGIN,
                             omega=(0, 0, 100.0))  # fmt: skip
-    gear = mech.add_rigid("gear", mass=9.0, inertia=(0.02,) * 3, at=(pair.distance, 0, 0),
-                          omega=(0, 0, 3.0 - 65.0))  # fmt: skip
+    turning = {"at": (pair.distance, 0, 0), "omega": (0, 0, 3.0 - 65.0)}
+    on_axle(mech, "gear", mass=9.0, inertia=(0.02,) * 3, **turning)
     film = rom.mbs.JournalBearing(0.04, 0.02, 8e-5, [rom.mbs.Groove(np.pi / 2, 0.3)], cells=(24, 4))
     for name, z in (("front", -0.03), ("back", 0.03)):
         ends = pinion.marker((0, 0, z)), mech.ground.marker((0, 0, z))
         mech.journal_bearing(name, *ends, axis=Z, bearing=film, oil=0.02)
-    ends = pinion.marker(ORIGIN), gear.marker(ORIGIN)
-    mech.bushing("thrust", mech.ground.marker(ORIGIN), ends[0], stiffness=(0, 0, 1e6, 0, 0, 0))
-    mech.revolute("axle", mech.ground.marker((pair.distance, 0, 0)), ends[1], axis=Z)
-    mech.gear_mesh("mesh", *ends, axis=Z, pair=pair, stiffness=K, cells=7, entry=0.1, **LOSSES)
-    mech.torque("motor", ends[0], (0, 0, 20.0))
+    mech.bushing("thrust", "ground", "pinion", stiffness=(0, 0, 1e6, 0, 0, 0))
+    law = {"stiffness": K, "cells": 7, "entry": 0.1} | LOSSES
+    mech.gear_mesh("mesh", "pinion", "gear", axis=Z, pair=pair, **law)
+    mech.torque("motor", "pinion", (0, 0, 20.0))
     sol = rom.simulate(mech, t_end=8e-4, dt=2e-6, method="dop853", rtol=1e-11, progress=False)
     load = np.linalg.norm(sol.element("mesh").force[:, 0], axis=1)
     touching, energy = load > 0, sol.energy

@@ -350,10 +350,7 @@ def test_depths_of_teeth_are_those_of_the_compliance():
 
 
 def stiffness_of(pair, phase, law):
-    """Force along the line of action over the approach of the teeth and the face [N/m^2].
-
-    The gear is held, the pinion turns on its axle under a torque.
-    """
+    """Force along the line of action over the approach of the teeth and the face [N/m^2]."""
     mech = rom.Mechanism(gravity=(0, 0, 0))
     pinion = on_axle(mech, "pinion", inertia=(1e-3,) * 3)
     ends = pinion, mech.ground.marker((pair.distance, 0, 0))

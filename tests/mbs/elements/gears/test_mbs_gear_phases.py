@@ -26,13 +26,14 @@ def train(teeth, places, *, axis=1, thinning=0.0, turned=0.0, phase=None):
     inner = GearPair((planet, -ring), MODULE, WIDTH, thinning=thinning)
     body = {"mass": 1.0, "inertia": (1e-3,) * 3,
             "orientation": rom.rotation.matrix(rom.rotation.exp([0, 0, turned]))}  # fmt: skip
-    middle = [mech.add_rigid(name, at=ORIGIN, **body).marker(ORIGIN) for name in ("sun", "ring")]
+    law = {"stiffness": 1e10, "phase": phase}
+    for name in ("sun", "ring"):
+        mech.add_rigid(name, at=ORIGIN, **body)
     for k, angle in enumerate(places):
         at = outer.distance * np.array([np.cos(angle), np.sin(angle), 0])
-        wheel = mech.add_rigid(f"planet {k}", at=at, **body).marker(ORIGIN)
-        law = {"stiffness": 1e10, "phase": phase}
-        mech.gear_mesh(f"sun {k}", middle[0], wheel, axis=z, pair=outer, **law)
-        mech.gear_mesh(f"ring {k}", wheel, middle[1], axis=-z, pair=inner, **law)
+        mech.add_rigid(f"planet {k}", at=at, **body)
+        mech.gear_mesh(f"sun {k}", "sun", f"planet {k}", axis=z, pair=outer, **law)
+        mech.gear_mesh(f"ring {k}", f"planet {k}", "ring", axis=-z, pair=inner, **law)
     return mech
 
 
@@ -70,12 +71,11 @@ def test_planets_in_turn_push_the_sun_where_planets_in_phase_do_not():
     pushes = {}
     for case in ("3 in phase", "3 in turn"):
         mech = train(*PLACES[case])
-        pull = mech.ground.marker(ORIGIN)
         for k in range(3):  # all bodies held: the turn of the sun alone deflects the teeth
-            mech.fixed(f"pin {k}", mech.ground.marker(mech.part(f"planet {k}").at),
-                       mech.part(f"planet {k}").marker(ORIGIN))  # fmt: skip
-        mech.fixed("ring held", pull, mech.part("ring").marker(ORIGIN))
-        mech.revolute("input", pull, mech.part("sun").marker(ORIGIN), axis=Z)
+            place = mech.ground.marker(mech.part(f"planet {k}").at)
+            mech.fixed(f"pin {k}", place, f"planet {k}")
+        mech.fixed("ring held", "ground", "ring")
+        mech.revolute("input", "ground", "sun", axis=Z)
         mech.drive("turn", "input", lambda t: t)
         sol = rom.simulate(mech, t_end=2e-5, dt=1e-5)
         forces = np.array([sol.element(f"sun {k}").force[-1, 0] for k in range(3)])
@@ -94,12 +94,11 @@ def test_trains_that_cannot_be_put_together_are_refused():
 
 def test_a_wheel_between_two_others_takes_its_phase_along():
     """Against a chain closed by hand: the teeth of an idler are where its first mesh put them."""
-    mech, ends = rom.Mechanism(gravity=ORIGIN), []
-    pair = GearPair((25, 25), MODULE, WIDTH)
-    for k, x in enumerate(np.arange(3) * pair.distance):
-        ends.append(mech.add_rigid(f"wheel {k}", mass=1.0, inertia=(1e-3,) * 3, at=(x, 0, 0)))
-    ends = [wheel.marker(ORIGIN) for wheel in ends]
-    mech.gear_mesh("a", *ends[:2], axis=Z, pair=pair, stiffness=1e10)
-    mech.gear_mesh("b", *ends[1:], axis=(0, 0, -1), pair=pair, stiffness=1e10)
+    mech, pair = rom.Mechanism(gravity=ORIGIN), GearPair((25, 25), MODULE, WIDTH)
+    for k in range(3):
+        at = k * pair.distance, 0, 0
+        mech.add_rigid(f"wheel {k}", mass=1.0, inertia=(1e-3,) * 3, at=at)
+    mech.gear_mesh("a", "wheel 0", "wheel 1", axis=Z, pair=pair, stiffness=1e10)
+    mech.gear_mesh("b", "wheel 1", "wheel 2", axis=(0, 0, -1), pair=pair, stiffness=1e10)
     assert mech.gear_meshes["a"].phase == 0.0
     assert_allclose(apart(pitches(mech, "b") - pitches(mech, "a")), 0.0, atol=1e-9)  # 25 is odd

@@ -11,6 +11,7 @@ from cases.components.geared import ORIGIN, Z, free_wheels
 from cases.gear_unit import PlaneMesh
 from cases.long import few
 from cases.mbs.mechanisms import prepared, residual_at
+from cases.mbs.parts import on_guide
 from cases.mbs.tangents import assert_forces_are_the_gradient, by_position, by_velocity, shifted
 from cases.refusals import refuses
 from rom.components.gear_mesh import Correction, GearPair, Hertz, Mesh, RackPair, stiffness_table
@@ -122,16 +123,14 @@ def test_a_rack_is_a_gear_without_end():
 def guided(pair, spin=0.0, **more):
     """A pinion on an axle, or held where it spins in its frame, and a rack in a guide along y."""
     mech = rom.Mechanism(gravity=(0, 0, 0))
-    pinion = mech.add_rigid("pinion", mass=1.0, inertia=(2e-3,) * 3, at=ORIGIN, spin=(0, 0, spin))
-    rack = mech.add_rigid("rack", mass=2.0, inertia=(2e-3,) * 3, at=(pair.distance, 0, 0))
-    rack.velocity[1] = spin * pair.r[0]
+    mech.add_rigid("pinion", mass=1.0, inertia=(2e-3,) * 3, at=ORIGIN, spin=(0, 0, spin))
     if spin:
-        mech.fixed("seat", mech.ground.marker(ORIGIN), pinion.marker(ORIGIN))
+        mech.fixed("seat", "ground", "pinion")
     else:
-        mech.revolute("axle", mech.ground.marker(ORIGIN), pinion.marker(ORIGIN), axis=Z)
-    mech.prismatic("guide", mech.ground.marker((pair.distance, 0, 0)), rack.marker(ORIGIN), axis=Y)
-    mech.gear_mesh("mesh", pinion.marker(ORIGIN), rack.marker(ORIGIN), axis=Z, pair=pair,
-                   stiffness=K, **more)  # fmt: skip
+        mech.revolute("axle", "ground", "pinion", axis=Z)
+    at = pair.distance, 0, 0
+    on_guide(mech, "rack", mass=2.0, at=at, base=at, axis=Y, velocity=(0, spin * pair.r[0], 0))
+    mech.gear_mesh("mesh", "pinion", "rack", axis=Z, pair=pair, stiffness=K, **more)
     return mech
 
 
@@ -157,9 +156,8 @@ def test_a_torque_rests_on_the_rack_along_the_normal_of_its_teeth(helix, torque)
     """Along the rack T / r, across it |T| / r tan(alpha_t), along the axis -T / r tan(beta)."""
     pair = replace(SPUR, helix=helix, thinning=0.0, centre_distance=None)
     mech = guided(pair, phase=0.2, entry=0.0, conservative=False)
-    mech.torque("motor", mech.parts["pinion"].marker(ORIGIN), (0, 0, torque))
-    mech.spring_damper("brake", mech.ground.marker((pair.distance, -1, 0)),
-                mech.parts["rack"].marker(ORIGIN), stiffness=1e7)  # fmt: skip
+    mech.torque("motor", "pinion", (0, 0, torque))
+    mech.spring_damper("brake", mech.ground.marker((pair.distance, -1, 0)), "rack", stiffness=1e7)
     still = rom.mbs.snapshot(mech, rom.equilibrium(mech))
     along = torque / (26 * 4e-3 / np.cos(helix) / 2)
     across, slope = np.tan(np.radians(20)) / np.cos(helix), np.tan(helix)

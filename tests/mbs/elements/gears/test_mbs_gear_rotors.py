@@ -90,16 +90,14 @@ def machine(solids, stiffness):
     pair = GearPair(TEETH, 2 * RB[0] / (TEETH[0] * np.cos(ALPHA)), 0.02, pressure_angle=ALPHA)
     far, z = pair.distance, np.array([0.0, 0.0, 1.0])
     mech = rom.Mechanism()
-    generator = mech.add_flexible("generator", solids[0], spin=SPINS[0] * z)
-    end = mech.add_flexible("end", solids[1], at=(0, 0, 4.34), spin=SPINS[0] * z)
-    turbine = mech.add_flexible("turbine", solids[2], at=(far, 0, 5.8), spin=SPINS[1] * z)
-    mech.fixed("step", generator.marker("end_b"), end.marker("end_a"))
+    a = mech.add_flexible("generator", solids[0], spin=SPINS[0] * z).marker
+    b = mech.add_flexible("end", solids[1], at=(0, 0, 4.34), spin=SPINS[0] * z).marker
+    c = mech.add_flexible("turbine", solids[2], at=(far, 0, 5.8), spin=SPINS[1] * z).marker
+    mech.fixed("step", a("end_b"), b("end_a"))
     places = (  # markers of the nodes of both shafts
-        (generator.marker("end_a"), generator.marker("journal_a"), end.marker("end_a"),
-         end.marker("journal_b"), end.marker("end_b")),
-        (turbine.marker("end_a"), turbine.marker("journal_a"), turbine.marker("journal_b"),
-         turbine.marker("end_b")),
-    )  # fmt: skip
+        (a("end_a"), a("journal_a"), b("end_a"), b("journal_b"), b("end_b")),
+        (c("end_a"), c("journal_a"), c("journal_b"), c("end_b")),
+    )
     for k, ends in enumerate(places):
         for node, (mass, across, about) in DISCS[k].items():
             disc = mech.add_rigid(f"disc {k} {node}", mass=mass, inertia=(across, across, about),

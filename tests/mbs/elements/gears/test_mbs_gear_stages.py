@@ -93,17 +93,16 @@ def test_two_stages_vibrate_as_a_lumped_model():
         mass, across, about, wheels, bearings = SHAFTS[name]
         points = {wheel: (0, 0, z) for wheel, z in wheels.items()}
         points |= {f"bearing {k}": (0, 0, z) for k, z in enumerate(bearings)}
-        shaft = mech.add_rigid(name, mass=mass, inertia=(across, across, about), at=at,
-                               markers=points)  # fmt: skip
+        inertia = across, across, about
+        mech.add_rigid(name, mass=mass, inertia=inertia, at=at, markers=points)
         for k, z in enumerate(bearings):
-            ends = mech.ground.marker(at + z * Z), shaft.marker(f"bearing {k}")
+            ends = mech.ground.marker(at + z * Z), f"{name}.bearing {k}"
             mech.bushing(f"{name} {k}", *ends, stiffness=(*BEARING, 0, 0, 0))
-    for name, pair, phase, axis, pinion, gear in MESHES:
-        ends = (mech.part(shaft).marker(name) for shaft in (pinion, gear))
-        mech.gear_mesh(name, *ends, axis=axis, pair=pair, stiffness=K, phase=phase, entry=0.0,
-                       cells=40)  # fmt: skip
-    mech.bushing("coupling", mech.ground.marker((0, 0, 0)), mech.part("input").marker((0, 0, 0)),
-                 stiffness=(0, 0, 0, 0, 0, COUPLING))  # fmt: skip
-    mech.torque("load", mech.part("output").marker("two"), (0, 0, -RATIO * TORQUE))
+    law = {"stiffness": K, "entry": 0.0, "cells": 40}
+    for name, pair, phase, axis, *shafts in MESHES:
+        ends = (f"{shaft}.{name}" for shaft in shafts)
+        mech.gear_mesh(name, *ends, axis=axis, pair=pair, phase=phase, **law)
+    mech.bushing("coupling", "ground", "input", stiffness=(0, 0, 0, 0, 0, COUPLING))
+    mech.torque("load", "output.two", (0, 0, -RATIO * TORQUE))
     found = np.sort(rom.linearize(mech, rom.equilibrium(mech)).frequencies)
     assert_allclose(found, lumped(), rtol=5e-5)

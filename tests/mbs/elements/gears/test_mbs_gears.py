@@ -84,11 +84,7 @@ def test_shifts_along_the_axis_and_tilts_add_what_they_do_in_first_order(pair):
 @pytest.mark.parametrize("helix", [0.35, -0.35, 0.0])
 @pytest.mark.parametrize("turn", [3e-4, -3e-3])
 def test_forces_of_helical_teeth_are_those_of_the_textbook(helix, turn):
-    """By pitch radii: axial over tangential tan(beta), radial tan(alpha_n) / cos(beta); ISO 21771.
-
-    The tangential force takes its side from the torque, the axial one from torque and hand, and the
-    radial one always parts the wheels.
-    """
+    """ISO 21771: axial over tangential force tan(beta), radial tan(alpha_n) / cos(beta)."""
     pair = GearPair((26, 40), 4e-3, 0.05, helix=helix, thinning=5e-5)
     packed, W = prepared(wheels(pair, phase=0.4))
     q = turn * np.eye(12)[5]
@@ -156,10 +152,7 @@ def geared(pair=SPUR, inertia=(2e-3, 9e-3), **more):
 
 
 def test_the_mesh_vibrates_as_a_spring_along_the_line_of_action():
-    """omega^2 = k (r_b1^2 / J_1 + r_b2^2 / J_2), k of all lines that touch under load.
-
-    A soft coil holds the gear, so that the loads have a place to rest.
-    """
+    """omega^2 = k (r_b1^2 / J_1 + r_b2^2 / J_2), k of all lines that touch under load."""
     J, pair = (2e-3, 9e-3), HELICAL
     mech = geared(pair, J)
     mech.torque("drive", mech.parts["pinion"].marker(ORIGIN), (0, 0, 50.0))
@@ -222,9 +215,8 @@ def test_how_deep_rigid_flanks_are_in_each_other(turn, away):
 
 def test_wheels_pressed_into_each_other_are_named():
     mech = wheels()
-    for part in mech.parts.values():
-        mech.prismatic(f"{part.name} slides", mech.ground.marker(part.at), part.marker(ORIGIN),
-                       axis=(1, 0, 0))  # fmt: skip
+    for name, part in mech.parts.items():
+        mech.prismatic(f"{name} slides", mech.ground.marker(part.at), name, axis=(1, 0, 0))
     mech.drive("press", "gear slides", lambda t: -t, rate=lambda t: -1.0 + 0 * t)
     mech.drive("hold", "pinion slides", lambda t: 0.0 * t)
     refuses(SolverError, "wheels of 'mesh' are so close", rom.simulate, mech, t_end=0.1, dt=1e-3)
@@ -297,24 +289,16 @@ def test_tips_inside_a_ring_pass_each_other_or_are_refused(z1, addendum):
 def planetary():
     """Sun driven, ring held by a stiff coil, planets on a carrier that is braked."""
     mech = rom.Mechanism(gravity=(0, 0, 0))
-    ground = mech.ground.marker(ORIGIN)
-
-    def body(name, J, at=ORIGIN):
-        return mech.add_rigid(name, mass=0.2, inertia=(J, J, J), at=at)
-
-    sun, ring, carrier = (body(n, J) for n, J in (("sun", 1e-4), ("ring", 2e-3), ("carrier", 5e-4)))
-    for part in (sun, ring, carrier):
-        mech.revolute(f"{part.name} axle", ground, part.marker(ORIGIN), axis=Z)
+    for name, J in (("sun", 1e-4), ("ring", 2e-3), ("carrier", 5e-4)):
+        on_axle(mech, name, mass=0.2, inertia=(J, J, J), axle=f"{name} axle")
     mech.rotational_spring("housing", "ring axle", stiffness=1e6, damping=20.0)
+    law = {"stiffness": 1.3e10, "damping": 2e-5}
     for k, angle in enumerate(2 * np.pi / 3 * np.arange(3)):
-        at = 0.048 * np.array([np.cos(angle), np.sin(angle), 0.0])
-        planet = body(f"planet {k}", 5e-5, at)
-        mech.revolute(f"pin {k}", carrier.marker(at), planet.marker(ORIGIN), axis=Z)
-        law = {"stiffness": 1.3e10, "damping": 2e-5}
-        mech.gear_mesh(f"sun {k}", sun.marker(ORIGIN), planet.marker(ORIGIN), axis=Z, pair=SUN,
-                       phase=24 * angle / 24, **law)  # fmt: skip
-        mech.gear_mesh(f"ring {k}", planet.marker(ORIGIN), ring.marker(ORIGIN), axis=(0, 0, -1),
-                       pair=RING, phase=0.1, **law)  # fmt: skip
+        at, planet = 0.048 * np.array([np.cos(angle), np.sin(angle), 0.0]), f"planet {k}"
+        mech.add_rigid(planet, mass=0.2, inertia=(5e-5,) * 3, at=at)
+        mech.revolute(f"pin {k}", mech.part("carrier").marker(at), planet, axis=Z)
+        mech.gear_mesh(f"sun {k}", "sun", planet, axis=Z, pair=SUN, phase=angle, **law)
+        mech.gear_mesh(f"ring {k}", planet, "ring", axis=(0, 0, -1), pair=RING, phase=0.1, **law)
     mech.drive("motor", "sun axle", lambda t: 80.0 * t, rate=lambda t: 80.0 + 0 * t)
     wanted = 80.0 * 24 / (24 + 72)
     mech.motor("brake", "carrier axle", lambda t, x, v: -40.0 - 1.0 * (v - wanted))
@@ -355,10 +339,7 @@ def flank(centre, radius, start, length, turn):
 
 
 def approach_of_curves(pair, s, moved_to, turns):
-    """How far two involutes that touch at s from T1 overlap along their common normal [m].
-
-    The centre of the gear has moved (2,) from where it was, and both wheels have turned.
-    """
+    """How far two involutes that touch at s from T1 overlap along their common normal [m]."""
     alpha, r1, r2 = pair.alpha, pair.rb[0], abs(pair.rb[1])
     behind = pair.tangents if not pair.internal else -abs(pair.tangents)
     start, length = (-alpha, s - behind) if pair.internal else (np.pi - alpha, behind - s)
@@ -478,27 +459,24 @@ def test_a_planetary_train_vibrates_as_its_lumped_model(planets):
     def body(name, at=ORIGIN):
         mass, inertia = PUBLISHED[name.split()[0]]
         J = inertia * radius[name.split()[0]] ** 2
-        part = mech.add_rigid(name, mass=mass, inertia=(J, J, J), at=at)
-        mech.planar(f"{name} plane", mech.ground.marker(at), part.marker(ORIGIN), normal=Z)
-        return part
+        mech.add_rigid(name, mass=mass, inertia=(J, J, J), at=at)
+        mech.planar(f"{name} plane", mech.ground.marker(at), name, normal=Z)
 
-    parts = {name: body(name) for name in BODIES}
     held = {"sun": 0.0, "ring": 1e9 * radius["ring"] ** 2, "carrier": 1e6 * radius["carrier"] ** 2}
-    for name, part in parts.items():
-        mech.bushing(f"{name} support", mech.ground.marker(ORIGIN), part.marker(ORIGIN),
-                     stiffness=(1e8, 1e8, 0, 0, 0, held[name]))  # fmt: skip
+    for name, turning in held.items():
+        body(name)
+        mech.bushing(f"{name} support", "ground", name, stiffness=(1e8, 1e8, 0, 0, 0, turning))
+    law = LAW | {"stiffness": 5e8 / SUN.width}
     for k in range(planets):
-        angle = 2 * np.pi * k / planets
+        angle, planet = 2 * np.pi * k / planets, f"planet {k}"
         at = 0.048 * np.array([np.cos(angle), np.sin(angle), 0.0])
-        planet = body(f"planet {k}", at).marker(ORIGIN)
-        ends = parts["carrier"].marker(at), planet
-        mech.bushing(f"pin {k}", *ends, stiffness=(1e8, 1e8, 0, 0, 0, 0))
-        law = {"stiffness": 5e8 / SUN.width, "entry": 0.0, "conservative": False}
-        mech.gear_mesh(f"sun {k}", parts["sun"].marker(ORIGIN), planet, axis=Z, pair=SUN,
-                       phase=one_line(SUN), **law)  # fmt: skip
-        mech.gear_mesh(f"ring {k}", planet, parts["ring"].marker(ORIGIN), axis=(0, 0, -1),
-                       pair=RING, phase=one_line(RING), **law)  # fmt: skip
-    mech.torque("drive", parts["sun"].marker(ORIGIN), (0, 0, 0.1))
+        body(planet, at)
+        pin = mech.part("carrier").marker(at)
+        mech.bushing(f"pin {k}", pin, planet, stiffness=(1e8, 1e8, 0, 0, 0, 0))
+        mech.gear_mesh(f"sun {k}", "sun", planet, axis=Z, pair=SUN, phase=one_line(SUN), **law)
+        phase = one_line(RING)
+        mech.gear_mesh(f"ring {k}", planet, "ring", axis=(0, 0, -1), pair=RING, phase=phase, **law)
+    mech.torque("drive", "sun", (0, 0, 0.1))
     found = np.sort(rom.linearize(mech, rom.equilibrium(mech)).frequencies)
     wanted = frequencies_of(*lumped(planets, np.radians(20), held=(0.0, 1e9, 1e6)))
     assert_allclose(found, wanted, rtol=1e-5)

@@ -104,10 +104,7 @@ def test_it_vibrates_in_rotation_as_a_rod_of_the_same_section(blade):
 
 
 def test_a_spin_up_bends_it_as_the_exact_beam(blade):
-    """Kane, Ryan and Banerjee's, 10 m and 0.93 s to the metre and second of this one.
-
-    Extremes are those of the geometrically exact beam.
-    """
+    """Kane, Ryan and Banerjee's, 10 m and 0.93 s to the metre and second of this one."""
     unit = UNIT / np.sqrt(1.2 * 10.0**4 / 1.4e4)
     sol, u, v = spin_up(blade[0], 6.0 / unit, 9 * unit, duration=15 * unit, dt=1e-2 * unit)
     assert_allclose(10 * v.min(), -0.57379, rtol=3e-4)
