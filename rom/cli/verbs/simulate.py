@@ -182,8 +182,6 @@ def _occurred(name: str, times: list[float]) -> str:
 def _pendulum(args: argparse.Namespace) -> Answer:
     from rom.io.native import load
     from rom.report.run import RECORD_FILE, SCENE_FILE, Record, file_digest, write_film
-    from rom.report.scene import motion_scene
-    from rom.report.scene_file import write_scene
 
     require({"--hinge": args.hinge, "--t-end": args.t_end, "--dt": args.dt})
     if args.dt > args.t_end:
@@ -216,6 +214,9 @@ def _pendulum(args: argparse.Namespace) -> Answer:
         audit = rom.audit(solution)
 
     def write() -> None:
+        from rom.report.scene import motion_scene
+        from rom.report.scene_file import write_scene
+
         with _finishing(args, keep):
             _write_motion(path, tables, body, solution)
             record.write(paths, solution, audit)
