@@ -32,10 +32,7 @@ def fields(test):
 
 @pytest.mark.parametrize("name", ["pyuff_test.uff", "sdynpy_test.unv"])
 def test_a_test_of_another_program_is_read_in_si_units(name):
-    """Written by pyuff 2.5.8 and SDynPy 0.23.0 in millimetres and millinewtons: 15, 2411, 55, 58.
-
-    One of them labels its axes, the other relies on dataset 164 and numbers its axes from one.
-    """
+    """By pyuff 2.5.8 and SDynPy 0.23.0 in mm and mN; one labels axes, one has dataset 164."""
     test = rom.io.read_responses(HERE / name, averages=20)
     assert_allclose(test.frequencies, F)
     power = -((2 * np.pi * F) ** 2)

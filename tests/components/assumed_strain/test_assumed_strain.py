@@ -231,10 +231,7 @@ def pulled(stretches, metal, state="plane stress"):
 
 
 def test_bars_follow_the_closed_forms_of_hencky_and_of_yield():
-    """T = E ln(stretch) on the current section times length; the force is T / stretch.
-
-    Beyond yield T = (sy + H e E / E) E / (E + H); unloading is elastic.
-    """
+    """Force over section E ln(stretch) / stretch; beyond yield (sy + H e E / E) E / (E + H)."""
     stretches = np.array([1.05, 1.3, 1.8, 0.7])
     force, width, _ = pulled(stretches, Metal(3.0, 0.3)).T
     assert_allclose(force, 3.0 * np.log(stretches) / stretches, rtol=1e-9)

@@ -118,10 +118,7 @@ def test_bend_of_45_degrees_under_a_force_out_of_its_plane(J, k, P, tip):
 
 
 def shooting(turn, curvature, length, rigidities, force):
-    """End of a rod from its differential equations, by the moment at the root that leaves none.
-
-    Nothing of this is discrete: x' = R (C^-1 R^T n + e3), R' = R [B^-1 R^T m + k0]x, m' = -x' x n.
-    """
+    """End of a rod from its differential equations, by the moment at the root that leaves none."""
     C, B = np.array(rigidities[:3]), np.array(rigidities[3:])
 
     def rates(_, y, n):

@@ -261,11 +261,7 @@ def sampled(shape, end=0.3, n=30001):
 
 @pytest.mark.parametrize("reflection", [0.0, 0.5, 1.0])
 def test_what_arrives_is_what_a_chain_of_masses_and_springs_passes_on(reflection):
-    """The floor's force by central differences on n masses and springs; a dashpot is the floor.
-
-    A column of length and speed one has the impedance one; a floor of the impedance Z gives back
-    the share (Z - 1) / (Z + 1).
-    """
+    """By central differences; a floor of impedance Z gives back (Z - 1) / (Z + 1) of a wave."""
     t, force = sampled(lambda t: np.where(t < 0.05, np.sin(np.pi * t / 0.05) ** 2, 0.0), n=3001)
     found, n = arriving(t, force, DELAY, reflection=reflection), 300
     m, k, dt = 1 / n, float(n), 0.5 / n
