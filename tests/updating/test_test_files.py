@@ -129,7 +129,6 @@ def table(unit="m/s^2/N", factor=1.0, separator=",", comma=False):
 
 
 def read_table(folder, text, points=POINTS):
-    """A test of twenty averages, of a table beside one of its nodes."""
     (folder / "points.csv").write_text(points)
     more = {"averages": 20, "coherence": None, "points": folder / "points.csv"}
     return read(folder / "test.csv", text, **more)
@@ -167,7 +166,6 @@ def test_hdf5_brings_the_same_test_back(tmp_path):
 
 
 def two(**second):
-    """Text of functions (7, 3) by (11, -3), and one more."""
     nodes = "".join(
         f"{n:10d}{0:10d}{0:10d}{0:10d}" + f"{n:13.5e}{0:13.5e}{0:13.5e}\n" for n in (7, 8, 11)
     )
@@ -176,14 +174,12 @@ def two(**second):
 
 
 def read(path, text=None, **options):
-    """A test of five averages, of a text that is written first."""
     if text is not None:
         path.write_text(text)
     return rom.io.read_responses(path, **{"averages": 5, "coherence": 0.9} | options)
 
 
 def labelled(unit, kind=12):
-    """The functions, the second half of the labels of an axis being a unit."""
     head = f"{kind:10d}{0:5d}{0:5d}{0:5d} {'NONE':<20} "
     return two().replace(head + f"{'NONE':<20}", head + f"{unit:<20}")
 

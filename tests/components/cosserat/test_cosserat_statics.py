@@ -23,7 +23,6 @@ STIFF = 1e6  # against bending rigidities of one: neither shear nor stretch
 
 
 def crooked(rng, n=4):
-    """A rod with corners and sections of its own everywhere."""
     x = np.cumsum(rng.normal(size=(n + 1, 3)), axis=0)
     p = np.array([rotation.exp(0.7 * rng.normal(size=3)) for _ in range(n + 2)])
     return rod(x, p, stretch=rng.uniform(1, 2, (n, 3)), bend=rng.uniform(1, 2, (n + 1, 3)))

@@ -134,7 +134,6 @@ ALPHA, P = np.arctan(0.1), np.sqrt(3 * G / (4 * np.hypot(0.1, 1.0)))
 
 
 def shaken(acceleration, **run):
-    """A slender block that rests first under an acceleration of the ground."""
     rock = {"E": 1e10, "nu": 0.2, "rho": 2000.0}
     stones = stone(GROUND, **rock), stone(box(*SLENDER, at=(-0.1, 0)), **rock)
     model = masonry.Masonry(stones, (0,), 20e10, 2.0)
@@ -298,7 +297,6 @@ def _factor(h, joints, sides, weight, centre, load):
 
 
 def assert_stays(stays, model, action, t_end):
-    """Stones that come to rest under a load, or go on ever faster."""
     motion = simulate(model, t_end=t_end, dt=1e-3, actions=[action], damping=30.0, save_every=500)
     speed = np.abs(motion.v[:, 1:-1]).max(axis=(1, 2))
     assert speed[-1] < 1e-6 if stays else speed[-1] > max(1e-3, speed[3])

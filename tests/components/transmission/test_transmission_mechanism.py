@@ -22,7 +22,6 @@ STEPS = 60
 
 @cache
 def both(theta=0.4, **more):
-    """The unit at rest by its own program, and as a mechanism with its state."""
     unit = rigid_unit(**more)
     mech = as_mechanism(unit)
     return rest(unit, theta), mech, rom.equilibrium(mech, t=theta / unit.speed)
@@ -126,7 +125,6 @@ def test_it_runs_through_its_speeds_as_another_program():
 
 @pytest.fixture(scope="module")
 def lossy():
-    """Shafts with so much damping that motion through time settles soon."""
     return rest(unit(torque=300.0, speed=150.0, loss=1e-4))
 
 
@@ -137,7 +135,6 @@ def found(lossy):
 
 @pytest.mark.long
 def test_it_is_where_motion_through_time_settles(lossy, found):
-    """But for the little that its steps damp."""
     run = simulate(lossy, periods=8, steps=STEPS)
     last, size = slice(-STEPS - 1, None), np.ptp(found.error)
     assert_allclose(run.error[last], found.error, atol=0.025 * size)

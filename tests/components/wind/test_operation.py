@@ -45,7 +45,6 @@ def test_filters_answer_a_step_as_their_equations_do():
 
 
 def answer(t, slow, fast):
-    """Of both filters to a step at 0, the first of which passes a share of 0.6 at once."""
     first, second = np.exp(-t / slow), np.exp(-t / fast)
     return 1 - second - 0.4 * slow / (slow - fast) * (first - second)
 

@@ -223,7 +223,6 @@ DIAGONAL = ((1, 2), (2, 3), (3, 7), (7, 4), (4, 5), (5, 1))
 
 
 def volume_and_centre(points, cells):
-    """Of straight cells, summed over tetrahedra."""
     parts = [cells[:, :4]]
     if cells.shape[1] in (8, 20):
         parts = [cells[:, [0, a, b, 6]] for a, b in DIAGONAL]
