@@ -87,10 +87,7 @@ def test_whirl_at_a_critical_speed_is_as_fast_as_the_shaft():
 
 
 def test_a_thin_disc_keeps_ahead_of_its_forward_whirl():
-    """Tilting, a thin disc on a stiff light shaft has Ip > Id: no forward speed, one backward.
-
-    A cantilever of stiffness k (2, 2) with the inertia diag(m, Id -+ Ip).
-    """
+    """diag(m, Id -+ Ip) on a cantilever, Ip > Id: no forward speed of tilting, one backward."""
     l, d = 0.3, 0.01
     clamped = Shaft([-0.1, 0.0, l], [0.1, d], [Disc(2, 1.0, 0.01, 0.02)], (211e9, 0.3, 1e-3))
     speeds, direction = critical_speeds(clamped, dict.fromkeys((0, 1), Support(1e12)))

@@ -28,10 +28,7 @@ def spinning(mesh, material=STEEL, **springs):
 
 
 def whirl(sector, speed, n):
-    """Frequencies seen at rest [rad/s], positive forward, ascending by size.
-
-    A wave that runs back more slowly than the wheel turns moves forward in space.
-    """
+    """Frequencies seen at rest [rad/s], positive forward, also of waves slower than the wheel."""
     waves = rom.travelling_modes(sector, 1, n, speed=speed)
     omega = 2 * np.pi * waves.at_rest * waves.direction
     return omega[np.argsort(abs(omega))]
@@ -40,10 +37,7 @@ def whirl(sector, speed, n):
 @pytest.mark.parametrize("width", [0.02, 0.2])
 @pytest.mark.parametrize("speed", [30.0, 600.0])
 def test_a_rigid_disc_on_springs_whirls_as_euler_says(width, speed):
-    """Ip > Id and Ip < Id; below and above the critical speeds of its two bearings.
-
-    w^2 Id -+ w Omega Ip = k b^2 / 2 about the centre, 2 k = m w^2 of the centre.
-    """
+    """w^2 Id -+ w Omega Ip = k b^2 / 2 about the centre, 2 k = m w^2 of it; Ip > Id and less."""
     k, R, bore = 1e4, 0.1, 0.02
     rotor = spinning(
         revolved_mesh(16, [bore, 0.06, R], [-width / 2, 0, width / 2], lambda r, z: "disc",
@@ -96,10 +90,7 @@ def narrow(outer):
 
 @pytest.fixture(scope="module")
 def published():
-    """Example 5.9.1 of Friswell et al., see test_rotor.py, its shaft of bricks.
-
-    Discs are stiff and stand on necks, so that they load the shaft where the book lets them.
-    """
+    """Example 5.9.1 of test_rotor.py: a shaft of bricks, discs on necks, as loads are there."""
     discs = {"left": (LEFT, *narrow(0.14)), "right": (RIGHT, *narrow(0.175))}
     edges = [at + side * w / 2 for at, _, wide, _ in discs.values()
              for side in (-1, 1) for w in (wide, NECK)]  # fmt: skip
@@ -179,10 +170,7 @@ def test_a_thin_free_disc_bends_as_kirchhoff_says():
 
 
 def test_a_thin_spinning_disc_splits_by_its_turning_alone():
-    """Out of its plane Coriolis forces vanish: an observer at rest sees f +- n Omega.
-
-    Southwell: omega^2 = omega_0^2 + 2.35 Omega^2 for n = 2 at least, bending and membrane added.
-    """
+    """Seen at rest f +- n Omega; Southwell for n = 2: omega_0^2 + 2.35 Omega^2 at least."""
     disc = spinning(thin_disc(0.02))
     still = rom.cyclic_modes(replace(disc, coriolis=None, centrifugal=None), 2, 1).omega[0]
     for speed in (0.5 * still, 2 * still):

@@ -30,7 +30,6 @@ pytestmark = [pytest.mark.fenicsx, pytest.mark.filterwarnings("ignore:linear tet
 
 @every_element
 def test_constant_strain_leaves_no_force_inside(kind, degree):
-    """The patch test."""
     mesh, _ = box((1.0, 0.8, 0.6), (3, 3, 3), kind)
     model = assemble(distort(mesh, 0.05), material=STEEL, degree=degree)
     A = np.random.default_rng(1).normal(size=(3, 3))

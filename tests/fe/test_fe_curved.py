@@ -123,11 +123,8 @@ def test_a_sphere_errs_by_what_its_triangles_leave_out(tmp_path, n, limit):
 
 
 def harmonic(a, b, L, n, N):
-    """Free frequencies [Hz] of a hollow or solid cylinder with n waves around, by Ritz.
-
-    u = (f(r) cos, g(r) sin, h(r) cos)(n theta) times Legendre polynomials along the axis; f, g, h
-    are polynomials of degree N, for a = 0 those of smooth fields.
-    """
+    """Free frequencies [Hz] of a hollow or solid cylinder with n waves around, by Ritz."""
+    # (f(r) cos, g(r) sin, h(r) cos)(n theta) times Legendre along the axis; degree N, smooth at 0
     x, w = leggauss(2 * N)
     r, z = (a + b) / 2 + (b - a) / 2 * x, x
     columns = []
@@ -249,11 +246,7 @@ def test_displacements_of_degree_one_need_straight_edges(tmp_path):
 
 @pytest.mark.parametrize("degree", few(1, [2, 3]))
 def test_linear_fields_are_exact_on_curved_cells(tmp_path, degree):
-    """Rigid motions without energy, uniform stress at all nodes, and its geometric stiffness.
-
-    For a dilatation e the stress is 3 K e, and shapes A x get 3 K e |skew A|^2 V; a finite rotation
-    needs no force.
-    """
+    """Stress 3 K e of a dilatation e, and A x gets 3 K e |skew A|^2 V; turns need no force."""
     file = written(tmp_path, PLATE)
     made = model(file, material=STEEL, degree=degree, parameters=round_bore(8))
     x, volume = made.points, made.mass() / STEEL.rho

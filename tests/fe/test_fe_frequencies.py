@@ -89,12 +89,8 @@ Physical Volume("body") = {v[1]};
 
 @pytest.mark.parametrize(("order", "rtol"), [(2, 2e-4), (1, 6e-3)])
 def test_axisymmetric_modes_of_a_free_cylinder_fv41(tmp_path, order, rtol):
-    """NAFEMS FV41, values of converged axisymmetric elements; a quarter of half the cylinder.
-
-    Modes that are even and odd about the middle are found with their own support of that plane.
-    The odd ones can slide along the axis, so they are computed with a negative shift in SciPy.
-    Straight edges err fifty times as much. Rigid motions of curved cells have no energy either.
-    """
+    """NAFEMS FV41, values of converged axisymmetric elements; a quarter of half the cylinder."""
+    # modes even and odd about the middle by a support each; odd ones can slide: negative shift
     path = tmp_path / "cylinder.geo"
     path.write_text(CYLINDER)
     quarter = model(path, material=NAFEMS, order=order)

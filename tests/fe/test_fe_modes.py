@@ -149,7 +149,6 @@ def test_a_factor_that_breaks_down_is_named_by_the_part_that_moves(small, monkey
 
 
 def place_in(error):
-    """The coordinates that a message names."""
     words = error.message.split("It moves most at (")[1].split(")")[0]
     return np.array([float(word) for word in words.split(",")])
 
@@ -227,7 +226,6 @@ KINDS = ["rbe2", "rbe3", rom.Polynomial(1), "full"]
 
 
 def parts_of(model, kinds):
-    """The model in interface coordinates, and condensed to them."""
     connection = connect(operators(model), model, kinds)
     ops = connection.ops
     held = ops.hold(connection.boundary)
@@ -327,7 +325,6 @@ def test_random_columns_are_normal_and_independent():
 
 
 def factored_once(body):
-    """The stages of its reduction, one of which has a factorisation."""
     stages = body.provenance["stages"]
     assert sum(table.get("number of factorisations", 0) for table in stages.values()) == 1
     return stages
@@ -351,7 +348,6 @@ def test_a_certified_reduction_takes_one_factorisation():
 
 
 def test_a_search_that_was_restarted_is_counted(monkeypatch):
-    """What is left of the start after a restart proves nothing."""
     model, counted = beam((14, 4, 3)), []
     monkeypatch.setattr(search, "MAX_DENSE_DOFS", 0)
     monkeypatch.setattr(petsc.PETScOperators, "count_below", lambda *a: counted.append(1))

@@ -25,10 +25,7 @@ def runs(tmp_path_factory):
 
 @pytest.mark.parametrize("n", SHARED_BY)
 def test_ranks_agree_with_one_process(runs, n):
-    """Frequencies and mass to 1e-9, interfaces node by node, shapes with their signs.
-
-    Entries of the mass that are zero are stored nowhere.
-    """
+    """To 1e-9, node by node, with signs of shapes; zero entries of the mass are stored nowhere."""
     one, many = runs[1], runs[n]
     assert set(one) == set(many)
     for name in ("free", "fixed", "tied", "mass", "entries"):

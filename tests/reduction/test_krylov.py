@@ -28,7 +28,6 @@ def dynamic_stiffness(K, M, s, b):
 
 
 def errors(connection, method, shifts):
-    """Relative error of the dynamic stiffness of the reduced body at each shift."""
     ops, b = connection.ops, connection.boundary
     E = np.eye(ops.n)
     K, M = ops.apply_K(E), ops.apply_M(E)
@@ -119,7 +118,6 @@ def mixed(request):
 
 
 def static_error(mixed, method, F):
-    """Error of the static deflection with the root held, relative to the largest one."""
     ops, root = mixed.ops, mixed.boundary[mixed.parts["root"]]
     full = ops.hold(root)(F)
     basis = method.basis(ops, mixed.boundary, mixed.labels)
@@ -165,7 +163,6 @@ def test_loads_that_are_none_and_methods_without_constraint_modes_are_refused(mi
 
 
 def modal(omega, zeta, b, c):
-    """Truncation of no coordinate of oscillators side by side."""
     D = np.diag(2 * zeta * omega)
     return second_order_balanced_truncation(
         np.diag(omega**2), np.eye(omega.size), D, b[:, None], c[None], omega.size

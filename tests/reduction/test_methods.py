@@ -25,7 +25,6 @@ def ops(request):
 
 
 def boundary(model):
-    """Corners of the root and of the tip: enough to hold the block."""
     ends = [model.interfaces[name].nodes[[0, 2, -1]] for name in ("root", "tip")]
     return (3 * np.concatenate(ends)[:, None] + np.arange(3)).ravel()
 
@@ -188,7 +187,6 @@ def test_published_four_mass_chain():
 
 
 def reduced_frequencies(n_modes, held=()):
-    """Frequencies of the beam on its Craig-Bampton basis, some boundary columns left out."""
     K, M = hermite_beam()
     basis = craig_bampton(K, M, ENDS, n_modes=n_modes)
     keep = np.setdiff1d(np.arange(4 + n_modes), held)
@@ -225,7 +223,6 @@ def test_conditions_on_reduced_coordinates_solve_that_boundary_problem(held, tab
 
 
 def ten(boundary=(0, 9), n_modes=2, coupling=None):
-    """The chain of ten masses, two entries of its stiffness spoilt."""
     K, M, _ = chain(10)
     if coupling is not None:
         K = K.tolil()

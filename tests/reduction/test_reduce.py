@@ -106,7 +106,6 @@ def test_three_points_span_the_frame():
 
 
 def _patch(model, name, nodes):
-    """Some nodes of the surface, of equal weight, as an interface of their own."""
     at = model.points[nodes]
     return rom.Interface(name, nodes, at, diags(np.ones(len(nodes))).tocsr(), at.mean(axis=0))
 

@@ -168,10 +168,7 @@ def test_equations_without_bias_err_as_much_as_they_say(family, model):
 
 
 def test_the_response_function_method_finds_what_is_true(family, model):
-    """Nothing is condensed: without noise no bias, where that of equations is above a per cent.
-
-    The input has no sensor, and 4 sensors are enough for 4 modes.
-    """
+    """No bias without noise, where equations have a per cent; 4 sensors, none at the input."""
     whole = measured(family, model)
     few = [1, 4, 7, 10]
     sensors = whole.sensors.some(few)

@@ -168,10 +168,7 @@ def test_errors_over_the_model_leave_the_mean_of_logarithms_where_it_is():
 
 
 def test_an_update_weighs_by_the_model_it_found(family, exact):
-    """Eight hundred lines of twenty averages: over the measured levels 2 s^2 would be 9 deviations.
-
-    All factors at once scale H: stiffness and mass would be too small by 0.0045.
-    """
+    """Over measured levels all factors would be too small by 0.0045, which is 9 deviations."""
     rng, n = np.random.default_rng(9), 20
     lines = np.linspace(40, 160, 800)
     H = exact_responses(model_of(family, (SENSORS, INPUTS), HELD), TRUE, lines)

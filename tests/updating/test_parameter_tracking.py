@@ -90,11 +90,7 @@ def test_held_factors_are_those_of_the_body_there(family, factors, damping):
 
 
 def test_the_filter_is_an_extended_one_linearised_at_every_step(filter_, monkeypatch):
-    """Written out in NumPy, with the transition and its derivative where the estimate is.
-
-    A point that moves with the estimate leaves what one sample after another makes of the second
-    order; one that stays within its reach a fraction of a deviation.
-    """
+    """Written out in NumPy; a point that stays within reach leaves a fraction of a deviation."""
     t, rng = filter_, np.random.default_rng(5)
     _, _, y = walked(t, rng, 300)
     n = len(t.assumed.before(t.operation))

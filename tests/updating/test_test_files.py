@@ -32,10 +32,7 @@ def fields(test):
 
 @pytest.mark.parametrize("name", ["pyuff_test.uff", "sdynpy_test.unv"])
 def test_a_test_of_another_program_is_read_in_si_units(name):
-    """Written by pyuff 2.5.8 and SDynPy 0.23.0 in millimetres and millinewtons: 15, 2411, 55, 58.
-
-    One of them labels its axes, the other relies on dataset 164 and numbers its axes from one.
-    """
+    """By pyuff 2.5.8 and SDynPy 0.23.0 in mm and mN; one labels axes, one has dataset 164."""
     test = rom.io.read_responses(HERE / name, averages=20)
     assert_allclose(test.frequencies, F)
     power = -((2 * np.pi * F) ** 2)
@@ -132,7 +129,6 @@ def table(unit="m/s^2/N", factor=1.0, separator=",", comma=False):
 
 
 def read_table(folder, text, points=POINTS):
-    """A test of twenty averages, of a table beside one of its nodes."""
     (folder / "points.csv").write_text(points)
     more = {"averages": 20, "coherence": None, "points": folder / "points.csv"}
     return read(folder / "test.csv", text, **more)
@@ -170,7 +166,6 @@ def test_hdf5_brings_the_same_test_back(tmp_path):
 
 
 def two(**second):
-    """Text of functions (7, 3) by (11, -3), and one more."""
     nodes = "".join(
         f"{n:10d}{0:10d}{0:10d}{0:10d}" + f"{n:13.5e}{0:13.5e}{0:13.5e}\n" for n in (7, 8, 11)
     )
@@ -179,14 +174,12 @@ def two(**second):
 
 
 def read(path, text=None, **options):
-    """A test of five averages, of a text that is written first."""
     if text is not None:
         path.write_text(text)
     return rom.io.read_responses(path, **{"averages": 5, "coherence": 0.9} | options)
 
 
 def labelled(unit, kind=12):
-    """The functions, the second half of the labels of an axis being a unit."""
     head = f"{kind:10d}{0:5d}{0:5d}{0:5d} {'NONE':<20} "
     return two().replace(head + f"{'NONE':<20}", head + f"{unit:<20}")
 

@@ -158,10 +158,7 @@ def test_upsetting_of_a_disc_follows_siebels_formula(friction):
 
 
 def punched(element, n=8):
-    """Mean pressure of a rough flat punch over the shear strength, as it sinks in.
-
-    Half of a deep block: n divisions below a punch of half-width 1, growing away from it.
-    """
+    """Mean pressure of a rough flat punch, half-width 1, over shear strength, as it sinks in."""
     growing = np.cumsum(1.25 ** np.arange(1, 40)) / n
     x = np.r_[np.linspace(0, 1, n + 1), 1 + growing[growing < 4.5]]
     y = -np.r_[0, growing[growing < 4.5]][::-1]

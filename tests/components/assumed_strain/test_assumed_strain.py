@@ -40,13 +40,11 @@ def cook(n, diagonal, load, **options):
 
 
 def hertz(body, metal, free, n):
-    """The n lowest frequencies in the plane [Hz]."""
     K, M = tangent(body, metal, body.points), mass(body, metal)
     return np.sqrt(eigsh(K[free][:, free], n, M[free][:, free], sigma=0.0)[0]) / (2 * np.pi)
 
 
 def solved(body, metal, f, held):
-    """Linear displacements (n, 2)."""
     K, u = tangent(body, metal, body.points), np.zeros(f.size)
     free = np.setdiff1d(np.arange(f.size), held)
     u[free] = spsolve(K[free][:, free].tocsc(), f.ravel()[free])
@@ -231,10 +229,7 @@ def pulled(stretches, metal, state="plane stress"):
 
 
 def test_bars_follow_the_closed_forms_of_hencky_and_of_yield():
-    """T = E ln(stretch) on the current section times length; the force is T / stretch.
-
-    Beyond yield T = (sy + H e E / E) E / (E + H); unloading is elastic.
-    """
+    """Force over section E ln(stretch) / stretch; beyond yield (sy + H e E / E) E / (E + H)."""
     stretches = np.array([1.05, 1.3, 1.8, 0.7])
     force, width, _ = pulled(stretches, Metal(3.0, 0.3)).T
     assert_allclose(force, 3.0 * np.log(stretches) / stretches, rtol=1e-9)
@@ -261,7 +256,6 @@ def test_plastic_stress_turns_with_the_body():
 
 
 def test_a_thick_ring_under_pressure_is_that_of_lame():
-    """Axial symmetry in the linear limit: closed form, not in the list of problems."""
     a, b, p = 1.0, 2.0, 1e-4
     X, T = rectangle((24, 2), [(a, 0), (b, 0), (b, 0.1), (a, 0.1)])
     metal, errors = Metal(1.0, 0.3), {}

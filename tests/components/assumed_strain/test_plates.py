@@ -113,10 +113,7 @@ def test_only_planes_cost_nothing_even_without_a_quadratic(n, diagonal):
 
 @pytest.mark.parametrize("diagonal", ["/", "x"])
 def test_a_strip_twists_like_a_free_bar_and_bends_like_a_free_beam_in_spite_of_poisson(diagonal):
-    """Torsion with G J = G b t^3 / 3; a narrow strip bends with E I, its edges being free.
-
-    Without Poisson's ratio the plate is the beam of Euler and Bernoulli.
-    """
+    """G J = G b t^3 / 3; E I, as edges are free; Euler and Bernoulli without Poisson's ratio."""
     body, metal, _ = strip(diagonal=diagonal)
     f = bent(body, metal)[:8]
     twist = np.sqrt(210e9 / 2.6 * 4 * 0.002**2 / 0.04**2 / 7850) / (2 * 0.4)

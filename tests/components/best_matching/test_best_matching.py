@@ -209,11 +209,8 @@ def test_a_floating_beam_has_the_same_best_frame_in_all_floating_frames(bodies):
 
 
 def test_a_beam_that_whirls_turns_back_like_a_falling_cat(bodies):
-    """A loop of two bending shapes: -2 pi a^2 / (J_x + a^2), with masses of finite elements.
-
-    Slender beams have one shape both ways, so that int rho phi_y phi_z is one; J_x = m (b^2 + h^2)
-    / 12. The same turn each time at any speed, and the other way for the loop backwards.
-    """
+    """A loop of two bending shapes: -2 pi a^2 / (J_x + a^2), with masses of finite elements."""
+    # slender, one shape both ways: int rho phi_y phi_z is one; J_x = m (b^2 + h^2) / 12
     M_s, Phi = MODEL.M[::3][:, ::3], bodies[1].surface.shape
     X, shapes = MODEL.points, Phi.reshape(len(MODEL.points), 3, -1)
     share = (shapes**2).sum(axis=0) / (shapes**2).sum(axis=(0, 1))

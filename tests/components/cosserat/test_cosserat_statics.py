@@ -23,7 +23,6 @@ STIFF = 1e6  # against bending rigidities of one: neither shear nor stretch
 
 
 def crooked(rng, n=4):
-    """A rod with corners and sections of its own everywhere."""
     x = np.cumsum(rng.normal(size=(n + 1, 3)), axis=0)
     p = np.array([rotation.exp(0.7 * rng.normal(size=3)) for _ in range(n + 2)])
     return rod(x, p, stretch=rng.uniform(1, 2, (n, 3)), bend=rng.uniform(1, 2, (n + 1, 3)))
@@ -118,10 +117,7 @@ def test_bend_of_45_degrees_under_a_force_out_of_its_plane(J, k, P, tip):
 
 
 def shooting(turn, curvature, length, rigidities, force):
-    """End of a rod from its differential equations, by the moment at the root that leaves none.
-
-    Nothing of this is discrete: x' = R (C^-1 R^T n + e3), R' = R [B^-1 R^T m + k0]x, m' = -x' x n.
-    """
+    """End of a rod from its differential equations, by the moment at the root that leaves none."""
     C, B = np.array(rigidities[:3]), np.array(rigidities[3:])
 
     def rates(_, y, n):

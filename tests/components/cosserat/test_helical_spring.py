@@ -37,10 +37,7 @@ WIRE = {  # wire, diameter, coils, length [mm]: stiffness, bending, sideways, tw
 
 @pytest.mark.parametrize("size", WIRE)
 def test_closed_forms_are_those_of_the_wire(size):
-    """The helix as a rod of 40 segments a coil; the forms leave out the slope of the wire.
-
-    The first ratio is one of stiffnesses, the others are of compliances.
-    """
+    """The helix as a rod of 40 segments a coil; the forms leave out the slope of the wire."""
     one = spring(*size)
     wire = plate_compliance(cosserat.wire_rod(one), (0, 0, one.length)).diagonal()
     ratio = one.compliance().diagonal() / wire

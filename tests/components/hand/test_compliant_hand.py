@@ -63,10 +63,7 @@ INDEX = {  # tension [N]: angle of a joint [deg], x, z of the tip, pull, inner l
 
 
 def test_index_finger_closes_until_coils_touch():
-    """Without a load on the tip every joint feels the tension alone: all three bend alike.
-
-    Beyond 2.65 N the pull hardly grows; springs without a stop would bend on.
-    """
+    """All joints feel the tension alone and bend alike; beyond 2.65 N the pull hardly grows."""
     postures = [rest(Finger())]
     for tension, (angle, x, z, pull, inner) in INDEX.items():
         posture = close(Finger(), tension=tension, start=postures[-1])

@@ -29,7 +29,6 @@ def tip_of(solution, name="finger"):
 
 
 def driven(finger, drive, name="index", seat=None):
-    """A hand of one finger, or of the index of which one joint is driven."""
     one = name.split()[0]
     return moving_hand({one: finger}, seats={one: seat or Seat()}, drives={name: drive})
 
@@ -103,7 +102,6 @@ def test_coils_that_touch_stop_a_moving_finger_where_they_stop_it_at_rest(load):
 
 @njit
 def bent(poses, K):
-    """Axis of the bend of two plates; its derivatives in K."""
     angle, axis = bend_of(poses, 1)
     add_bending(2, angle, axis, 1.0, K)
     return axis

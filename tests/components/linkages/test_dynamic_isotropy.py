@@ -223,10 +223,7 @@ def test_saddles_between_four_hills_are_joined_once():
 
 
 def test_equal_cranks_that_bend_keep_the_isotropic_postures(found):
-    """All the cranks see is the mass at their elbows: where that is isotropic, everything is.
-
-    The cantilever shape (3 s^2 - s^3) / 2 has the integrals 3/8, 11/40 and 33/140 of the mass.
-    """
+    """They see mass at elbows alone; (3 s^2 - s^3) / 2 has integrals 3/8, 11/40 and 33/140."""
     M = np.zeros((4, 4))
     M[:3, :3] = rod(2.0, 0.3).M
     M[3] = M[:, 3] = 2.0 * np.array([0.0, 3 / 8, 0.3 * 11 / 40, 33 / 140])

@@ -122,10 +122,7 @@ def test_free_links_feel_lighter_whatever_the_direction_and_their_frame(bar):
 
 
 def apparent_inertia(L, mu, EI, w):
-    """Of a uniform beam about its driven end at circular frequency w: torque over acceleration.
-
-    The fourth derivative of y is k^4 y; y = 0 and y' = 1 at the driven end, the other is free.
-    """
+    """Torque over acceleration of a uniform beam at its driven end; y'''' = k^4 y, y' = 1 there."""
     k = (mu * w**2 / EI) ** 0.25
     c, s, C, S = np.cos(k * L), np.sin(k * L), np.cosh(k * L), np.sinh(k * L)
     # y = a (cos - cosh) + b sin + d sinh of k x; no moment and no force at the end

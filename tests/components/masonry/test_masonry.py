@@ -41,10 +41,7 @@ def test_mass_of_a_block_is_that_of_finite_elements():
 
 
 def test_mass_and_mean_axes_of_a_skew_block():
-    """Entries are integrals of T^T T at random points; couplings of rotation and strains need Sxy.
-
-    Vibrations with rotation in the equations, and without it in a frame of mean axes.
-    """
+    """Integrals of T^T T at random points; vibrations with rotation, and in mean axes without."""
     one = stone(SKEW, **SOFT)
     area, _, S = polygon_moments(SKEW)
     x = np.random.default_rng(0).uniform(SKEW.min(axis=0), SKEW.max(axis=0), (400_000, 2))
@@ -160,10 +157,7 @@ def test_column_under_its_own_weight():
 
 
 def test_a_rocking_block_strikes_in_time_and_loses_as_much_as_housner_says_or_less():
-    """A block of 1 m by 4 m, tilted by half its stability angle on its right corner, let go.
-
-    Nonlinear: integral of d theta over the speed from the energy; p^2 = 3 g / (4 R).
-    """
+    """1 m by 4 m, let go at half its stability angle: d theta over the speed, p^2 = 3 g / (4 R)."""
     alpha, p = np.arctan(0.25), np.sqrt(3 * G / (4 * np.hypot(0.5, 2.0)))
     assert p == pytest.approx(1.8892, abs=1e-4)
     assert np.arccosh(2.0) / p == pytest.approx(0.69711, abs=1e-5)

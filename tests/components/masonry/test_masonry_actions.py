@@ -134,7 +134,6 @@ ALPHA, P = np.arctan(0.1), np.sqrt(3 * G / (4 * np.hypot(0.1, 1.0)))
 
 
 def shaken(acceleration, **run):
-    """A slender block that rests first under an acceleration of the ground."""
     rock = {"E": 1e10, "nu": 0.2, "rho": 2000.0}
     stones = stone(GROUND, **rock), stone(box(*SLENDER, at=(-0.1, 0)), **rock)
     model = masonry.Masonry(stones, (0,), 20e10, 2.0)
@@ -157,10 +156,7 @@ def test_a_block_tips_under_the_pulse_that_housner_says(ratio):
 
 @pytest.mark.parametrize("dt", [1e-3, 2.5e-4])
 def test_damping_delays_tipping_by_its_closed_form_whatever_the_step(dt):
-    """theta'' + c theta' = p^2 (theta - alpha + x alpha), the pulse over when it starts to grow.
-
-    With c = 1 / s the pulse must be 20 % longer; it would be the same for a share lost each step.
-    """
+    """theta'' + c theta' = p^2 (theta - alpha + x alpha); with c = 1 / s pulses are 20 % longer."""
     c, x = 1.0, 1.5
     grows, falls = (-c / 2 + sign * np.sqrt(c**2 / 4 + P**2) for sign in (1, -1))
 
@@ -177,10 +173,7 @@ def test_damping_delays_tipping_by_its_closed_form_whatever_the_step(dt):
 
 
 def left_after_half_a_sine(x, omega):
-    """Linear rocking from a pulse: theta' + p (theta - alpha) at its end; it tips if > 0.
-
-    theta = A sinh + B cosh - forced, until the pulse ends; no impact before (Zhang and Makris).
-    """
+    """theta' + p (theta - alpha) after a pulse without impact; tips if > 0 (Zhang and Makris)."""
     psi = np.arcsin(1 / x)
     t, k = (np.pi - psi) / omega, 1 / (1 + (omega / P) ** 2)
     # theta'' - p^2 theta = p^2 alpha (x sin(omega t + psi) - 1) while it turns to one side
@@ -219,10 +212,7 @@ def test_a_block_follows_the_exact_rocking_motion_under_a_sine():
 
 
 def overturns(a, T):
-    """Whether a rigid slender block tips under one cycle of a sine, by the nonlinear equation.
-
-    At each impact it keeps 1 - 3/2 sin^2 alpha of its speed (Housner). Returns impacts before too.
-    """
+    """Whether a rigid slender block tips under a cycle of a sine, and impacts before (Housner)."""
     t, y, side, impacts = T / (2 * np.pi) * np.arcsin(np.tan(ALPHA) * G / a), (0.0, 0.0), 1.0, 0
 
     def rate(t, y, side):
@@ -307,7 +297,6 @@ def _factor(h, joints, sides, weight, centre, load):
 
 
 def assert_stays(stays, model, action, t_end):
-    """Stones that come to rest under a load, or go on ever faster."""
     motion = simulate(model, t_end=t_end, dt=1e-3, actions=[action], damping=30.0, save_every=500)
     speed = np.abs(motion.v[:, 1:-1]).max(axis=(1, 2))
     assert speed[-1] < 1e-6 if stays else speed[-1] > max(1e-3, speed[3])
@@ -433,10 +422,7 @@ def test_contacts_that_turn_back_within_a_step_stick():
 
 @pytest.mark.parametrize(("mu", "cuts"), [(0.6, 5), (1.0, 10), (1.5, 220), (2.0, 280), (3.0, 260)])
 def test_steps_settle_with_friction_of_one_and_more(mu, cuts):
-    """Friction in turns with normal forces diverged from one on: 766 and 1222 cuts of steps.
-
-    Where negative pivots cut steps they were 245, 1682 and 5589 at 1.5, 2 and 3.
-    """
+    """Steps were cut 766 and 1222 times from one on; 245, 1682, 5589 times at 1.5, 2 and 3."""
     model = masonry.wall(2.0, 8, brick=(0.5, 0.25), rock=masonry.Rock(friction=mu))
     shaking = masonry.BaseMotion(masonry.sine(4.0, 0.4))
     motion = simulate(model, t_end=0.5, dt=1e-3, actions=[shaking], save_every=500)

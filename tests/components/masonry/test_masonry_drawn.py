@@ -39,11 +39,8 @@ def test_stones_of_a_vault_are_the_surfaces_with_their_corners():
 
 
 def test_a_buttress_tips_at_the_width_that_statics_says():
-    """Virtual work of Heyman's mechanism, linear programming, and motion: one width.
-
-    A half tips about the outer foot of its buttress, hinges open in the vault: the thrust at the
-    outer face of the crown is the largest that hinges on the inner face ask for.
-    """
+    """Virtual work of Heyman's mechanism, linear programming, and motion: one width."""
+    # half tips about its outer foot: largest thrust at the crown with hinges on the inner face
     Ri, Ro = R - T / 2, R + T / 2
     half, thrust = vault().stones[9:17], 0.0
     W, x = np.array([s.M[0, 0] for s in half]), np.array([s.centre[0] for s in half])

@@ -171,11 +171,7 @@ def test_joints_that_cannot_be_are_named(tmp_path):
 
 
 def spread_arch(n, thickness, k, x):
-    """Rigid stones of an arch of radius 1 whose supports have moved apart by x.
-
-    Hinges: outer edge of the crown, inner edges of the joints k stones below it on both sides. What
-    is between them turns and comes down; what is below has moved out with its support.
-    """
+    """Rigid stones of an arch of radius 1, its supports moved apart by x, hinged at joints k."""
     rock, model = masonry.Rock(friction=2.0), arch(n, 1.0, thickness)
     angle = k * np.pi / n
     hinge = (1 - thickness / 2) * np.array([np.sin(angle), np.cos(angle)])
@@ -193,10 +189,7 @@ def spread_arch(n, thickness, k, x):
 
 
 def test_supports_of_an_arch_spread_until_it_falls():
-    """Statics of the moved rigid stones say where; t / R = 0.2 bears far more than 0.15.
-
-    The mechanism follows Ochsendorf, Collapse of masonry structures (2002), for spreading supports.
-    """
+    """Ochsendorf's mechanism (2002) by rigid statics; t / R = 0.2 bears far more than 0.15."""
     for thickness, k in ((0.15, 6), (0.2, 7)):
         low, high = 0.0, 0.5
         while high - low > 1e-4:

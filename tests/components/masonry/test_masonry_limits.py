@@ -138,11 +138,7 @@ def test_two_piers_under_a_lintel_tip_at_their_slenderness():
 
 
 def test_a_wall_with_three_openings_gives_way_on_shaking_ground_where_statics_says():
-    """Two windows and a door, ground that accelerates slowly: linear programming against motion.
-
-    Joints of linear programming rise as they slip, which bears more: motion begins between
-    0.85 and 0.9 of it.
-    """
+    """Joints of linear programming rise as they slip: motion begins at 0.85 to 0.9 of its limit."""
     openings = [(0.5, 1.0, 2, 5), (1.75, 2.25, 0, 5), (3.0, 3.5, 2, 5)]
     model = wall(4.0, 7, openings=openings, rock=Rock(friction=0.6))
     area = sum(s.M[0, 0] for s in model.stones[1:]) / 2000  # lintels fill their course

@@ -17,7 +17,6 @@ HERTZ_SLOPE = np.sqrt(2) / np.pi / (1 - 0.25**2)
 
 
 def baseline(**change):
-    """The illustration of `test_rockfall`, with the cushion of the default."""
     parts = Cushion.of_sand(4000.0, 1e6), rockfall.Shear(2e9), Slab.of_mass(6000.0, 1.2e8)
     return replace(rockfall.Gallery(4000.0, 15.0, 2500.0, *parts), **change)
 
@@ -33,7 +32,6 @@ def test_sand_gives_back_less_than_a_twentieth_of_the_energy(cushion, height):
 
 
 def seen_to_its_end(g):
-    """An impact in which nothing larger follows."""
     got, long = strike(g), strike(g, t_end=30.0)
     assert_allclose(got.peaks, long.peaks, rtol=2e-3)
     assert got.deflection == pytest.approx(long.deflection, rel=2e-3)
@@ -208,7 +206,6 @@ def test_several_modes_yield_as_a_slip_under_the_plug():
 
 
 def test_one_mode_yields_as_it_did():
-    """The shape of the static deflection of one mode is that mode."""
     one = Slab.of_mass(6000.0, 1.2e8, damping=0.0, capacity=1.2e6)
     modes = np.full(2, 6000.0**-0.5 / np.sqrt(2)), np.full(2, np.sqrt(1.2e8 / 6000))
     twin = Slab(*modes, damping=0.0, capacity=1.2e6)
@@ -261,11 +258,7 @@ def sampled(shape, end=0.3, n=30001):
 
 @pytest.mark.parametrize("reflection", [0.0, 0.5, 1.0])
 def test_what_arrives_is_what_a_chain_of_masses_and_springs_passes_on(reflection):
-    """The floor's force by central differences on n masses and springs; a dashpot is the floor.
-
-    A column of length and speed one has the impedance one; a floor of the impedance Z gives back
-    the share (Z - 1) / (Z + 1).
-    """
+    """By central differences; a floor of impedance Z gives back (Z - 1) / (Z + 1) of a wave."""
     t, force = sampled(lambda t: np.where(t < 0.05, np.sin(np.pi * t / 0.05) ** 2, 0.0), n=3001)
     found, n = arriving(t, force, DELAY, reflection=reflection), 300
     m, k, dt = 1 / n, float(n), 0.5 / n

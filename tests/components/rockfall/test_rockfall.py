@@ -72,10 +72,7 @@ def test_the_handbook_formula_is_hertz(tonnes, height, expected):
 
 
 def test_a_rigid_gallery_is_struck_as_hard_and_as_long_as_hertz_says():
-    """Of depth over speed 2.943275, of (m^2 / k^2 v)^(1/5) 3.218: integral, Gamma function, motion.
-
-    Time is twice the integral of dx / v sqrt(1 - x^(5/2)) over the way in.
-    """
+    """Twice the integral of dx / v sqrt(1 - x^(5/2)): quadrature, Gamma function, motion."""
     by_depth = quad(lambda u: 4 * u / np.sqrt(1 - (1 - u * u) ** 2.5), 0, 1)[0]  # x = 1 - u^2
     assert by_depth == pytest.approx(0.8 * np.sqrt(np.pi) * gamma(0.4) / gamma(0.9), rel=1e-10)
     assert by_depth == pytest.approx(2.943275, abs=5e-7)

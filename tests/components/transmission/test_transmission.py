@@ -163,10 +163,7 @@ def test_a_rotor_alone_whirls_at_the_threshold_of_its_bearings():
 
 @pytest.mark.parametrize("helix", [0.0, HELIX])
 def test_it_rests_as_another_program_says_and_whirls_as_its_mechanism(helix):
-    """But for products of turns, and for forces that turn with the line of centres.
-
-    Half of a twist of 3e-3 times a tilt of 2e-4 is 1e-4 of the largest turn.
-    """
+    """But for forces that turn with the line of centres, and products of turns: 1e-4 of turns."""
     state = rest(unit(helix=helix, speed=600.0, gravity=(0.0, -9.81)))
     assert_allclose(state.q, resting(state.unit), atol=1e-4 * np.abs(state.q).max())
     mech = mechanism_of(state.unit, state.q, 0.0 * state.q)

@@ -22,7 +22,6 @@ STEPS = 60
 
 @cache
 def both(theta=0.4, **more):
-    """The unit at rest by its own program, and as a mechanism with its state."""
     unit = rigid_unit(**more)
     mech = as_mechanism(unit)
     return rest(unit, theta), mech, rom.equilibrium(mech, t=theta / unit.speed)
@@ -61,10 +60,7 @@ def test_shafts_rest_on_films_that_conserve_their_oil_wherever_it_comes_in(beyon
 
 @pytest.mark.parametrize("beyond", [-60, -45])
 def test_wheels_beside_the_middle_find_their_films_where_oil_comes_in_before_the_load(beyond):
-    """From the middle they run dry on the way to the load. Near and far seats bear 7 to 3.
-
-    Within a hundredth, as teeth press harder on one end of their face.
-    """
+    """Seats bear 7 to 3 within a hundredth, as teeth press harder on one end of their face."""
     seats, unit = (-0.06, 0.14), oiled(beyond, speed=60.0)
     mech = as_mechanism(unit, seats=seats)
     still = rom.mbs.snapshot(mech, rom.equilibrium(mech))
@@ -105,10 +101,7 @@ def test_it_whirls_and_vibrates_as_the_unit(more, rtol):
 
 
 def test_it_runs_through_its_speeds_as_another_program():
-    """Errors of transmission and forces of teeth at every step.
-
-    But for forces that turn with the line of centres, and for what the methods leave of each step.
-    """
+    """At every step, but for forces that turn with the line of centres, and what steps leave."""
     motion = None
     for speed in (725.0, 750.0):
         unit = rigid_unit(torque=300.0, speed=speed)
@@ -132,7 +125,6 @@ def test_it_runs_through_its_speeds_as_another_program():
 
 @pytest.fixture(scope="module")
 def lossy():
-    """Shafts with so much damping that motion through time settles soon."""
     return rest(unit(torque=300.0, speed=150.0, loss=1e-4))
 
 
@@ -143,7 +135,6 @@ def found(lossy):
 
 @pytest.mark.long
 def test_it_is_where_motion_through_time_settles(lossy, found):
-    """But for the little that its steps damp."""
     run = simulate(lossy, periods=8, steps=STEPS)
     last, size = slice(-STEPS - 1, None), np.ptp(found.error)
     assert_allclose(run.error[last], found.error, atol=0.025 * size)

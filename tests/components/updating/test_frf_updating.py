@@ -244,11 +244,7 @@ def test_eight_sensors_need_some_linear_solutions():
 
 
 def test_unmeasured_dofs_as_the_model_says_converge_slower_to_the_same():
-    """The exchange as first published: the model's responses stand in for what no sensor sees.
-
-    Equations relative to both responses. Table: .41, .27, .073 and 1e-4 in the steps 1, 2, 3, 5,
-    with a scaling of which nothing is known; one step later all scalings have converged.
-    """
+    """As first published. Table: .41, .27, .073 and 1e-4 in steps 1, 2, 3, 5, scaling unknown."""
     C = updating.damping_matrix(BEAM.at(TRUE), ZETA)
     s = BEAM.sensors.argmax(axis=1)
     w, p, error = OMEGA[:, None, None], START, []

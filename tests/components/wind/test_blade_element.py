@@ -112,10 +112,7 @@ def test_strips_of_a_rod_have_the_loads_of_the_rotor_whose_wake_leans(tilt, yaw,
 
 @pytest.mark.parametrize(("tower", "wind"), BLOWN)
 def test_tangents_of_the_wind_are_derivatives(tower, wind):
-    """By rotations, by velocities, and by places if there is a tower, five metres behind.
-
-    In the last wind, from 84 degrees aside, the wake lies in the plane of the rotor.
-    """
+    """By rotations, velocities, places with a tower; the last wake lies in the rotor's plane."""
     one = blade(6)  # does not bend back, so that forces are those of the wind
     one = one._replace(stretch=1e-14 * one.stretch, bend=1e-14 * one.bend)
     one, down = in_wind(cosserat.body(one), wind, tower=tower), rotation.exp([np.pi, 0, 0])

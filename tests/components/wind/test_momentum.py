@@ -40,11 +40,7 @@ def loss(r, phi, blades=3, R=63.0, hub=1.5):
 
 
 def balances(blades, load):
-    """Thrust and torque of each strip over those that the air loses, by the momentum of rings.
-
-    Beyond an induction of 0.4 thrust is that of Buhl: C_T = 8/9 + (4 F - 40/9) a +
-    (50/9 - 4 F) a^2.
-    """
+    """Thrust and torque of strips over those that rings of air lose; beyond a = 0.4 as Buhl."""
     normal, driving, through, across, _, a = load.strip[0].T
     r, V = blades.radius, load.wind
     phi = np.arctan2(through, across)
@@ -187,11 +183,8 @@ def test_a_blade_passes_the_dam_of_the_tower():
 
 
 def test_the_mean_with_a_tower_is_that_of_each_strip_in_the_wind_it_meets():
-    """A rotor in uniform wind, one for each place of a strip; the dam is U (1 - a^2 / Z^2).
-
-    Without tilt and cone the blades are 5.0191 m ahead of the axis of the tower, whose radius
-    falls from 3 to 1.935 m in 87.6 m.
-    """
+    """A rotor in uniform wind, one for each place of a strip; the dam is U (1 - a^2 / Z^2)."""
+    # blades pass 5.0191 m ahead of the tower's axis, its radius falls from 3 to 1.935 m in 87.6 m
     blades, V, speed, n = straight(), 8.0, tip_ratio(DESIGN_RATIO), 24
     open_wind = rotor_load(blades, V, speed, n_azimuths=1).strip[0]
     mean = np.zeros((17, 2))
@@ -252,12 +245,8 @@ def test_every_strip_meets_the_wind_of_its_place():
 
 
 def biot_savart(chi, place, n=400):
-    """Velocity through the end of a skewed half-infinite cylinder of vortex rings at a place.
-
-    Rings lie parallel to the end, their middles on a line that leaves it at an angle chi, along the
-    second axis. Their radius is 1, and so is their strength per length of this line; the integral
-    over it is that of (A + B s) / (square s^2 + 2 b s + q)^(3/2) from 0 on, a closed form.
-    """
+    """Velocity through the end of a skewed half-infinite cylinder of vortex rings at a place."""
+    # rings of radius 1 along a line at chi: int (A + B s) / (square s^2 + 2 b s + q)^(3/2)
     t = 2 * np.pi * (np.arange(n) + 0.5) / n
     ring, element = (np.array(x) for x in ([np.cos(t), np.sin(t)], [-np.sin(t), np.cos(t)]))
     arm = np.asarray(place)[:, None] - ring  # in the plane; behind it, less s (0, tan chi) and s

@@ -45,7 +45,6 @@ def test_filters_answer_a_step_as_their_equations_do():
 
 
 def answer(t, slow, fast):
-    """Of both filters to a step at 0, the first of which passes a share of 0.6 at once."""
     first, second = np.exp(-t / slow), np.exp(-t / fast)
     return 1 - second - 0.4 * slow / (slow - fast) * (first - second)
 
@@ -65,10 +64,7 @@ def after_a_step(before, then, dt, cone=0.0):
 
 
 def remembered(blades, axial, t, V, a):
-    """Shares of a step that wakes of an induction have followed, axial inductions, and their size.
-
-    Both filters slow down with the induction, and towards the hub.
-    """
+    """Shares of a step that wakes of an induction have followed, axial inductions, their size."""
     slow = 1.1 / (1 - 1.3 * a) * 63.0 / V
     share = answer(t[:, None], slow, (0.39 - 0.26 * (blades.radius / 63.0) ** 2) * slow)
     change = axial[1] - axial[0]
@@ -101,10 +97,7 @@ def test_the_wake_of_each_strip_follows_a_step_as_the_closed_form_does(before, t
 
 @pytest.mark.parametrize("cone", [0.0, 0.3])
 def test_the_wake_of_a_rotor_that_drives_the_air_is_as_quick_as_without_induction(cone):
-    """Pitched away, strips push: 1 / (1 - 1.3 a) is 1 for a below zero.
-
-    Cone makes the disc smaller by its cosine, and the wind through the strips slower by it.
-    """
+    """1 / (1 - 1.3 a) is 1 for a below zero; cone makes disc and wind less by its cosine."""
     dt, V = 0.01, 5.0
     blades, axial, _, run, start = after_a_step((V, 0.0), (V, np.radians(12.0)), dt, cone)
     driving = axial[1] < -0.1 * V
@@ -239,10 +232,7 @@ def test_torque_has_the_published_corners():
 
 
 def test_gains_fall_with_the_pitch_as_published():
-    """6.302336 degrees halve them; damping 0.7 at 0.6 rad/s of a rotor of 43.784e6 kg m^2.
-
-    Report, equations 7-9 to 7-12: gain = 2 I w z w0 / (N |dP/dpitch|) of -25.52e6 W/rad.
-    """
+    """Report, equations 7-9 to 7-12: gain = 2 I w z w0 / (N |dP/dpitch|), half at 6.302336 deg."""
     assert_allclose(np.degrees(DOUBLING_PITCH), 6.302336, rtol=1e-5)
     assert_allclose([control.gain_factor(0.0), control.gain_factor(DOUBLING_PITCH)], [1.0, 0.5])
     inertia, sensitivity, w, zeta = 43.784e6, 25.52e6, 0.6, 0.7

@@ -111,10 +111,7 @@ def test_blades_whirl_on_a_stiff_tower_as_one_of_them_swings():
 
 
 def test_torque_gives_momentum_and_energy():
-    """Two meganewton metres, from rest, without weight; about the shaft.
-
-    The generator stores its own momentum times the ratio of the gear.
-    """
+    """From rest, without weight, about the shaft; the generator has its own times the gear."""
     whole = on_a_stiff_tower(16)
     whole.turn_with(lambda t, x, v: 2e6 * min(t / 2.0, 1.0))
     sol = rom.simulate(whole.mechanism, t_end=12.0, dt=0.01, rho_inf=0.9)

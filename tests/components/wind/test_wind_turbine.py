@@ -30,10 +30,7 @@ def test_mass_of_the_blade():
 
 
 def test_frequencies_of_the_blade_at_rest():
-    """Flap, edge, flap, edge, flap, torsion with 192 segments; the assumed modes of the definition.
-
-    Their 0.6993 Hz belongs to a turbine with few modes and is no limit of a finer beam.
-    """
+    """Flap, edge, flap, edge, flap, torsion; 0.6993 Hz is no limit, as it is of few modes."""
     f = frequencies(blade(192))
     assert_allclose(f, [0.6705, 1.0567, 1.9028, 3.6556, 4.2849, 5.5761], rtol=3e-4)
     assert_allclose(f[:2], [0.6914, 1.112056], rtol=0.055)

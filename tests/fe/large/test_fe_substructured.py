@@ -57,10 +57,7 @@ def fill(pattern, places):
 
 @pytest.mark.parametrize("seed", range(8))
 def test_given_unknowns_come_last_at_no_further_fill(library, seed):
-    """Beside the order of MUMPS itself, the entries of the factor counted by elimination.
-
-    A graph of some 150 edges, connected or not, whose last vertices are joined to each other.
-    """
+    """Beside MUMPS' own order, on graphs of some 150 edges; the last vertices are joined."""
     A = random(N_VERTICES, N_VERTICES, 0.04, random_state=seed)
     end = np.arange(N_VERTICES - N_LAST, N_VERTICES)
     clique = (np.ones(N_LAST**2), (np.tile(end, N_LAST), np.repeat(end, N_LAST)))

@@ -128,10 +128,7 @@ def test_abaqus_sections_sets_and_surfaces(tmp_path):
 
 @pytest.mark.parametrize("kind", ["tet4", "hex8"])
 def test_abaqus_side_numbers_follow_the_manual(kind):
-    """Outer corner opposite to side S1..S4 of a tetrahedron; planes of S1..S6 of a brick.
-
-    Source: Abaqus manual, three-dimensional solid element library, element faces.
-    """
+    """Three-dimensional solid elements: corners opposite to S1..S4, planes of S1..S6 of a brick."""
     cell = CELL_TYPES[kind]
     sides = [cell.nodes[list(side)] for side in abaqus.SIDES[cell.n_corners]]
     if kind == "tet4":
@@ -226,7 +223,6 @@ DIAGONAL = ((1, 2), (2, 3), (3, 7), (7, 4), (4, 5), (5, 1))
 
 
 def volume_and_centre(points, cells):
-    """Of straight cells, summed over tetrahedra."""
     parts = [cells[:, :4]]
     if cells.shape[1] in (8, 20):
         parts = [cells[:, [0, a, b, 6]] for a, b in DIAGONAL]
@@ -285,11 +281,8 @@ GRDSET,,5
 
 
 def test_systems_lead_where_the_manuals_say(tmp_path):
-    """Angles in degrees, of a sphere from z and then around it; blank fields are those of GRDSET.
-
-    Node 101 lies on y, 102 on -x, 103 on z of a system at (1, 0, 0); through 101 and 102 runs z of
-    the next one, -(1, 1, 0) / sqrt(2), and its x is the basic z.
-    """
+    """Degrees of a sphere, from z, then around it; blank fields are those of GRDSET."""
+    # at (1, 0, 0) 101 lies on y, 102 on -x, 103 on z; their system has z = -(1, 1, 0) / sqrt(2)
     (tmp_path / "s.bdf").write_text(SPHERE + "GRID,1,,1.,0.,2.\nGRID,2,0,1.,0.,2.\n")
     labels, points = read_nodes(tmp_path / "s.bdf")
     found = dict(zip(labels.tolist(), points, strict=True))
