@@ -6,7 +6,7 @@
 # opposite of tension, until the blade buckles.
 #
 # Run: `python demos/demo_bent_blade.py`, or under `mpirun -n 2`
-# Time: 30 s
+# Time: 1 min
 # Writes: `bent_blade.png` into `out/`; another folder with `--out`
 
 import argparse

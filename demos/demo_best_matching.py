@@ -6,7 +6,7 @@
 # body. Nothing about gravity is computed here beyond Newton's attraction of three points.
 #
 # Run: `python demos/demo_best_matching.py`
-# Time: 30 s
+# Time: 40 s
 # Writes: `best_matching.png` into `out/`; another folder with `--out`
 
 import argparse

@@ -7,7 +7,7 @@
 # points that were not measured, with bands, and the frame without the instrument.
 #
 # Run: `python demos/demo_bolted_frame.py`
-# Time: 30 s
+# Time: 20 s
 # Writes: `bolted_frame.png` into `out/`; another folder with `--out`
 
 import argparse

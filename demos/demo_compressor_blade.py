@@ -7,7 +7,7 @@
 #
 # Run: `python demos/demo_compressor_blade.py`, or under `mpirun -n 2`; `--crown 0.03` for curved
 # flanks, `--lc-flank 0.0036` for a third of a minute
-# Time: 30 s
+# Time: 2 min
 # Writes: `compressor_blade.png` into `out/`; another folder with `--out`
 
 import argparse

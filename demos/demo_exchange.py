@@ -5,7 +5,7 @@
 # frequencies. Then it swings, and the motion leaves as a table and as a film to turn around.
 #
 # Run: `python demos/demo_exchange.py`, or under `mpirun -n 2`
-# Time: 30 s
+# Time: 15 s
 # Writes: eleven files named `beam` and a picture into `out/`; another folder with `--out`
 
 import argparse

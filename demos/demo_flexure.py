@@ -5,7 +5,7 @@
 # `rom.Geometric` the reduced plate does, and its certificate says how far out it may be believed.
 #
 # Run: `python demos/demo_flexure.py`, or under `mpirun -n 2`
-# Time: 30 s
+# Time: 40 s
 # Writes: `flexure.png` into `out/`; another folder with `--out`
 
 import argparse

@@ -7,7 +7,7 @@
 # Potratz, Yang, Abdel-Malek, Pena Pitarch and Grosland.
 #
 # Run: `python demos/demo_hand.py`
-# Time: 30 s
+# Time: 3 min
 # Writes: three pictures, `hand.png`, `hand_control.png` and `hand_grasp.png`, and the film
 # `hand_grasp.gif` into `out/`; another folder with `--out`
 

@@ -6,7 +6,7 @@
 # does not: where the generalised inertia is a multiple of the identity.
 #
 # Run: `python demos/demo_isotropy.py`
-# Time: 30 s
+# Time: 15 s
 # Writes: `isotropy.png` and `isotropy_compared.png` into `out/`; another folder with `--out`
 
 import argparse

@@ -5,7 +5,7 @@
 # order in a few coordinates: it bends to 70 degrees, stretches where it is held, and snaps.
 #
 # Run: `python demos/demo_large_deflection.py`
-# Time: 30 s
+# Time: 20 s
 # Writes: `large_deflection.png` into `out/`; another folder with `--out`
 
 import argparse

@@ -5,7 +5,7 @@
 # modes live on different processes. `--million` makes a million dofs of it.
 #
 # Run: `python demos/demo_large_mesh.py`, or `mpirun -n 2 python demos/demo_large_mesh.py --million`
-# Time: 30 s
+# Time: 1.5 min
 # Writes: `housing_mesh.png` and `housing_modes.png` into `out/`; another folder with `--out`
 
 import argparse

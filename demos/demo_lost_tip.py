@@ -5,7 +5,7 @@
 # functions, and cantilever modes of its own. The disk is reduced once; blades are exchanged on it.
 #
 # Run: `python demos/demo_lost_tip.py`, or under `mpirun -n 2`
-# Time: 30 s
+# Time: 15 s
 # Writes: `lost_tip.png` into `out/`; another folder with `--out`
 
 import argparse

@@ -6,7 +6,7 @@
 # on buttresses is drawn in gmsh, and one of its stones is a reduced body of finite elements.
 #
 # Run: `python demos/demo_masonry.py`, or under `mpirun -n 2`
-# Time: 30 s
+# Time: 1.5 min
 # Writes: `masonry.png`, `masonry.gif` and `masonry_vault.png` into `out/`; another folder with
 # `--out`
 

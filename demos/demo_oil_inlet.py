@@ -6,7 +6,7 @@
 # Parameters are for illustration.
 #
 # Run: `python demos/demo_oil_inlet.py`
-# Time: 30 s
+# Time: 3 min
 # Writes: `oil_inlet.png`, `oil_inlet_static.png`, `oil_inlet.gif` into `out/`; another folder with
 # `--out`
 

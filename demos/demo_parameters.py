@@ -5,7 +5,7 @@
 # sweep returns to the finite elements. Beside the curves stand models meshed and assembled anew.
 #
 # Run: `python demos/demo_parameters.py`, or under `mpirun -n 2`
-# Time: 30 s
+# Time: 20 s
 # Writes: `parameters.png` into `out/`; another folder with `--out`
 
 import argparse

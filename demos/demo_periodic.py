@@ -6,7 +6,7 @@
 # springs across its way; then a pair of gears through its resonance, where teeth part.
 #
 # Run: `python demos/demo_periodic.py`
-# Time: 30 s
+# Time: 1.5 min
 # Writes: `periodic.png` into `out/`; another folder with `--out`
 
 import argparse

@@ -6,7 +6,7 @@
 # on the flank that the sun drives.
 #
 # Run: `python demos/demo_planetary.py`
-# Time: 30 s
+# Time: 40 s
 # Writes: `planetary_motion.png` and `planetary.png` into `out/`; another folder with `--out`
 
 import argparse

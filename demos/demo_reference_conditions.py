@@ -7,7 +7,7 @@
 # table of claims.
 #
 # Run: `python demos/demo_reference_conditions.py`
-# Time: 30 s
+# Time: 20 s
 # Writes: `reference_conditions.png`, `reference_resonance.png` and `reference_statics.png` into
 # `out/`; another folder with `--out`
 

@@ -5,7 +5,7 @@
 # because the links sag, and it swings on for a while. How much and how fast was known beforehand.
 #
 # Run: `python demos/demo_robot_arm.py`, or under `mpirun -n 2`
-# Time: 30 s
+# Time: 40 s
 # Writes: `robot_arm.png` and `robot_arm.gif` into `out/`; another folder with `--out`
 
 import argparse

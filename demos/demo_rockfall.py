@@ -7,7 +7,7 @@
 # parameters are for illustration.
 #
 # Run: `python demos/demo_rockfall.py`, or under `mpirun -n 2`
-# Time: 30 s
+# Time: 1.5 min
 # Writes: `rockfall.png`, `rockfall_capacity.png` and `rockfall.gif` into `out/`; another folder
 # with `--out`
 

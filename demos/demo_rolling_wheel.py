@@ -6,7 +6,7 @@
 # the velocity of the contact kept to round-off or not.
 #
 # Run: `python demos/demo_rolling_wheel.py`
-# Time: 30 s
+# Time: 15 s
 # Writes: `rolling_wheel.png` into `out/`; another folder with `--out`
 
 import argparse

@@ -5,7 +5,7 @@
 # a compressor blade and turned in a rotor, and its Campbell diagram shows the speeds to avoid.
 #
 # Run: `python demos/demo_rotating_blade.py`, or under `mpirun -n 2`
-# Time: 30 s
+# Time: 1 min
 # Writes: `rotating_beam.png` and `blade_campbell.png` into `out/`; another folder with `--out`
 
 import argparse

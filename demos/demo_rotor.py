@@ -7,7 +7,7 @@
 # what beams leave out: discs seventy millimetres wide stiffen the shaft they sit on.
 #
 # Run: `python demos/demo_rotor.py`, or under `mpirun -n 2`
-# Time: 30 s
+# Time: 20 s
 # Writes: `rotor_whirl.png` and `rotor_modes.png` into `out/`; another folder with `--out`
 
 import argparse

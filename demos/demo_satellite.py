@@ -5,7 +5,7 @@
 # frequencies are not those of a panel clamped to a wall, because the hub gives way.
 #
 # Run: `python demos/demo_satellite.py`, or under `mpirun -n 2`
-# Time: 30 s
+# Time: 1 min
 # Writes: `satellite.png` and `satellite.gif` into `out/`; another folder with `--out`
 
 import argparse

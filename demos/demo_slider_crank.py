@@ -5,7 +5,7 @@
 # into a mechanism. The same mechanism with a rigid rod runs beside it.
 #
 # Run: `python demos/demo_slider_crank.py`, or under `mpirun -n 2`
-# Time: 30 s
+# Time: 1 min
 # Writes: pictures, a film, the body file and `report.html` into `out/`; another folder with `--out`
 
 import argparse

@@ -7,7 +7,7 @@
 # arch can leave its symmetric shape.
 #
 # Run: `python demos/demo_snap_through.py`
-# Time: 30 s
+# Time: 1 min
 # Writes: `snap_through.png` into `out/`; another folder with `--out`
 
 import argparse

@@ -6,7 +6,7 @@
 # is for illustration, no measurement is reproduced.
 #
 # Run: `python demos/demo_transmission.py`
-# Time: 30 s
+# Time: 1 min
 # Writes: `transmission.png` into `out/`; another folder with `--out`
 
 import argparse

@@ -9,7 +9,7 @@
 # from a geometry, from rest to its speed in the field of gravity.
 #
 # Run: `python demos/demo_whole_turbine.py`
-# Time: 30 s
+# Time: 1 min
 # Writes: `turbine_campbell.png`, `whole_turbine.png` and `whole_turbine.gif` into `out/`; another
 # folder with `--out`
 
