@@ -3,12 +3,10 @@
 import numpy as np
 from scipy.sparse import csr_matrix, identity, kron
 
-from cases.long import MESHED
 from cases.solid import quads_of
 from rom.components.wheels.modes import cyclic_modes
 from rom.components.wheels.sector import CyclicSector
 
-MARKS = MESHED  # of modules on wheels of finite elements
 # of a brick in a grid: its lower corners, then the upper ones
 BRICK = [(*c, s) for s in (0, 1) for c in ((0, 0), (0, 1), (1, 1), (1, 0))]
 

@@ -9,14 +9,15 @@ from numpy.testing import assert_allclose
 from scipy.sparse import csr_matrix
 
 import rom
+from cases.long import MESHED
 from cases.refusals import refuses
-from cases.wheels import MARKS, bladed_model, gathered, response_of, tip_of
+from cases.wheels import bladed_model, gathered, response_of, tip_of
 from rom.components.wheels.blades.substructured_sector import cut, region, root_of
 from rom.eigen.scipy import SciPyOperators
 from rom.eigen.verbs import dofs_of
 from rom.errors import ConfigError, InterfaceError, ModelError
 
-pytestmark = MARKS
+pytestmark = MESHED
 N, ORDER, ZETA = 6, 2, 2e-3
 SIZES = {"cells": (6, 2, 3, 2), "blade": (2, 4)}
 

@@ -7,11 +7,12 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
+from cases.long import MESHED
 from cases.refusals import refuses
-from cases.wheels import MARKS, bladed_model, gathered, ring_frequency
+from cases.wheels import bladed_model, gathered, ring_frequency
 from rom.errors import InterfaceError
 
-pytestmark = MARKS
+pytestmark = MESHED
 N = 6
 SIZES = {"degree": 1, "cells": (4, 2, 2, 2)}
 

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from cases.long import MESHED
 from cases.paths import RANKS, ROOT
 from cases.ranks.environment import on_ranks
-from cases.wheels import MARKS
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 from cases.ranks.sectors_under_mpi import wheel
 from rom.fe.operators.workers import shared_out
 
-pytestmark = [*MARKS, pytest.mark.mpi]
+pytestmark = [*MESHED, pytest.mark.mpi]
 
 
 @pytest.fixture(scope="module", params=[2, 3])

@@ -9,8 +9,9 @@ from scipy.linalg import eig, eigh
 from scipy.sparse import block_diag, csr_matrix, diags, identity
 
 import rom
+from cases.long import MESHED
 from cases.refusals import refuses
-from cases.wheels import MARKS, beam_ring, bladed_model, gathered, mass_ring
+from cases.wheels import beam_ring, bladed_model, gathered, mass_ring
 from rom.components.wheels.rotation import divergence_speed, rotation_matrices
 from rom.components.wheels.sector import CyclicSector
 from rom.errors import ConfigError, ModelError, ModesMissedError
@@ -19,7 +20,7 @@ N, SPEED = 6, 900.0
 ALUMINIUM = rom.Material(E=70e9, nu=0.3, rho=2700.0)
 SIZES = {"degree": 1, "cells": (4, 2, 2, 2), "material": ALUMINIUM}
 needs_fenicsx = pytest.mark.fenicsx
-pytestmark = MARKS[1:]  # of which some have finite elements
+pytestmark = MESHED[1:]  # of which some have finite elements
 
 
 @pytest.mark.parametrize("n", [2, 3, 5])

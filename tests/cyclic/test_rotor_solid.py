@@ -9,12 +9,13 @@ from scipy.optimize import brentq, fsolve
 from scipy.special import iv, ivp, jv, jvp, kv, kvp, yv, yvp
 
 import rom
+from cases.long import MESHED
 from cases.refusals import refuses
-from cases.wheels import MARKS, model_of, revolved_mesh
+from cases.wheels import model_of, revolved_mesh
 from rom.components.transmission import Disc
 from rom.errors import ConfigError, InterfaceError
 
-pytestmark = MARKS
+pytestmark = MESHED
 STEEL = rom.Material(E=211e9, nu=211e9 / (2 * 81.2e9) - 1, rho=7810.0)
 
 

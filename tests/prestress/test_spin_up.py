@@ -8,15 +8,16 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_bvp
 
 import rom
+from cases.long import MESHED
 from cases.refusals import refuses
-from cases.wheels import MARKS, bladed_model
+from cases.wheels import bladed_model
 from rom.components import cosserat
 from rom.components.wheels.prestress.steady_rotation import SteadyRotation
 from rom.components.wheels.prestress.thermal import finite_solid
 from rom.components.wheels.rotation import centrifugal_displacement
 from rom.errors import ConfigError, InterfaceError, ModelError, RomWarning
 
-pytestmark = MARKS
+pytestmark = MESHED
 E, RHO = 70e9, 2700.0
 R, ARC, BEND, B, H = 0.1, 0.5, 60.0, 0.03, 0.004  # of meshes/bent_blade.geo
 UNIT = np.sqrt(E * H**2 / (12 * RHO * ARC**4))  # rad/s of a dimensionless frequency of one

@@ -11,15 +11,16 @@ from scipy.sparse import identity
 from scipy.sparse.linalg import eigsh
 
 import rom
+from cases.long import MESHED
 from cases.refusals import refuses
 from cases.solid import reduced
-from cases.wheels import MARKS, bladed_model, gathered
+from cases.wheels import bladed_model, gathered
 from rom.components.wheels.prestress.thermal import _stressed, _thermal, finite_solid
 from rom.eigen.verbs import rigid_motions
 from rom.eigen.workers import ONE_PROCESS
 from rom.errors import ConfigError, InterfaceError, ModelError
 
-pytestmark = MARKS
+pytestmark = MESHED
 E, RHO, L, B, H, ALPHA = 70e9, 2700.0, 1.0, 0.02, 0.01, 23e-6
 EULER = np.pi**2 * H**2 / (12 * L**2)  # strain at which a pinned column buckles
 ENDS = ("root", "tip")

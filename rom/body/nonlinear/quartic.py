@@ -9,7 +9,6 @@ T3 and T4 are symmetric in all indices, and only entries with i <= j <= k <= l a
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import combinations_with_replacement
 from math import comb
 
 import numpy as np
@@ -103,8 +102,13 @@ class Quartic(Energy):
 
 def entries(r: int, order: int) -> Index:
     """(e, order) indices i <= j <= ... < r of the entries that are kept, last one fastest."""
-    found = combinations_with_replacement(range(r), order)
-    return np.fromiter(found, np.dtype((np.int64, order)), n_entries(r, order))
+    found: Index = np.arange(r)[:, None]
+    for _ in range(order - 1):
+        count = r - found[:, -1]
+        found = np.repeat(found, count, axis=0)
+        further = np.arange(len(found)) - np.repeat(np.cumsum(count) - r, count)
+        found = np.column_stack([found, further])
+    return found
 
 
 def n_entries(r: int, order: int) -> int:
