@@ -106,7 +106,7 @@ def truss(height=0.3, stiffness=1000.0):
 
 @pytest.mark.parametrize("dense", few(1, [500, 0]))
 def test_a_truss_snaps_through_both_limit_points(dense, monkeypatch):
-    monkeypatch.setattr(orbits.equilibria, "MAX_DENSE", dense)
+    monkeypatch.setattr("rom.components.orbits.equilibria.MAX_DENSE", dense)
     mech, top, load = truss()
     path = rom.continuation(mech, (0.0, 100.0))
     z = path.position(top)[:, 2]
@@ -136,7 +136,7 @@ def test_a_path_goes_either_way_and_ends_as_far_behind_its_beginning():
 @pytest.mark.parametrize("dense", few(1, [0, 500]))
 def test_a_crank_longer_than_its_rod_turns_back_at_its_dead_point(dense, monkeypatch):
     """The time of a drive turns back as loads do: at sin(angle) = rod / crank."""
-    monkeypatch.setattr(orbits.equilibria, "MAX_DENSE", dense)
+    monkeypatch.setattr("rom.components.orbits.equilibria.MAX_DENSE", dense)
     mech = rom.Mechanism(gravity=(0, 0, 0))
     solid = {"mass": 1.0, "inertia": (1, 1, 1)}
     crank = on_hinge(mech, X, "crank", **solid, axis=Z)
@@ -204,7 +204,7 @@ def upright(n=16, weak=1.0, stiff=50.0):
 @pytest.mark.parametrize("dense", few(1, [500, 0]))
 def test_eulers_column_and_the_elastica_behind_it(dense, monkeypatch):
     """P / Pcr = (2 K(sin(a / 2)) / pi)^2 at the slope a of the tip."""
-    monkeypatch.setattr(orbits.equilibria, "MAX_DENSE", dense)
+    monkeypatch.setattr("rom.components.orbits.equilibria.MAX_DENSE", dense)
     mech, tip = upright()
     mech.force("load", tip, lambda t: (0, 0, -t))
     path = rom.continuation(mech, (0.0, 3.0))
