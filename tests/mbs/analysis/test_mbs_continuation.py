@@ -9,7 +9,7 @@ import rom
 from cases.long import few
 from cases.mbs.parts import ORIGIN, X, Y, Z, held_rod, on_guide, on_hinge
 from cases.refusals import refuses
-from rom.components import cosserat, orbits
+from rom.components import cosserat
 
 
 def column(mech, name="column", x=0.0, half=1.0):
