@@ -6,7 +6,7 @@
 # are best.
 #
 # Run: `python demos/demo_sheet.py`
-# Time: 1 min
+# Time: 20 s
 # Writes: `sheet.png`, `strip.png` and `taylor_bar.gif` into `out/`; another folder with `--out`
 
 import argparse

@@ -7,7 +7,7 @@
 # arch can leave its symmetric shape.
 #
 # Run: `python demos/demo_snap_through.py`
-# Time: 1 min
+# Time: 20 s
 # Writes: `snap_through.png` into `out/`; another folder with `--out`
 
 import argparse

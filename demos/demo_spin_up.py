@@ -8,7 +8,7 @@
 # base, which is exact: without geometric stiffness the bar no longer runs away, but is wrong.
 #
 # Run: `python demos/demo_spin_up.py`, or under `mpirun -n 2`
-# Time: 1 min
+# Time: 15 s
 # Writes: `spin_up.png` into `out/`; another folder with `--out`
 
 import argparse

@@ -4,7 +4,7 @@
 # the teeth which travel around them, oil films between journals and seats that give way.
 #
 # Run: `python demos/demo_two_stage.py`
-# Time: 1 min
+# Time: 40 s
 # Writes: `two_stage.png` into `out/`; another folder with `--out`
 
 import argparse

@@ -6,7 +6,7 @@
 # the model is condensed to the sensors. The test is simulated, so that the truth is known.
 #
 # Run: `python demos/demo_updating.py`
-# Time: 1 min
+# Time: 10 s
 # Writes: `updating.png` into `out/`; another folder with `--out`
 
 import argparse

@@ -6,7 +6,7 @@
 # The record is simulated with a basis four times as rich, so that the truth is known.
 #
 # Run: `python demos/demo_virtual_sensing.py`
-# Time: 1 min
+# Time: 15 s
 # Writes: `virtual_sensing.png` into `out/`; another folder with `--out`
 
 import argparse

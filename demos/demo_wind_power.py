@@ -7,7 +7,7 @@
 # becomes a solid, meshed and reduced, that carries three bending blades in the wind.
 #
 # Run: `python demos/demo_wind_power.py`
-# Time: 1 min
+# Time: 40 s
 # Writes: `wind_turbine_hub.png` and `wind_power.png` into `out/`; another folder with `--out`
 
 import argparse

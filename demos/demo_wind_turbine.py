@@ -8,7 +8,7 @@
 # solid of cast iron that is meshed and reduced, gives way, too.
 #
 # Run: `python demos/demo_wind_turbine.py`
-# Time: 1 min
+# Time: 30 s
 # Writes: three pictures into `out/`; another folder with `--out`
 
 import argparse
