@@ -162,11 +162,14 @@ except rom.errors.ResourceError as error:
 
 def test_a_disk_that_would_fill_is_named_with_folder_and_size(tmp_path, monkeypatch):
     """MUMPS itself would wait for its writer for ever."""
-    tried: list[float] = []
+    tried, sizes = list[float](), list[int]()
     with monkeypatch.context() as context:
+        context.setattr(disk, "MOST_FILE_BYTES", 1000)
+        context.setattr(disk.os, "posix_fallocate", lambda file, start, size: sizes.append(size))
+        disk.reserve_disk(2500.0, 10, MPI.COMM_SELF)
         context.setattr(disk, "_refusal", lambda size: tried.append(size) or "")
         disk.reserve_disk(3e6, 10, MPI.COMM_SELF)
-    assert tried == [3e6]
+    assert tried == [3e6] and sizes == [1000, 1000, 500]
     monkeypatch.setenv("MUMPS_OOC_TMPDIR", str(tmp_path))
     ran = python("-c", FULL_DISK, timeout=60)
     assert f"GiB on disk and cannot be kept in {tmp_path}: File too large" in ran.stdout, ran.stderr
