@@ -72,6 +72,6 @@ html_sidebars = {"**": ["sidebar-nav-bs"], "index": [], "generated/demos": []}
 html_static_path = ["static"]
 html_css_files = ["site.css"]
 html_math_renderer = "mathml"
-html_search_scorer = "search_scores.js"
+html_search_scorer = str(Path(__file__).with_name("search_scores.js"))
 html_show_sourcelink = False
 html_copy_source = False
