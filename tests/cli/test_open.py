@@ -1,5 +1,6 @@
 """A part that is open in the browser: what is clicked swings, strangers get no answer."""
 
+import errno
 import http.client
 import json
 import re
@@ -88,6 +89,20 @@ def test_what_cannot_be_chosen_is_refused_and_nothing_written(tmp_path, change, 
     part = read_component(chosen.file)
     assert part.material() == rom.Material(70e9, 0.33, 2700.0)
     assert part.mesh[1]["faces"] == {"bore": "7"} and part.kinds.keys() == {"bore"}
+
+
+def test_a_swing_that_cannot_be_started_is_told_and_holds_nothing_up(tmp_path, monkeypatch):
+    def none(command):
+        raise OSError(errno.EAGAIN, "no more processes")
+
+    monkeypatch.setattr(child, "start", none)
+    told, faces = [], {"face 7": {"fixed": False}}
+    chosen = Chosen(tmp_path / "a.step", {}, {}, faces, tmp_path / "a.toml", [])
+    chosen.tell = lambda **event: told.append(event)
+    for _ in range(2):
+        chosen.swing(CHOICE)
+    failed = [event for event in told if event.get("failed")]
+    assert len(failed) == 2 and all("no more processes" in event["ended"] for event in failed)
 
 
 @pytest.mark.fenicsx

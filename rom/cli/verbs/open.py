@@ -151,8 +151,13 @@ class Chosen:
 
         In one thread: the system ends a child with the thread that has started it.
         """
-        process = self.process = child.start(command)
-        started.set()
+        try:
+            process = self.process = child.start(command)
+        except OSError as error:
+            self.tell(ended=f"it cannot be started: {error.strerror}", failed=True)
+            return
+        finally:
+            started.set()
         assert process.stdout is not None and process.stderr is not None
         for line in process.stderr:
             self.tell(line=line.decode(errors="replace").rstrip())
