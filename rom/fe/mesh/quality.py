@@ -104,10 +104,8 @@ def layer_doubt(mesh: SolidMesh, degree: int) -> str:
     thin = slender > limit
     if thin.mean() < THIN_SHARE:
         return ""
-    faces, skin = (
-        faces_of(mesh.cells, mesh.kind, len(mesh.points)),
-        np.zeros(len(mesh.points), bool),
-    )
+    n = len(mesh.points)
+    faces, skin = faces_of(mesh.cells, mesh.kind, n), np.zeros(n, bool)
     skin[faces.corners[faces.count == 1]] = True
     thin &= skin[mesh.corners].all(axis=1)
     volumes, outer = cell_volumes(mesh), faces.of_cell[thin]
