@@ -74,15 +74,6 @@ static int wrong_phase(Instance *x, String what)
     return answer(x, ERROR, message);
 }
 
-static int hexadecimal(char c)
-{
-    if (c >= '0' && c <= '9')
-        return c - '0';
-    if (c >= 'a' && c <= 'f')
-        return c - 'a' + 10;
-    return c >= 'A' && c <= 'F' ? c - 'A' + 10 : -1;
-}
-
 /* file:///a%20b or file:/a%20b -> /a b */
 static char *path_of(String uri)
 {
@@ -94,10 +85,12 @@ static char *path_of(String uri)
     }
     out = path = malloc(strlen(uri) + 1);
     while (path && *uri) {
-        int high = *uri == '%' ? hexadecimal(uri[1]) : -1;
-        int low = high >= 0 ? hexadecimal(uri[2]) : -1;
-        *out++ = low >= 0 ? (char)(16 * high + low) : *uri;
-        uri += low >= 0 ? 3 : 1;
+        int escaped = *uri == '%' && strspn(uri + 1, "0123456789abcdefABCDEF") > 1;
+        char digits[3] = "";
+        if (escaped)
+            memcpy(digits, uri + 1, 2);
+        *out++ = escaped ? (char)strtol(digits, NULL, 16) : *uri;
+        uri += escaped ? 3 : 1;
     }
     if (path)
         *out = 0;
