@@ -97,13 +97,10 @@ class Reader:
                 known = f"Known: + - * / ^ ( ) , {', '.join(self.names)}."
                 self._refuse(at, f"{self.text[at]!r} has no meaning here", known)
             token = Token(str(found.lastgroup), found[0], at)
-            if token.kind == "word":
-                if before.kind == "number":
-                    self._refuse(at, f"a sign is missing between {before.text} and {token.text}")
-                if token.text not in self.names:
-                    self._refuse(at, f"there is no {token.text!r}", nearest(token.text, self.names))
-            elif token.kind == before.kind == "number":
+            if before.kind == "number" and token.kind in ("number", "word"):
                 self._refuse(at, f"a sign is missing between {before.text} and {token.text}")
+            if token.kind == "word" and token.text not in self.names:
+                self._refuse(at, f"there is no {token.text!r}", nearest(token.text, self.names))
             yield token
             at, before = found.end(), token
 
