@@ -23,8 +23,7 @@ from rom.process import stopwatch as watch
 from rom.process.child import scratch
 from rom.report import html
 from rom.report.run import RECORD_FILE, SCENE_FILE, Run, look_of, run, versions
-from rom.report.scene import SHAPE_BYTES, Scene, modes_scene, motion_scene, start_scene
-from rom.report.scene_file import read_scene
+from rom.report.scene import SHAPE_BYTES, Scene, modes_scene, motion_scene, read_scene, start_scene
 from rom.report.viewer import MOTION_WORDS, START_WORDS, figure, modes_words
 from rom.view.figures.curves import frequencies, history
 from rom.view.scenes.film import instants, start
