@@ -132,6 +132,16 @@ class Packed:
         lengths = np.isin(rows.kind, LENGTHS) | np.array(slides, dtype=bool)
         return np.where(lengths, self.length, 1.0)
 
+    @cached_property
+    def unit(self) -> Array:
+        """(n,) motion of each coordinate by one rad, or by the length of the mechanism."""
+        bodies, unit = self.system.bodies, np.ones(self.v.size)
+        for b, (at, r) in enumerate(zip(bodies.v_at, bodies.r, strict=True)):
+            modal = np.diag(bodies.M[bodies.flex[b]])[:r]
+            unit[at : at + 3] = self.length
+            unit[at + 6 : at + 6 + r] = self.length * np.sqrt(bodies.mass[b] / modal)
+        return unit
+
     @property
     def graph(self) -> Graph:
         """How the equations are stored and solved."""
