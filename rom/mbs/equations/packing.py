@@ -21,7 +21,7 @@ from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import GROUND, Marker, Part, moving_start
 from rom.mbs.parts.joints import Joint, Row
 from rom.mbs.parts.signals import Signal, drive_signal
-from rom.model import OWN_FRAME, Array, Index
+from rom.model import Array, Index
 from rom.names import check_known
 
 FAR_JOINTS = 1e4  # sizes from the origin; reactions of a pendulum there miss 2e-5 of its weight
@@ -180,11 +180,6 @@ class Packed:
     def coupled(self) -> list[Sequence[int]]:
         """Groups of bodies that elements couple."""
         return coupled_by(self.elements, self.system.markers.body)
-
-    @property
-    def frames(self) -> list[Marker]:
-        """The further markers of ``seen``."""
-        return [marker for marker in self.markers if marker.place == OWN_FRAME]
 
     def refuse_rolling(self, message: str, hint: str = "") -> None:
         """Refuse joints that roll, naming the first, where positions alone may be bound."""
