@@ -246,7 +246,7 @@ def correct(s, W, step, rank):
         step.lam1[k] += W.dlam[k] / bh2
     size = increment_norm(W, step)
     if step.count[entry.BOTH_LEVELS] == 1:
-        close_gaps(s, W, n, rank, lead)
+        close_gaps(s, W, rank, lead)
         size += increment_norm(W, step)
         for i in range(n):
             step.psi[i] += W.delta[i]
