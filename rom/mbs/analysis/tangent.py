@@ -139,14 +139,12 @@ class Tangent:
     @cached_property
     def _principal(self) -> tuple[Array, Array]:
         """(f,) curvatures and (f, f) their directions."""
-        squares, V = np.linalg.eigh(self.curvature)
-        return squares, V
+        return np.linalg.eigh(self.curvature)
 
     @cached_property
     def _singular(self) -> tuple[Array, Array, Array]:
         """Singular values of the stiffness of the free motions, between forces and motions."""
-        U, s, V = np.linalg.svd(self.Z.T @ self.K @ self.Z)
-        return U, s, V
+        return np.linalg.svd(self.Z.T @ self.K @ self.Z)
 
     def _answered(self, motion: Callable[[Array], Array]) -> tuple[Array, Array]:
         """The joints closed, and the motion (f,) that answers the forces left over (f,)."""

@@ -109,8 +109,7 @@ def pack(contacts: Mapping[str, Contact], places: Places) -> Contacts:
 
 def kept(contacts: "Contacts", memory: Array) -> Array:
     """(n_t,) energy in springs of friction, from what is remembered (n_t, p) [J]."""
-    total: Array = memory[:, contacts.remembered[contacts.remembered >= 0] + STORED].sum(axis=1)
-    return total
+    return memory[:, contacts.remembered[contacts.remembered >= 0] + STORED].sum(axis=1)
 
 
 @inner
