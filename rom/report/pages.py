@@ -97,10 +97,20 @@ def _sentence(body: "rom.body.FlexibleBody") -> str:
     evidence = "carries no certificate"
     if body.certificate is not None:
         evidence = "has a certificate that " + ("holds" if body.certificate.ok else "FAILS")
-    return (
+    return _failing({f"the certificate of {body.name}": body.certificate}) + (
         f"{body.name} is a flexible body of {body.mass:.5g} kg and {1e3 * body.size:.4g} mm, "
         f"reduced{full} to {body.n_modes} elastic coordinates{method}; its frame follows "
         f"{body.reference}. It {evidence}."
+    )
+
+
+def _failing(reports: dict[str, Report | None]) -> str:
+    """What comes before all else where a report does not hold: in how much, and where most."""
+    return "".join(
+        f"Do not rely on this yet: {name} FAILS in {len(report.failures)} of {len(report.rows)} "
+        f"rows, worst is {report.worst.quantity}. "
+        for name, report in reports.items()
+        if report is not None and not report.ok
     )
 
 
@@ -223,7 +233,9 @@ def of_mechanism(
     ]
     header = (BODY_COLUMNS[0], "kind", *BODY_COLUMNS[1:])
     total = sum(part.mass for part in mechanism.parts.values())
-    words = (
+    flexible = {n: p.flexible for n, p in mechanism.parts.items() if p.flexible is not None}
+    judged = {f"the certificate of {name}": body.certificate for name, body in flexible.items()}
+    words = _failing(judged if moved is None else judged | {"the audit": moved.audit}) + (
         f"{file.name} has {len(bodies)} bodies of together {total:.5g} kg and "
         f"{len(mechanism.joints)} joints; gravity is {file.values['gravity']} m/s^2."
     )
@@ -238,7 +250,6 @@ def of_mechanism(
     }
     if moved is not None:
         sections["Motion"] = _motion(moved, look)
-    flexible = {n: p.flexible for n, p in mechanism.parts.items() if p.flexible is not None}
     for name, body in flexible.items():
         shown = [html.paragraph(_sentence(body)), *_mode_figure(body, SHAPE_BYTES // len(flexible))]
         sections[f"Body {name}"] = [*shown, *_frequency_blocks(body), _interface_table(body)]
@@ -298,7 +309,10 @@ def of_run(folder: Path) -> tuple[str, Sections]:
         pictures = {SCENE_FILE: moving} | pictures
     joints = html.table(("joint", "kind"), list(record["joints"].items()), "Joints.")
     sections: Sections = {
-        "What it is": [html.paragraph(words + record["status"]), *pictures.values()],
+        "What it is": [
+            html.paragraph(_failing({"the audit": audit}) + words + record["status"]),
+            *pictures.values(),
+        ],
         "Bodies and joints": [html.table(BODY_COLUMNS, bodies, "Bodies."), joints],
     }
     if events:

@@ -1,64 +1,18 @@
 """Archives of Ansys and meshes of Salome: nodes, shapes, regions, components, materials."""
 
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from cases.files.cells import solid
-from cases.files.damage import changed, damaged, outcome
+from cases.files.archives import archive
+from cases.files.damage import changed
 from cases.refusals import refuses
-from rom.errors import FileFormatError, MeshError, RomError
-from rom.fe.mesh import child
-from rom.fe.mesh.cell_types import DECK_EDGES, READ_TYPES
+from rom.errors import FileFormatError, MeshError
 from rom.fe.mesh.read import read_mesh
 
 FOREIGN = Path(__file__).parents[2] / "reference" / "foreign"
-LAWS = """MPTEMP,R5.0, 1, 1,  0.00000000    ,
-MPDATA,R5.0, 1,EX  ,       1, 1,  210000.000    ,
-MPDATA,R5.0, 1,PRXY,       1, 1, 0.300000000    ,
-MPDATA,R5.0, 1,DENS,       1, 1, 7.850000000E-09,
-MP,EX,2,100000.,  ! by hand
-MP,NUXY,2,0.34
-MP,DENS,2,8.5e-9
-MP,KXX,2,60.,1.,2.
-TB,BISO,2
-TBDATA,1,235.
-"""
-BRICK = (0, 1, 2, 2, 3, 3, 3, 3)  # corners of a tetrahedron drawn as a brick
-TYPES = {"tet4": 285, "tet10": 187, "hex8": 185, "hex20": 186}
-
-
-def archive(kind, *, bricks=False, size=(2.0, 1.0, 1.0)):
-    """Text of a box in mm, with the last cell of another material, and its mesh."""
-    mesh = solid("hex27" if kind == "hex20" else kind, (2, 2, 2), size)
-    type_ = READ_TYPES[kind]
-    edges = type_.among(DECK_EDGES.get(kind, ()))
-    used, cells = np.unique(mesh.cells[:, [*range(type_.n_corners), *edges]], return_inverse=True)
-    points, cells = mesh.points[used], cells.reshape(-1, type_.n_nodes) + 1
-    if bricks:
-        cells = (
-            cells[:, BRICK]
-            if kind == "tet4"
-            else cells[:, [*BRICK, 4, 5, 2, 6, *4 * [3], 7, 8, 9, 9]]
-        )
-    rows = [f"/PREP7\nET,       5,{TYPES[kind] if not bricks else 186}\nET,6,154",
-            f"NBLOCK,6,SOLID,{len(points):9d},{len(points):9d}\n(3i9,6e21.13e3)"]  # fmt: skip
-    for k, x in enumerate(points, 1):
-        row = "".join(f"{v:21.13E}" for v in x)
-        rows.append(f"{k:9d}{0:9d}{0:9d}{row}")
-    rows.append(f"N,R5.3,LOC,       -1,\nEBLOCK,19,SOLID,{len(cells):10d}\n(19i10)")
-    for k, cell in enumerate(cells, 1):
-        head = (1 + (k == len(cells)), 5, 1, 1, 0, 0, 0, 0, len(cell), 0, k)
-        words = [f"{n:10d}" for n in (*head, *cell)]
-        rows += ["".join(words[:19])] + ["".join(words[19:])] * (len(words) > 19)
-    root = np.flatnonzero(points[:, 0] == 0.0) + 1
-    ranges = [root[0], *(-n if n == m + 1 else n for m, n in pairwise(root))]
-    rows.append(f"        -1\nCMBLOCK,ROOT    ,NODE,{len(root):8d}  ! users node component\n(8i10)")
-    rows += ["".join(f"{n:10d}" for n in ranges[k : k + 8]) for k in range(0, len(ranges), 8)]
-    return "\n".join([*rows, LAWS]), mesh
 
 
 @pytest.mark.parametrize(("kind", "bricks"), [
@@ -106,24 +60,6 @@ def test_wedges_and_cells_without_some_middles_are_refused(tmp_path):
     )
     with pytest.raises(MeshError, match=r"\['hex8', 'wedge or pyramid'\]"):
         read_mesh(tmp_path / "a.cdb")
-
-
-def test_damaged_archives_are_refused_or_harmless(tmp_path):
-    path = tmp_path / "x.cdb"
-    path.write_text(archive("tet4")[0])
-
-    def read(path):
-        try:
-            child.read({"reader": "ansys", "path": str(path)})
-        except RomError as error:
-            raise type(error)(error.message, where=str(path)) from error
-
-    assert outcome(read, path) is None
-    data, refused = path.read_bytes(), 0
-    for _, content in damaged(data, np.random.default_rng(5), 100):
-        path.write_bytes(content)
-        refused += outcome(read, path) is not None
-    assert refused > 20
 
 
 def test_a_mesh_of_salome_has_its_groups(tmp_path):
