@@ -70,7 +70,7 @@ def test_a_body_is_described_with_its_numbers(folder):
     assert "FAILS" not in reader.text
     failed = rom.Report("certificate", (rom.model.Row("gap", 2.0, "<= 1", False),))
     _, sections = of_body(replace(body, certificate=failed), [])
-    loud = "this yet: the certificate of bar &lt;1&gt; FAILS in 1 of 1 rows, worst is gap"
+    loud = "this yet: the certificate of bar &lt;1&gt; FAILS, most in gap"
     assert sections["What it is"][0].startswith(f"<p>Do not rely on {loud}")
 
 

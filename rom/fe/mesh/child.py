@@ -32,7 +32,6 @@ from rom.process.memory import total_bytes
 BYTES_PER_MEGABYTE, BYTES_PER_GIGABYTE = 2**20, 1e9
 MESHER_TIME_LIMIT = 1800.0  # [s]
 WRITE_AGAIN = "The file is damaged; write it again."
-DEBIAN = ("gmsh", "h5py")  # has packages of these
 MAX_MEMORY_SHARE = 0.8  # of the memory of the machine, for a mesher
 # LC_ALL: gmsh reads decimal points with the locale of the process
 VARIABLES = {"OMP_NUM_THREADS": "1", "LC_ALL": "C.UTF-8"}
@@ -179,10 +178,9 @@ def read(request: Request) -> Read:
     except (RomError, MemoryError):
         raise
     except ModuleNotFoundError as error:
-        apt = f"On Debian: apt-get install python3-{error.name}; else "
         raise ResourceError(
             f"reading this file needs {error.name}, which is not installed.",
-            hint=f"{apt * (error.name in DEBIAN)}pip install {error.name}.",
+            hint=f"On Debian: apt-get install python3-{error.name}; else pip install {error.name}.",
         ) from error
     except OSError as error:
         if reader not in GEOMETRIES or ".so" not in str(error):

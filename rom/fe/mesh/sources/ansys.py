@@ -54,10 +54,9 @@ class Command:
     place: Place
     rows: list[str] = field(default_factory=list)
 
-    def wrong(self, what: object, row: int = -1) -> FileFormatError:
-        """An error at the command, or at a line of its data."""
-        place = (self.place[0], self.place[1] + row + 1)
-        return FileFormatError(f"{self.name} cannot be read: {what}.", where=at(place))
+    def wrong(self, what: object) -> FileFormatError:
+        """An error at the command."""
+        return FileFormatError(f"{self.name} cannot be read: {what}.", where=at(self.place))
 
     def table(self) -> tuple[str, list[list[str]]]:
         """Kinds of the fields as the first line of data says, and the words of the others."""
@@ -65,9 +64,8 @@ class Command:
             (k, int(w)) for n, k, w in FIELDS.findall(self.rows[0]) for _ in range(int(n or 1))
         ]
         if not found:
-            raise self.wrong(f"{self.rows[0].strip()[:40]!r} is no format", 0)
-        ends = np.cumsum([0, *(width for _, width in found)]).tolist()
-        places = list(pairwise(ends))
+            raise self.wrong(f"{self.rows[0].strip()[:40]!r} is no format")
+        places = list(pairwise(np.cumsum([0, *(width for _, width in found)]).tolist()))
         rows = [[row[a:b].strip() for a, b in places] for row in self.rows[1:]]
         return "".join(kind for kind, _ in found), rows
 
@@ -88,28 +86,26 @@ def read(path: str) -> Read:
     """Read an archive, or refuse what would be lost."""
     deck = Deck()
     for command in _commands(Path(path)):
-        name = command.name
-        if name in TAKEN:
+        if command.name in TAKEN:
             try:
-                TAKEN[name](deck, command)
+                TAKEN[command.name](deck, command)
             except (ValueError, IndexError) as error:
                 raise command.wrong(error) from error
-        elif name in LOST or (name == "EN" and "-1" not in command.fields):
-            deck.unread.add(name, command.place)
+        elif command.name in LOST or (command.name == "EN" and "-1" not in command.fields):
+            deck.unread.add(command.name, command.place)
     deck.unread.refuse()
     shapes = {CELLS.get(len(nodes), "wedge or pyramid") for _, nodes in deck.solids.values()}
     if (cell_type := only_type(shapes)) not in CELLS.values():
         raise MeshError("the cells are wedges or pyramids; tetrahedra or hexahedra are needed.")
     ids, labels = (np.array(list(rows), dtype=np.int64) for rows in (deck.solids, deck.nodes))
-    raw = np.array([nodes for _, nodes in deck.solids.values()], dtype=np.int64)
-    materials = np.array([number for number, _ in deck.solids.values()], dtype=np.int64)
+    materials, raw = map(np.array, zip(*deck.solids.values(), strict=True))
     cells, n = to_gmsh(positions(labels, raw, "node"), cell_type), len(labels)
     sets = {name: positions(labels, np.array(rows), "node") for name, rows in deck.sets.items()}
     facets, remarks = facets_of_nodes(outer_facets(cells, cell_type, n), sets, cell_type, n)
     names = {int(number): f"material_{number}" for number in np.unique(materials)}
     told = {"region_names": names, "warnings": [*remarks, *unused(labels, cells)]}
     told |= {"provenance": {"parameters": {}}} | of_materials(_materials, deck.laws, names)
-    points = np.array(list(deck.nodes.values()))
+    points = np.array([*deck.nodes.values()])
     return packed(points, cells, cell_type, materials, ids, facets=facets, **told)
 
 
@@ -180,28 +176,18 @@ def _cell(nodes: list[int]) -> list[int]:
 
 def _component(deck: Deck, command: Command) -> None:
     """Numbers of nodes; one below zero ends a range that the one before begins."""
-    if command.fields[1].startswith("ELEM"):
+    if command.fields[1] != "NODE":  # of elements, that is
         return
-    if command.fields[1] != "NODE":
-        raise command.wrong(f"it holds neither nodes nor elements, but {command.fields[1]!r}")
     found: list[int] = []
     for number in (whole(word) for row in command.table()[1] for word in row if word):
         found += range(found[-1] + 1, 1 - number) if number < 0 else [number]
     deck.sets[command.fields[0]] = found
 
 
-def _law(deck: Deck, command: Command) -> None:
-    """``MPDATA, R5.0, how many, label, material, place, values`` and ``MP, label, ...`` alike."""
-    if command.name == "MPDATA":
-        fields = command.fields[command.fields[0].startswith("R5") :]
-        command.fields = [*fields[1:3], *fields[4:]]
-    deck.laws.append(command)
-
-
 BLOCKS = ("NBLOCK", "EBLOCK", "CMBLOCK", "ETBLOCK")
 TAKEN: dict[str, Callable[[Deck, Command], None]] = {
     **dict.fromkeys(("ET", "ETBLOCK"), _type),
-    **dict.fromkeys(("MP", "MPDATA", "TB"), _law),
+    **dict.fromkeys(("MP", "MPDATA", "TB"), lambda deck, command: deck.laws.append(command)),
     "NBLOCK": _nodes,
     "EBLOCK": _elements,
     "CMBLOCK": _component,
@@ -213,11 +199,13 @@ def _materials(laws: list[Command], names: dict[int, str]) -> dict[str, list[flo
     unread, found = Unread(), {name: dict[str, float]() for name in names.values()}
     for law in laws:
         try:
-            label, number, values = law.fields[0][:4], whole(law.fields[1]), law.fields[2:]
-            numbers = [] if law.name == "TB" else [real(word) for word in values]
+            label, place, *values = law.fields
+            if law.name == "MPDATA":  # R5.0, how many, label, material, place of the first, values
+                label, place, _, *values = law.fields[1 + label.startswith("R5") :]
+            number, numbers = whole(place), [real(x) for x in values if law.name != "TB"]
         except (ValueError, IndexError) as error:
             raise law.wrong(error) from error
-        label = label.replace("PRXY", "NUXY")  # the same number of an isotropic solid
+        label = label[:4].replace("PRXY", "NUXY")  # the same number of an isotropic solid
         odd = label not in PLASTIC if law.name == "TB" else label in DIRECTED
         if number in names and (odd or (label in ELASTIC and any(numbers[1:]))):
             unread.add(f"{law.name}, {label}", law.place)

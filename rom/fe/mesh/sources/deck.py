@@ -42,9 +42,8 @@ def regions_of(
     names, regions = dict(enumerate(sets or ["body"], 1)), np.full(ids.size, int(not sets))
     for number, (name, rows) in enumerate(sets.items(), 1):
         if (both := rows[regions[rows] > 0]).size:
-            text = (
-                f"element {ids[both[0]]} is in the {what}s {names[regions[both[0]]]!r} and {name!r}"
-            )
+            first = names[regions[both[0]]]
+            text = f"element {ids[both[0]]} is in the {what}s {first!r} and {name!r}"
             raise TagError(f"{text}; give it to only one.")
         regions[rows] = number
     if not regions.all():

@@ -43,10 +43,8 @@ def read(path: str) -> Read:
             text = f"it holds {len(meshes)} meshes, {named(list(meshes))}, and one is read."
             raise FileFormatError(text, hint="Export the mesh of the solid alone.")
         ((name, steps),) = meshes.items()
-        families = file[f"FAS/{name}"]
-        return _mesh(next(iter(steps.values())), {
-            kind: _groups(families.get(kind, {})) for kind in ("ELEME", "NOEUD")
-        })  # fmt: skip
+        groups = {kind: _groups(file[f"FAS/{name}"].get(kind, {})) for kind in ("ELEME", "NOEUD")}
+        return _mesh(next(iter(steps.values())), groups)
 
 
 def _mesh(step: Group, groups: dict[str, dict[int, list[str]]]) -> Read:
@@ -54,8 +52,7 @@ def _mesh(step: Group, groups: dict[str, dict[int, list[str]]]) -> Read:
     blocks = {kind: step["MAI"][kind] for kind in step["MAI"] if kind not in LINES}
     cell_type = only_type(SOLIDS.get(kind, kind) for kind in blocks if kind not in SKINS)
     if cell_type not in SOLIDS.values():
-        text = f"cells of the type {cell_type} are not supported"
-        raise FileFormatError(f"{text}; supported are {named(list(SOLIDS))}.")
+        raise FileFormatError(f"cells are {cell_type}, none of {named(list(SOLIDS))}.")
     (solid,) = (block for kind, block in blocks.items() if kind in SOLIDS)
     cells = to_gmsh(_nodes(solid), cell_type)
     ids = solid["NUM"][()] if "NUM" in solid else np.arange(len(cells)) + 1
@@ -73,10 +70,7 @@ def _mesh(step: Group, groups: dict[str, dict[int, list[str]]]) -> Read:
 
 def _nodes(block: Group) -> Index:
     """(n, k) numbers of the nodes, from zero; stored are all first ones, all second ones, ..."""
-    return (
-        block["NOD"][()].reshape(-1, len(block["NOD"]) // int(block["NOD"].attrs["NBR"]), order="F")
-        - 1
-    )
+    return block["NOD"][()].reshape(-1, int(block["NOD"].attrs["NBR"])).T - 1
 
 
 def _groups(families: Group) -> dict[int, list[str]]:
@@ -84,10 +78,8 @@ def _groups(families: Group) -> dict[int, list[str]]:
     found = {}
     for family in families.values():
         rows = family["GRO/NOM"][()] if "GRO" in family else ()
-        texts = (bytes(row.astype(np.uint8)).partition(b"\0")[0] for row in rows)
-        found[int(family.attrs["NUM"])] = [
-            text.decode("utf-8", "replace").strip() for text in texts
-        ]
+        texts = (bytes(row.astype(np.uint8)).decode("utf-8", "replace") for row in rows)
+        found[int(family.attrs["NUM"])] = [text.partition("\0")[0].strip() for text in texts]
     return found
 
 
