@@ -26,24 +26,6 @@ DEMOS = ROOT / "demos"
 PICTURES = (ROOT / "out", DEMOS)  # what `make pictures` leaves, then those of the README
 THUMBNAILS = Path(__file__).with_name("thumbnails")  # of the demos, by the name of the script
 PICTURE = re.compile(r"\b(\w+\.(?:png|gif))\b")
-CURES = {  # what to do about it, where no single message can tell
-    "ConfigError": "Compare with `rom VERB --help` or the arguments of the function.",
-    "UnknownNameError": "Take one of the names that the message lists.",
-    "ParameterError": "Keep to the range the family was reduced for, or reduce it for a wider one.",
-    "FileFormatError": "Write the file again; bodies are checked whole by `rom check`.",
-    "UnsafeFileError": "Do not open it: a body file holds plain arrays only.",
-    "MeshError": "Look at it with `rom mesh FILE --save mesh.vtu`, repair it where it is named.",
-    "TagError": "Name each interface once, by a physical surface, a node set or `--face`.",
-    "MaterialError": "Give E and rho above zero and nu between -1 and 0.5, in units of the mesh.",
-    "InterfaceError": "Check the name with `rom mesh FILE`; take another kind or more nodes.",
-    "ModelError": "Draw the mechanism as it starts; release the joint that is named.",
-    "SolverError": "Take shorter steps or looser tolerances; see whether the model is held.",
-    "ModesMissedError": "Ask for a few modes more, or solve directly instead of by iteration.",
-    "QualityGateError": "Keep more modes or finer interfaces; the certificate says which row.",
-    "ResourceError": "Use a coarser mesh, another `--solver`, or install what `rom doctor` names.",
-    "ParallelError": "Read the message of the first process that failed.",
-    "InterruptedRun": "Start again; a motion goes on from its checkpoint.",
-}
 
 
 def demo_page(script: Path, pictures: dict[str, Path]) -> str:
@@ -111,14 +93,12 @@ def gallery_page(thumbnails: Path = THUMBNAILS) -> str:
 
 def error_page() -> str:
     """Every error with its exit code, its meaning and what to do, from `rom.errors`."""
-    rows = ["| error | exit code | what it is | what to do |", "|---|---|---|---|"]
+    rows = ["| error | exit code | what it is | if its message has no cure |", "|---|---|---|---|"]
     kinds = [e for e in vars(errors).values() if inspect.isclass(e) and hasattr(e, "exit_code")]
     for kind in sorted(kinds, key=lambda e: e.exit_code):
         if kind is not errors.RomError:
             meaning = " ".join((kind.__doc__ or "").split())
-            rows.append(
-                f"| `{kind.__name__}` | {kind.exit_code} | {meaning} | {CURES[kind.__name__]} |"
-            )
+            rows.append(f"| `{kind.__name__}` | {kind.exit_code} | {meaning} | {kind.advice} |")
     return "\n\n".join([
         "# Errors",
         "Everything raised on purpose is a `rom.RomError`. Its message says what happened, with the"

@@ -10,6 +10,7 @@ import sys
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +36,7 @@ class RomError(Exception):
 
     def __init__(self, message: str, *, where: str = "", hint: str = "", solution: Any = None):
         self.message, self.where = message, where
-        self.hint = hint or self.advice or last_clause(message)
+        self.hint = hint or self.advice or message.strip().replace("; ", ". ").rpartition(". ")[2]
         self.solution = solution
         super().__init__(message, where, hint)
 
@@ -50,12 +51,7 @@ class RomError(Exception):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Rebuild with keywords, so that an error survives a broadcast between ranks."""
-        return _rebuild, (type(self), self.message, self.where, self.hint)
-
-
-def last_clause(message: str) -> str:
-    """What stands behind the last semicolon or full stop within a message, or all of it."""
-    return message.strip().replace("; ", ". ").rpartition(". ")[2]
+        return partial(type(self), where=self.where, hint=self.hint), (self.message,)
 
 
 @contextmanager
@@ -76,10 +72,6 @@ def in_file(path: str | Path) -> Iterator[None]:
     except RomError as error:
         error.where = error.where or str(path)
         raise
-
-
-def _rebuild(kind: type[RomError], message: str, where: str, hint: str) -> RomError:
-    return kind(message, where=where, hint=hint)
 
 
 class ConfigError(RomError):

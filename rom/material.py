@@ -23,6 +23,30 @@ from rom.units import SYSTEMS, UnitSystem, unit_system
 Array = npt.NDArray[np.float64]
 
 
+def _doubt(solid: "Material | Orthotropic") -> str:
+    """What is unusual about the numbers, in a sentence, or nothing.
+
+    Speed of sound or density that no solid has, and the unit system that may be meant.
+    """
+    numbers = f"the solid with E = {solid.E}, rho = {solid.rho:g}"
+    density = STIFF_DENSITY if solid.wave_speed > LIGHT_SPEED else SOLID_DENSITY
+    message = WAVE_SPEED.doubt(solid.wave_speed, numbers) or density.doubt(solid.rho, numbers)
+    if not message and solid.rho > HEAVY_DENSITY:
+        message = HEAVY_SPEED.doubt(solid.wave_speed, numbers)
+    if not message:
+        return ""
+    system = next((name for name, unit in SYSTEMS.items() if _is_stiff(solid, unit)), "")
+    kind = type(solid).__name__
+    cure = f" Units of {system}? {kind}.from_units({system!r}, …), of a deck units={system!r}."
+    return message + cure * bool(system)
+
+
+def _is_stiff(solid: "Material | Orthotropic", unit: UnitSystem) -> bool:
+    """Whether the numbers are those of a metal, mineral or wood in a unit system."""
+    speed, rho = solid.wave_speed * unit.length / unit.time, solid.rho * unit.density
+    return speed > FOAM_SPEED and not (WAVE_SPEED.doubt(speed) or STIFF_DENSITY.doubt(rho))
+
+
 @dataclass(frozen=True, slots=True)
 class Material:
     """Isotropic linear elastic solid; ``Material.steel`` and others of `SOLIDS` are ready made.
@@ -80,18 +104,13 @@ class Material:
         E, rho = (number(name, x, error=MaterialError) for name, x in (("E", E), ("rho", rho)))
         return cls(E * unit.pressure, nu, rho * unit.density)
 
-    @property
-    def doubt(self) -> str:
-        """What is unusual about the numbers, in a sentence, or nothing."""
-        return _solid_doubt(self)
+    doubt = property(_doubt)
 
     @property
     def stiffness(self) -> Array:
         """(6, 6) stiffness [Pa]; rows xx, yy, zz, yz, xz, xy with engineering shear strains."""
-        mu, lam = (
-            self.E / (2 * (1 + self.nu)),
-            self.E * self.nu / ((1 + self.nu) * (1 - 2 * self.nu)),
-        )
+        mu = self.E / (2 * (1 + self.nu))
+        lam = self.E * self.nu / ((1 + self.nu) * (1 - 2 * self.nu))
         C = np.diag([2 * mu] * 3 + [mu] * 3)
         C[:3, :3] += lam
         return C
@@ -180,10 +199,7 @@ class Orthotropic:
         )
         return cls(E, nu, G, rho, **({} if axes is None else {"axes": axes}))
 
-    @property
-    def doubt(self) -> str:
-        """What is unusual about the numbers, in a sentence, or nothing."""
-        return _solid_doubt(self)
+    doubt = property(_doubt)
 
     def _compliance(self) -> Array:
         (E1, E2, E3), (n12, n13, n23), (G12, G13, G23) = self.E, self.nu, self.G
@@ -203,28 +219,6 @@ class Orthotropic:
     def wave_speed(self) -> float:
         """Largest speed of a longitudinal wave in a thin bar [m/s]."""
         return sqrt(max(self.E) / self.rho)
-
-
-def _solid_doubt(solid: Material | Orthotropic) -> str:
-    """Speed of sound or density that no solid has, and the unit system that may be meant."""
-    numbers = f"the solid with E = {solid.E}, rho = {solid.rho:g}"
-    density = STIFF_DENSITY if solid.wave_speed > LIGHT_SPEED else SOLID_DENSITY
-    message = WAVE_SPEED.doubt(solid.wave_speed, numbers) or density.doubt(solid.rho, numbers)
-    if not message and solid.rho > HEAVY_DENSITY:
-        message = HEAVY_SPEED.doubt(solid.wave_speed, numbers)
-    if not message:
-        return ""
-    meant = [name for name, unit in SYSTEMS.items() if _is_stiff(solid, unit)]
-    kind = type(solid).__name__
-    system = meant[0] if meant else ""
-    cure = f" Units of {system}? {kind}.from_units({system!r}, …), of a deck units={system!r}."
-    return message + cure * bool(meant)
-
-
-def _is_stiff(solid: Material | Orthotropic, unit: UnitSystem) -> bool:
-    """Whether the numbers are those of a metal, mineral or wood in a unit system."""
-    speed, rho = solid.wave_speed * unit.length / unit.time, solid.rho * unit.density
-    return speed > FOAM_SPEED and not (WAVE_SPEED.doubt(speed) or STIFF_DENSITY.doubt(rho))
 
 
 PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))  # xx yy zz yz xz xy

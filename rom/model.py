@@ -295,13 +295,11 @@ class Modes:
         return f"{f.size} modes, {f[0]:.5g} to {f[-1]:.5g} Hz"
 
     def _repr_html_(self) -> str:
-        columns, names = [self.frequencies], ["frequency [Hz]"]
-        if self.residual is not None:
-            columns, names = [*columns, self.residual], [*names, "residual"]
-        if self.error is not None:
-            columns, names = [*columns, self.error], [*names, "error below"]
-        rows = zip(range(1, self.omega.size + 1), *columns, strict=True)
-        return html_table(f"Modes: {self._said}", ("mode", *names), rows)
+        told = {"frequency [Hz]": self.frequencies, "residual": self.residual}
+        told |= {"error below": self.error}
+        told = {name: column for name, column in told.items() if column is not None}
+        rows = zip(range(1, self.omega.size + 1), *told.values(), strict=True)
+        return html_table(f"Modes: {self._said}", ("mode", *told), rows)
 
 
 # What a row that fails costs the user, and the cure, by words of its quantity

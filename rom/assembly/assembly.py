@@ -106,8 +106,7 @@ class Assembly:
             (M, K), N = self._matrices(), self._free(fixed)
             omega, V = natural_modes(N.T @ M @ N, N.T @ K @ N, self._n_rigid(fixed))
             self._known[key] = omega, N @ V
-        found: tuple[Array, Array] = self._known[key]
-        return found
+        return self._known[key]
 
     @cached_property
     def _known(self) -> dict[Any, Any]:
@@ -209,8 +208,7 @@ class Assembly:
                 N = still_motions(np.vstack([np.zeros((0, 6 + body.n_modes)), *held]))
                 H, matrices = np.vstack([*self._rows_of(name).values()]), body.full_matrices()
             self._known[key] = partition(*matrices, N, H, self._n_rigid(fixed))
-        found: Partition = self._known[key]
-        return found
+        return self._known[key]
 
     def _interfaces(self) -> Array:
         """(h, n) coordinates of all coupled interfaces."""
@@ -236,8 +234,7 @@ class Assembly:
 
     def _matrices(self) -> tuple[Array, Array]:
         pairs = [body.full_matrices() for body in self.bodies.values()]
-        M, K = (block_diag(*parts) for parts in zip(*pairs, strict=True))
-        return M, K
+        return tuple(block_diag(*parts) for parts in zip(*pairs, strict=True))
 
     def _widths(self) -> dict[str, int]:
         return {name: 6 + body.n_modes for name, body in self.bodies.items()}

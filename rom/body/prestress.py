@@ -16,7 +16,7 @@ import numpy as np
 from rom.body.records import Marker
 from rom.body.recovery import CENTRIFUGAL_LOADS, centrifugal, with_elements
 from rom.body.stiffening import elastic_loads, interface_loads
-from rom.eigen.attachments import carried_displacements
+from rom.eigen.attachments import Carried, carried_displacements
 from rom.eigen.connection import Connection
 from rom.eigen.verbs import (
     Operators,
@@ -24,6 +24,7 @@ from rom.eigen.verbs import (
     given_rigid_motions,
     mean_motion,
     own_points,
+    owned,
     pins,
     rigid_motions,
 )
@@ -31,16 +32,6 @@ from rom.model import Array, FEModel, Index, Interface
 
 Felt = Callable[[Array], Array]  # at points (p, 3), (3 p, k)
 MAX_PAIRS = 3  # of interfaces: each costs the assembly of a matrix
-
-
-@dataclass(frozen=True, slots=True)
-class Carried:
-    """Point masses on an interface: points (p, 3), masses (p,), N (3 p, 3 k) from its dofs."""
-
-    interface: Interface
-    points: Array
-    masses: Array
-    N: Array
 
 
 @dataclass(frozen=True)
@@ -57,10 +48,7 @@ class UnitLoads:
 
     def geometric_stiffness(self, E: Array, markers: dict[str, Marker]) -> dict[str, Array]:
         """{load: (r, r)} of the shapes E (n_local, r) in their mean-axis frame."""
-        carried = [
-            Carried(self.model.interfaces[a.interface], *carried_displacements(a, self.model))
-            for a in self.model.attachments
-        ]
+        carried = [carried_displacements(a, self.model) for a in self.model.attachments]
         of_interfaces = (load for m in markers for load in interface_loads(m))
         names = [*CENTRIFUGAL_LOADS, *of_interfaces, *elastic_loads(E.shape[1])]
         balanced, wrenches = self._balanced(carried, tuple(markers))
@@ -135,9 +123,8 @@ class UnitLoads:
 
     def _add(self, out: Array, interface: Interface, rows: Array) -> None:
         """Add rows of the dofs of an interface to those this process has."""
-        at = interface.dofs - self.mesh.first
-        mine = (at >= 0) & (at < self.mesh.n_local)
-        out[at[mine]] += rows[mine]
+        mine = owned(self.mesh, interface.dofs)
+        out[interface.dofs[mine] - self.mesh.first] += rows[mine]
 
     def _six_dofs(self) -> Index:
         """Six dofs that stop every rigid motion and, as loads are balanced, carry nothing."""

@@ -107,12 +107,9 @@ def canonical_columns(ops: Operators, E: Array, model: FEModel) -> Array:
 
 def carried_integrals(model: FEModel, ops: Operators, E: Array) -> list[InertiaIntegrals]:
     """Integrals of what each attachment carries, under shapes E (n_local, r)."""
-    found = []
-    for attachment in model.attachments:
-        points, masses, N = carried_displacements(attachment, model)
-        dofs = model.interfaces[attachment.interface].dofs
-        found.append(point_integrals(points, masses, N @ ops.rows(E, dofs)))
-    return found
+    carried = (carried_displacements(attachment, model) for attachment in model.attachments)
+    moved = ((c, c.N @ ops.rows(E, c.interface.dofs)) for c in carried)
+    return [point_integrals(c.points, c.masses, shapes) for c, shapes in moved]
 
 
 def _marker(ops: Operators, interface: Interface, tie: Tie, E: Array) -> Marker:

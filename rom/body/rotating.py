@@ -51,8 +51,7 @@ def _held(body: BodyData, rows: Array) -> Array:
     """(h, r) those of some coordinates (h', 6 + r) that its frame does not hold to round-off."""
     rigid = np.abs(rows[:, :6] * np.r_[np.ones(3), np.full(3, 1 / body.size)]).max()
     size = np.linalg.norm(rows[:, 6:] / np.sqrt(np.diag(body.M) / body.mass), axis=1)
-    H: Array = rows[size > 1e-9 * rigid, 6:]
-    return H
+    return rows[size > 1e-9 * rigid, 6:]
 
 
 def rotating_matrices(

@@ -4,13 +4,14 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial import cKDTree
 
 from rom.body.records import BodyData, Surface
 from rom.errors import ConfigError, ModelError
 from rom.model import Array, Index, Mask
 
 Where = Callable[[Array], npt.ArrayLike] | str | None
-COINCIDENT_RTOL = 1e-9  # of the body's size
+COINCIDENT_RTOL = 1e-7  # of the body's size
 GAUGE_RTOL = 0.02  # distance of a strain gauge from the surface, of the body's size
 MAX_TILT = 0.2  # sine of the angle between a strain gauge and the surface; facets of a round one
 
@@ -113,7 +114,5 @@ def _on_interface(body: BodyData, name: str) -> Mask:
     if patch is None:
         text = f"body {body.name!r} has no deformable interface {name!r}"
         raise ConfigError(f"{text}; choose the place by a function of points.")
-    surface = surface_of(body)
-    grid = COINCIDENT_RTOL * max(float(np.ptp(surface.points, axis=0).max()), 1e-300)
-    known = {tuple(x) for x in np.round(patch.points / grid / 100).astype(int)}
-    return np.array([tuple(x) in known for x in np.round(surface.points / grid / 100).astype(int)])
+    points = surface_of(body).points
+    return cKDTree(patch.points).query(points)[0] <= COINCIDENT_RTOL * np.ptp(points, axis=0).max()

@@ -6,7 +6,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.sparse import coo_matrix, csr_matrix
+from scipy.sparse import csr_matrix, identity
 from scipy.spatial import cKDTree
 
 from rom.body.nonlinear.full import TurningSection
@@ -46,20 +46,16 @@ class GluedSolid:
 
     def force(self, u: Array) -> Array:
         """(n,) forces that hold the solid at a displacement (n,) [N]."""
-        f = np.zeros(self.n)
-        for key, solid in self._solids.items():
-            f[self.dofs[key]] += solid.force(u[self.dofs[key]])
-        return f
+        return sum(P.T @ solid.force(P @ u) for _, solid, P in self._parts)
 
     def tangent(self, u: Array) -> csr_matrix:
         """(n, n) derivative of the forces at a displacement (n,) [N/m]."""
-        own = self._solids.items()
-        return self._sum({key: solid.tangent(u[self.dofs[key]]) for key, solid in own})
+        return csr_matrix(sum(P.T @ solid.tangent(P @ u) @ P for _, solid, P in self._parts))
 
     @cached_property
     def M(self) -> csr_matrix:
         """(n, n) mass [kg]."""
-        return self._sum({key: _mass(model) for key, model in self.models.items()})
+        return csr_matrix(sum(P.T @ _mass(model) @ P for model, _, P in self._parts))
 
     def motion(self, load: Load) -> Array:
         """(n,) row of the mean motion of an interface on which a unit load works [1, 1/m]."""
@@ -77,17 +73,11 @@ class GluedSolid:
         return TurningSection.of(interface, self.dofs[key][interface.dofs])
 
     @cached_property
-    def _solids(self) -> dict[str, Any]:
-        return {key: model.stresses.finite_strain() for key, model in self.models.items()}
-
-    def _sum(self, parts: Mapping[str, Matrix]) -> csr_matrix:
-        """(n, n) sum of matrices of the pieces, by their numbers in the whole."""
-        entries = [
-            (self.dofs[key][A.row], self.dofs[key][A.col], A.data)
-            for key, A in ((key, coo_matrix(part)) for key, part in parts.items())
-        ]
-        rows, columns, values = map(np.concatenate, zip(*entries, strict=True))
-        return csr_matrix((values, (rows, columns)), shape=(self.n, self.n))
+    def _parts(self) -> list[tuple[FEModel, Any, csr_matrix]]:
+        """Each piece, itself at finite strain, and the (n_k, n) selection of its dofs."""
+        one = identity(self.n, format="csr")
+        found = ((model, one[self.dofs[key]]) for key, model in self.models.items())
+        return [(model, model.stresses.finite_strain(), P) for model, P in found]
 
 
 def _mass(model: FEModel) -> Matrix:

@@ -151,7 +151,7 @@ def add_geometry(parser: argparse.ArgumentParser) -> None:
 
 def add_file(parser: argparse.ArgumentParser) -> None:
     """The file and its parameters."""
-    parser.add_argument("file", type=Path, help=".geo, .py, .step, .msh, .unv, .inp or .bdf")
+    parser.add_argument("file", type=Path, help=".geo .py .step .msh .unv .med .inp .bdf .cdb")
     about = "parameter of the geometry, e.g. lc=4e-3; may be repeated"
     option(parser, "-p --parameter NAME=VALUE", about, assignment)
     option(parser, "--unite", "connect the solids of a .step file where they touch")

@@ -75,7 +75,7 @@ INTERFACE = Either(Text(), Variants(KINDS))
 TABLE = Table("A component.", (
     Key("name", Text(), "Name of the body; that of the file if missing."),
     Key("geometry", Table("The solid as a geometry or mesh; needs FEniCSx.", (
-        Key("file", file_path, "`.geo`, `.py`, `.step`, `.msh`, `.unv`, `.inp` or `.bdf`.", ...),
+        Key("file", file_path, "`.geo .py .step .msh .unv .med .inp .bdf` or `.cdb`.", ...),
         Key("unit", Text(LENGTHS), "Length unit of its coordinates; a `.step` knows its own.", "m"),
         Key("units", Text(tuple(SYSTEMS)), "Unit system of a deck, with the materials it says; in "
             "place of a unit.", "SI"),

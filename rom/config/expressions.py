@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, NoReturn
 
 from rom.arguments import Quantity
 from rom.config.document import Values
-from rom.config.keys import Key, Named, Place, Table, Text, nearest, read_value, written
+from rom.config.keys import Key, Named, Place, Plain, Table, Text, nearest, read_value, written
 from rom.mbs.elements.formulas.codes import (
     ADD,
     DIV,
@@ -97,13 +97,10 @@ class Reader:
                 known = f"Known: + - * / ^ ( ) , {', '.join(self.names)}."
                 self._refuse(at, f"{self.text[at]!r} has no meaning here", known)
             token = Token(str(found.lastgroup), found[0], at)
-            if token.kind == "word":
-                if before.kind == "number":
-                    self._refuse(at, f"a sign is missing between {before.text} and {token.text}")
-                if token.text not in self.names:
-                    self._refuse(at, f"there is no {token.text!r}", nearest(token.text, self.names))
-            elif token.kind == before.kind == "number":
+            if before.kind == "number" and token.kind in ("number", "word"):
                 self._refuse(at, f"a sign is missing between {before.text} and {token.text}")
+            if token.kind == "word" and token.text not in self.names:
+                self._refuse(at, f"there is no {token.text!r}", nearest(token.text, self.names))
             yield token
             at, before = found.end(), token
 
@@ -196,22 +193,16 @@ def any_quantity(value: object, place: Place) -> Any:
     return read_value(Quantity(unit), value, place)
 
 
-@dataclass(frozen=True, slots=True)
-class UnitName:
-    """A unit of a dimension."""
+def unit_name(unit: str) -> Plain:
+    """How a unit is written of the dimension of an SI unit: how many of these it is."""
 
-    unit: str  # in SI, of the dimension
-
-    @property
-    def summary(self) -> str:
-        """Unit of what."""
-        return f"unit such as {self.unit}"
-
-    def read(self, value: object, place: Place) -> float:
-        """How many SI units it is."""
+    @written(f"unit such as {unit}")
+    def read(value: object, place: Place) -> float:
         text = Text().read(value, place)
         with place.told():
-            return in_si(f"1 {text}", self.unit)
+            return in_si(f"1 {text}", unit)
+
+    return read
 
 
 @dataclass(frozen=True, slots=True)
@@ -245,7 +236,7 @@ def formula_keys(unit: str, variables: tuple[str, ...]) -> tuple[Key, ...]:
     of = ", ".join(f"{name} ({VARIABLE_WORDS[name]})" for name in variables)
     return (
         Key("expression", Text(), f"A formula of {of}, in SI.", ...),
-        Key("unit", UnitName(unit), "Unit of its values; the SI unit if missing."),
+        Key("unit", unit_name(unit), "Unit of its values; the SI unit if missing."),
         Key("constants", Named(any_quantity, "constants"), "Numbers with names, in it by SI."),
     )
 

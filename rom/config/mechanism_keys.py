@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -16,6 +15,7 @@ from rom.config.keys import (
     Kind,
     Named,
     Place,
+    Plain,
     Table,
     Text,
     Variants,
@@ -47,25 +47,17 @@ def marker_name(value: object, place: Place) -> tuple[str, object]:
     )
 
 
-@dataclass(frozen=True, slots=True)
-class Markers:
+def Markers(*, two: bool = False) -> Plain:
     """Markers of any bodies, at least one; or two of different bodies."""
 
-    two: bool = False
-
-    @property
-    def summary(self) -> str:
-        """How they are written."""
-        many = "list of two markers" if self.two else "list of markers"
-        return many + ', each "body.marker" or { body = [x, y, z] }'
-
-    def read(self, value: object, place: Place) -> list[tuple[str, object]]:
-        """All of them."""
-        if not isinstance(value, list) or not value or (self.two and len(value) != 2):
-            place.refuse(
-                value, f": {'two markers are' if self.two else 'a list of markers is'} needed"
-            )
+    @written(f"list of {'two ' * two}markers" + ', each "body.marker" or { body = [x, y, z] }')
+    def read(value: object, place: Place) -> list[tuple[str, object]]:
+        if not isinstance(value, list) or not value or (two and len(value) != 2):
+            needed = "two markers are" if two else "a list of markers is"
+            place.refuse(value, f": {needed} needed")
         return [marker_name.read(item, place) for item in value]
+
+    return read
 
 
 ANGLE = Key("angle", Quantity("rad"), "Angle, right-handed.", ...)

@@ -13,10 +13,12 @@ WHOLE_PATTERN = re.compile(r"[+-]?\d{1,18}", re.ASCII)
 MOST_INCLUDED = 20  # files in files
 Place = tuple[Path, int]  # file and line
 CURES = {  # words of cards that are not read -> what to do instead
-    r"\bR(BE|BAR|ROD)|MPC|COUPLING|EQUATION|TIE|RIGID": "Ties: interfaces={...} makes rigid "
-    "(rbe2) and distributing (rbe3) ones; take them out.",
-    r"CONM|MASS|NSM|INERTIA": "Masses: rom.Attachment adds them to the model; take them out.",
-    r"CBUSH|CELAS|CDAMP|SPRING|DASHPOT": "Springs stand between bodies, in the mechanism.",
+    r"\bR(BE|BAR|ROD)|MPC|COUPLING|EQUATION|TIE|RIGID|\bC[EP]|ET, (17\d|184)\b": "Ties: "
+    "interfaces={...} makes rigid (rbe2) and distributing (rbe3) ones; take them out.",
+    r"CONM|MASS|NSM|INERTIA|ET, 21\b": "Masses: rom.Attachment adds them to the "
+    "model; take them out.",
+    r"CBUSH|CELAS|CDAMP|SPRING|DASHPOT|COMBIN|ET, (14|39|40)\b": "Springs stand between "
+    "bodies, in the mechanism.",
     r"PSHELL|PCOMP|SHELL SECTION": "Shells without this card only name faces of the solid.",
     r"COPY|GEN|FILL|INSTANCE|PART|SYSTEM": "Write all nodes and elements out, in one system.",
 }

@@ -5,13 +5,15 @@ A rigid body has the same kinetic energy as six point masses m/6 on its principa
 and all inertia integrals as six more nodes, with no formula of their own.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.sparse import csr_matrix
 
 from rom.arguments import positive
 from rom.eigen.verbs import coupled, mean_motion, rigid_motions
 from rom.errors import InterfaceError, MaterialError
-from rom.model import Array, Attachment, FEModel
+from rom.model import Array, Attachment, FEModel, Interface
 from rom.names import check_known
 from rom.plausible import REACH, warn_outside
 
@@ -32,8 +34,18 @@ def point_masses(attachment: Attachment, origin: Array) -> tuple[Array, Array]:
     return at + np.vstack([arms.T, -arms.T]), np.full(6, m / 6)
 
 
-def carried_displacements(attachment: Attachment, model: FEModel) -> tuple[Array, Array, Array]:
-    """Points (6, 3), masses (6,) and the map (18, 3k) from interface dofs to their motion."""
+@dataclass(frozen=True, slots=True)
+class Carried:
+    """Point masses on an interface: points (p, 3), masses (p,), N (3 p, 3 k) from its dofs."""
+
+    interface: Interface
+    points: Array
+    masses: Array
+    N: Array
+
+
+def carried_displacements(attachment: Attachment, model: FEModel) -> Carried:
+    """Six point masses, and how they move with the dofs of the interface."""
     name = attachment.interface
     text = f"an attachment names the interface {name!r}; the model has"
     check_known(name, model.interfaces, text, InterfaceError)
@@ -41,7 +53,8 @@ def carried_displacements(attachment: Attachment, model: FEModel) -> tuple[Array
     points, masses = point_masses(attachment, interface.origin)
     reach, size = np.abs(points - interface.origin).max(), np.ptp(model.points, axis=0).max()
     warn_outside(REACH, float(reach / size), f"the attachment on {interface.name!r}")
-    return points, masses, rigid_motions(points - interface.origin) @ mean_motion(interface)
+    N = rigid_motions(points - interface.origin) @ mean_motion(interface)
+    return Carried(interface, points, masses, N)
 
 
 def added_mass(model: FEModel, first: int, n_local: int) -> csr_matrix | None:
@@ -50,7 +63,7 @@ def added_mass(model: FEModel, first: int, n_local: int) -> csr_matrix | None:
         return None
     dM = csr_matrix((n_local, model.n_dofs))
     for attachment in model.attachments:
-        _, masses, N = carried_displacements(attachment, model)
-        block = N.T @ (np.repeat(masses, 3)[:, None] * N)
-        dM = dM + coupled(dM.shape, first, model.interfaces[attachment.interface].dofs, block)
+        c = carried_displacements(attachment, model)
+        block = c.N.T @ (np.repeat(c.masses, 3)[:, None] * c.N)
+        dM = dM + coupled(dM.shape, first, c.interface.dofs, block)
     return dM

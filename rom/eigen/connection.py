@@ -43,8 +43,7 @@ class Connection:
 
     def held(self, fixed: Fixed) -> Index:
         """Dof numbers that are zero when these interfaces are held."""
-        rows = self.held_parts(fixed)
-        return self.boundary[rows]
+        return self.boundary[self.held_parts(fixed)]
 
     def on_springs(self, stiffness: dict[str, Array]) -> "Connection":
         """The model on springs to the ground: {interface: (6, 6)} for its six coordinates."""

@@ -131,5 +131,4 @@ def _point(rigid: Array, first: int) -> Array | None:
     rows = rigid[first : first + 3]
     if rows.shape[0] < 3 or np.abs(rows[:, :3] - np.eye(3)).max() > ROWS_RTOL:
         return None
-    point: Array = np.array([sign * rows[row, column] for row, column, sign in X_Y_Z])
-    return point + 0.0
+    return np.array([sign * rows[row, column] for row, column, sign in X_Y_Z]) + 0.0

@@ -63,20 +63,15 @@ class BlockLanczos:
         hint = "Ask for fewer modes, or check the mesh for cells of extreme shape."
         raise SolverError(f"{self.k} modes did not converge in {MAX_RESTARTS} restarts.", hint=hint)
 
-    def pairs(self) -> tuple[Array, Array]:
-        """The k eigenvalues next to the shift, ascending, and their mass-normalised modes."""
-        theta, S = self._ritz(self.k)
-        return self.sigma + 1.0 / theta, self.V[:, self.n_deflated : self.size - self.width] @ S
-
     def iterated(self) -> tuple[Array, Array]:
-        """The pairs after one more inverse iteration, B V S / theta = V S + W R S_last / theta.
+        """The k eigenvalues next to the shift, ascending, and their mass-normalised modes.
 
-        The last block W has paid for it. Modes stay orthonormal to the square of their residuals.
+        The modes after one more inverse iteration, B V S / theta = V S + W R S_last / theta, for
+        which the last block W has paid. They stay orthonormal to the square of their residuals.
         """
-        lam, Phi = self.pairs()
         theta, S = self._ritz(self.k)
-        last = slice(self.size - self.width, self.size)
-        return lam, Phi + self.V[:, last] @ (self.R @ S[-self.width :] / theta)
+        V, W = np.split(self.V[:, self.n_deflated : self.size], [-self.width], axis=1)
+        return self.sigma + 1.0 / theta, V @ S + W @ (self.R @ S[-self.width :] / theta)
 
     def _append(self, X: Array, MX: Array) -> None:
         new = slice(self.size, self.size + X.shape[1])

@@ -21,8 +21,8 @@ class Factored(Protocol):
         """A^-1 f, (n,), of f (n,), both on all ranks, in units of f over those of A."""
 
 
-class Workers(Protocol):
-    """One process, or ranks that all have the same matrices."""
+class Workers:
+    """One process, by SciPy; ranks that all have the same matrices do the same together."""
 
     def operators(
         self, K: Matrix, M: Matrix, rigid: Array | None = None, *, together: bool = False
@@ -32,12 +32,17 @@ class Workers(Protocol):
         ``rigid`` (n, r) are motions without stiffness; ``together`` ranks share the rows, and all
         of them must ask.
         """
+        return SciPyOperators(K, M, rigid)
 
     def factor(self, A: Matrix, *, pivoting: bool = False) -> Factored | None:
         """A factor that all ranks make together and all must ask; None if A (n, n) is singular.
 
         With ``pivoting``, where its diagonal has zeros, ``definite`` is not known.
         """
+        try:
+            return SymmetricLU(A, pivoting=pivoting)
+        except RuntimeError:
+            return None
 
     def each(
         self, function: Callable[[Item], Value], items: Sequence[Item], costs: Sequence[float]
@@ -47,28 +52,6 @@ class Workers(Protocol):
         Each is found by one rank, so that the function must not wait for others; what it raises is
         raised on all of them. Costs (k,) are the work that each makes, in units of any kind.
         """
-
-
-class OneProcess:
-    """SciPy, and one thing after another."""
-
-    def factor(self, A: Matrix, *, pivoting: bool = False) -> Factored | None:
-        """By SuperLU."""
-        try:
-            return SymmetricLU(A, pivoting=pivoting)
-        except RuntimeError:
-            return None
-
-    def operators(
-        self, K: Matrix, M: Matrix, rigid: Array | None = None, *, together: bool = False
-    ) -> Searched:
-        """The verbs by SciPy."""
-        return SciPyOperators(K, M, rigid)
-
-    def each(
-        self, function: Callable[[Item], Value], items: Sequence[Item], costs: Sequence[float]
-    ) -> list[Value]:
-        """Value after value."""
         return [function(item) for item in items]
 
 
@@ -78,8 +61,7 @@ def held_solution(workers: Workers, matrices: tuple[Matrix, ...], held: Index, f
     Of the matrices (n, n), stiffness and mass, the second tells a motion that nothing holds.
     """
     ops = workers.operators(*matrices, together=True)
-    solution: Array = every_row(ops, ops.hold(held)(own_rows(ops, f[:, None])))[:, 0]
-    return solution
+    return every_row(ops, ops.hold(held)(own_rows(ops, f[:, None])))[:, 0]
 
 
-ONE_PROCESS = OneProcess()
+ONE_PROCESS = Workers()

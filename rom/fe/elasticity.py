@@ -56,8 +56,8 @@ def model(
     """Finite element model of the solid in a geometry or mesh file.
 
     Args:
-        path: ``.geo``, ``.py``, ``.step``, ``.msh``, ``.unv``, ``.inp`` or ``.bdf``, see
-            `rom.fe.mesh.read.read_mesh`.
+        path: ``.geo``, ``.py``, ``.step``, ``.msh``, ``.unv``, ``.med``, ``.inp``, ``.bdf`` or
+            ``.cdb``, see `rom.fe.mesh.read.read_mesh`.
         material: `Material`, `Orthotropic`, or {region name: material}; needless where a deck says
             its own, whose place it takes.
         degree: polynomial degree of the displacement, 1 to 3; 2 unless you know better.

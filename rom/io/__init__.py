@@ -2,8 +2,8 @@
 
 `native` is the file of a body, an `archive`, as is all that stands for `bodies`; `export` picks one
 of `programs`, `sid`, `matrices`, `fields` or `fmu` by name, `history` writes motions. `files` are
-written whole, `ours` says which may be replaced and keeps a folder for one run, `hdf5` loads h5py
-beside dolfinx.
+written whole, by h5py beside dolfinx too, `ours` says which may be replaced and keeps a folder for
+one run.
 """
 
 from rom.lazy import front

@@ -22,7 +22,7 @@ MATRIX_ADVICE = (
     "rom.read_model reads stiffness and mass with their nodes; rom.reduce makes a body of it."
 )
 READER_ADVICE = {  # ending: what reads such a file
-    **dict.fromkeys((".geo", ".msh", ".step", ".stp", ".brep", ".inp", ".bdf", ".py"), MESH_ADVICE),
+    **dict.fromkeys(".geo .msh .step .stp .brep .inp .bdf .cdb .med .py".split(), MESH_ADVICE),
     **dict.fromkeys(
         (".op4", ".mtx", ".mm", ".pch", ".dmig", ".dat", ".sti", ".mas"), MATRIX_ADVICE
     ),

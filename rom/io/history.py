@@ -10,8 +10,7 @@ import numpy as np
 
 from rom.arguments import AnySolution, typed, whole
 from rom.errors import ConfigError
-from rom.io.files import check_writable, library, write_whole
-from rom.io.hdf5 import h5py
+from rom.io.files import check_writable, h5py, library, write_whole
 from rom.model import Array
 from rom.names import csv_cell, offered
 

@@ -32,19 +32,15 @@ class Problem(Protocol):
 
     def corrections(self, at: Any, p: float) -> tuple[Array, Array]:
         """(k,) Newton's correction at the same p, and (k,) change of the solution per p."""
-        ...
 
     def moved(self, at: Any, step: Array, p: float) -> Any:
         """The solution after a change (k,)."""
-        ...
 
     def inner(self, a: Array, b: Array) -> float:
         """Product of two changes; a change of size one is the longest of which one speaks."""
-        ...
 
     def size(self, step: Array) -> float:
         """Largest part of a change, one for what linear equations cannot describe."""
-        ...
 
 
 @dataclass(frozen=True)

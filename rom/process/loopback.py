@@ -122,15 +122,16 @@ class _Handler(BaseHTTPRequestHandler):
     def _answer(
         self, code: int, body: bytes = b"", kind: str = "text/plain; charset=utf-8"
     ) -> None:
-        self.send_response(code)
-        for name, value in (
-            HEADERS | {"Content-Type": kind, "Content-Length": str(len(body))}
-        ).items():
-            self.send_header(name, value)
-        if code != 200:  # what is left of a request that was not read is no other request
-            self.send_header("Connection", "close")
-        self.end_headers()
+        # what is left of a request that was not read is no other request
+        close = {"Connection": "close"} if code != 200 else {}
+        self._head(code, {"Content-Type": kind, "Content-Length": str(len(body))} | close)
         self.wfile.write(body)
+
+    def _head(self, code: int, more: dict[str, str]) -> None:
+        self.send_response(code)
+        for name, value in (HEADERS | more).items():
+            self.send_header(name, value)
+        self.end_headers()
 
     def _events(self) -> None:
         """All events so far and those to come, to one page at a time."""
@@ -143,10 +144,7 @@ class _Handler(BaseHTTPRequestHandler):
         self.close_connection = True
         try:
             with suppress(OSError):
-                self.send_response(200)
-                for name, value in (HEADERS | {"Content-Type": "text/event-stream"}).items():
-                    self.send_header(name, value)
-                self.end_headers()
+                self._head(200, {"Content-Type": "text/event-stream"})
                 self._stream()
         finally:
             server.left, server.reader = time.monotonic(), None

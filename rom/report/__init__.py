@@ -2,8 +2,8 @@
 
 `html` writes them, `pages` fills them for bodies, for files and for motions, `run` moves what a
 mechanism file describes and keeps it in a folder. `viewer` makes the figures that turn, from what
-`scene` takes of a body or a motion, `coarse` makes small and `scene_file` keeps with a run.
-`pieces` sets those of a solid, welded in a mechanism, beside the whole.
+`scene` takes of a body or a motion and keeps with a run, and `coarse` makes small. `pieces` sets
+those of a solid, welded in a mechanism, beside the whole.
 """
 
 from rom.lazy import front

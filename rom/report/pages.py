@@ -23,8 +23,7 @@ from rom.process import stopwatch as watch
 from rom.process.child import scratch
 from rom.report import html
 from rom.report.run import RECORD_FILE, SCENE_FILE, Run, look_of, run, versions
-from rom.report.scene import SHAPE_BYTES, Scene, modes_scene, motion_scene, start_scene
-from rom.report.scene_file import read_scene
+from rom.report.scene import SHAPE_BYTES, Scene, modes_scene, motion_scene, read_scene, start_scene
 from rom.report.viewer import MOTION_WORDS, START_WORDS, figure, modes_words
 from rom.view.figures.curves import frequencies, history
 from rom.view.scenes.film import instants, start
@@ -98,11 +97,18 @@ def _sentence(body: "rom.body.FlexibleBody") -> str:
     evidence = "carries no certificate"
     if body.certificate is not None:
         evidence = "has a certificate that " + ("holds" if body.certificate.ok else "FAILS")
-    return (
+    return _failing({f"the certificate of {body.name}": body.certificate}) + (
         f"{body.name} is a flexible body of {body.mass:.5g} kg and {1e3 * body.size:.4g} mm, "
         f"reduced{full} to {body.n_modes} elastic coordinates{method}; its frame follows "
         f"{body.reference}. It {evidence}."
     )
+
+
+def _failing(reports: dict[str, Report | None]) -> str:
+    """What comes before all else where a report does not hold, and where most."""
+    bad = {name: x.worst.quantity for name, x in reports.items() if x is not None and not x.ok}
+    words = "Do not rely on this yet: {} FAILS, most in {}. "
+    return "".join(words.format(*x) for x in bad.items())
 
 
 def _method_words(reduction: Told) -> str:
@@ -224,7 +230,9 @@ def of_mechanism(
     ]
     header = (BODY_COLUMNS[0], "kind", *BODY_COLUMNS[1:])
     total = sum(part.mass for part in mechanism.parts.values())
-    words = (
+    flexible = {n: p.flexible for n, p in mechanism.parts.items() if p.flexible is not None}
+    judged = {f"the certificate of {name}": body.certificate for name, body in flexible.items()}
+    words = _failing(judged if moved is None else judged | {"the audit": moved.audit}) + (
         f"{file.name} has {len(bodies)} bodies of together {total:.5g} kg and "
         f"{len(mechanism.joints)} joints; gravity is {file.values['gravity']} m/s^2."
     )
@@ -239,7 +247,6 @@ def of_mechanism(
     }
     if moved is not None:
         sections["Motion"] = _motion(moved, look)
-    flexible = {n: p.flexible for n, p in mechanism.parts.items() if p.flexible is not None}
     for name, body in flexible.items():
         shown = [html.paragraph(_sentence(body)), *_mode_figure(body, SHAPE_BYTES // len(flexible))]
         sections[f"Body {name}"] = [*shown, *_frequency_blocks(body), _interface_table(body)]
@@ -299,7 +306,10 @@ def of_run(folder: Path) -> tuple[str, Sections]:
         pictures = {SCENE_FILE: moving} | pictures
     joints = html.table(("joint", "kind"), list(record["joints"].items()), "Joints.")
     sections: Sections = {
-        "What it is": [html.paragraph(words + record["status"]), *pictures.values()],
+        "What it is": [
+            html.paragraph(_failing({"the audit": audit}) + words + record["status"]),
+            *pictures.values(),
+        ],
         "Bodies and joints": [html.table(BODY_COLUMNS, bodies, "Bodies."), joints],
     }
     if events:

@@ -74,8 +74,7 @@ class Run:
 
     def write(self, folder: Path) -> None:
         """Write its files, pictures last, so that the motion is there whatever becomes of them."""
-        from rom.report.scene import motion_scene
-        from rom.report.scene_file import write_scene
+        from rom.report.scene import motion_scene, write_scene
 
         paths = paths_of(self.file, folder)
         self.write_motion(paths)

@@ -496,7 +496,6 @@
     choose(k) {
       const mode = this.data.modes[k], body = this.bodies[0];
       this.modes.value = k;
-      this.mode = mode;
       this.q = mode.q || body.shapes.map((_, j) => (j === mode.coordinate ? 1 : 0));
       body.displace(this.q, mode.rigid);
       body.lengths();

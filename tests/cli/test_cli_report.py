@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from cases.files.reports import read
 from cases.files.toml_files import laid_out
 from cases.solid import block, reduced
 from rom.cli.main import main
+from rom.report.pages import of_body
 
 ADDRESS, XML_NAME = re.compile(r"[a-z]*://[^\s\"'<]*"), "http://www.w3.org/1999/xhtml"
 
@@ -66,6 +68,10 @@ def test_a_body_is_described_with_its_numbers(folder):
         "rom report rod.rom.npz -o r.html", rom.__version__, "CraigBampton", "asymmetry of K",
         "has a certificate that holds")  # fmt: skip
     assert "FAILS" not in reader.text
+    failed = rom.Report("certificate", (rom.model.Row("gap", 2.0, "<= 1", False),))
+    _, sections = of_body(replace(body, certificate=failed), [])
+    loud = "this yet: the certificate of bar &lt;1&gt; FAILS, most in gap"
+    assert sections["What it is"][0].startswith(f"<p>Do not rely on {loud}")
 
 
 def test_inertia_is_that_about_the_mass_centre(bare):

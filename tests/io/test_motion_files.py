@@ -18,7 +18,7 @@ from cases.solid import block, reduced
 from rom.errors import ConfigError, ResourceError
 from rom.io.fields.gltf import upright
 from rom.io.fields.vtkhdf import write_vtkhdf
-from rom.io.hdf5 import h5py
+from rom.io.files import h5py
 from rom.io.history import quoted
 from rom.rotation import matrix
 
@@ -33,13 +33,13 @@ from mpi4py import MPI
 import dolfinx, numpy, sys
 from dolfinx.io import XDMFFile
 from rom.io.fields.vtkhdf import write_vtkhdf
-import rom.io.hdf5
+import rom.io.files
 cube = dolfinx.mesh.create_unit_cube(MPI.COMM_WORLD, 1, 1, 1)
 with XDMFFile(MPI.COMM_WORLD, "cube.xdmf", "w") as file:
     file.write_mesh(cube)
 corners = numpy.array([[[0.0, 0, 0], [1, 0, 0], [0, 2, 0]]])
 write_vtkhdf(corners, numpy.array([[0, 1, 2]]), [0.0], "corner.vtkhdf", fields={})
-open_file = rom.io.hdf5.h5py("").File
+open_file = rom.io.files.h5py("").File
 with open_file("corner.vtkhdf") as file, open_file("cube.h5") as cube:
     sys.stdout.write(f"{file['VTKHDF/Points'][:].tolist()} {cube['Mesh/mesh/geometry'].shape}")
 """

@@ -41,7 +41,7 @@ fe.operators: solver memory disk aij foreseen factor substructures spectrum iter
   petsc
 fe.mesh: cell_types topology picks cad solid sources child curving quality repair validate cut read
   summary input_deck
-io: files hdf5 archive native fields matrices sid programs fmu bodies history export ours
+io: files archive native fields matrices sid programs fmu bodies history export ours
 mbs: compiler kernels parts connections elements mechanism equations results integrate analysis
 mbs.analysis: local_equations rotors few_modes tangent equilibrium linearize campbell
   response steady_motion sensitivity inverse_dynamics law_check

@@ -17,7 +17,7 @@ from cases.refusals import refuses
 from cases.solid import block
 from rom import report
 from rom.report import coarse, scene
-from rom.report.scene_file import read_scene, write_scene
+from rom.report.scene import read_scene, write_scene
 from rom.view.canvas.scene import sharp_edges
 from rom.view.canvas.solids import ellipsoid
 

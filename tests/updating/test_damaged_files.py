@@ -13,6 +13,7 @@ from cases.paths import TESTS
 from cases.refusals import refuses
 from rom.components.updating.frf_data import noisy
 from rom.errors import FileFormatError, RomError, RomWarning
+from rom.io.files import h5py
 from rom.updating import Channels
 
 HERE = TESTS / "reference" / "foreign"
@@ -213,7 +214,7 @@ def other(file, name, value, without_checksum=False):
 def test_what_is_wrong_in_hdf5_is_named(words, whole, tmp_path):
     path = tmp_path / "x.h5"
     path.write_bytes(whole)
-    with rom.io.hdf5.h5py("").File(path, "r+") as file:
+    with h5py("").File(path, "r+") as file:
         CHANGES[words](file)
     refuses(FileFormatError, words, rom.io.read_responses, path)
 
@@ -223,8 +224,8 @@ def test_hdf5_of_another_program_is_read(whole, tmp_path):
     path, there = tmp_path / "x.h5", tmp_path / "whole.h5"
     there.write_bytes(whole)
     test = rom.io.read_responses(there)
-    h5py = rom.io.hdf5.h5py("")
-    with h5py.File(there, "r") as file, h5py.File(path, "w") as new:
+    open_file = h5py("").File
+    with open_file(there, "r") as file, open_file(path, "w") as new:
         for name in ("frequencies", "H", "coherence", "sensors", "inputs"):
             file.copy(name, new)
         new.attrs.update({"averages": 20, "quantity": "displacement", "units": "SI"})

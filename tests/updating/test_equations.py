@@ -91,8 +91,8 @@ def test_equations_find_what_they_find_on_dense_matrices(family, model, sign):
 def test_condensed_matrices_have_the_derivatives_of_a_complex_step(family, model):
     x = np.array([0.2, -0.1, 0.15])
     here = small(family, model)
-    basis = np.hstack([np.linalg.pinv(here.seen), null_space(here.seen)])
-    found, n_s = AtSensors(in_sensors(here, x, np.ones(3, bool))).at(x), len(here.seen)
+    basis = np.hstack([np.linalg.pinv(here.sensors), null_space(here.sensors)])
+    found, n_s = AtSensors(in_sensors(here, x, np.ones(3, bool))).at(x), len(here.sensors)
 
     def condensed(x):
         k, m = (np.prod(np.exp(x) ** p, axis=1) for p in (here.k_powers, here.m_powers))

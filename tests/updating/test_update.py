@@ -60,7 +60,7 @@ def summed(model, x, amount=1.0):
 
 def logarithmic(model, x, ratios, omega):
     """d ln H by all unknowns: gradients of residuals of one value, real and imaginary."""
-    shape = (omega.size, len(model.seen), len(model.driven))
+    shape = (omega.size, len(model.sensors), len(model.driven))
     out = np.zeros((*shape, x.size + ratios.size), dtype=complex)
     log = np.log(responses_at(model, x, ratios, omega))
     for at in np.ndindex(shape):
@@ -106,7 +106,7 @@ def test_derivatives_are_those_of_a_complex_step(family):
             K, M = summed(model, x + 1e-30j * (np.arange(5) == j), model.amount)
         else:
             K, M = summed(model, x, model.amount + 1e-30j * (model.amount == 0))
-        parts = [model.seen @ np.linalg.solve(K - w**2 * M, model.driven.T) for w in omega]
+        parts = [model.sensors @ np.linalg.solve(K - w**2 * M, model.driven.T) for w in omega]
         expected = np.array(parts).imag / 1e-30
         assert_allclose(by_x[..., j].real, expected, atol=1e-10 * np.abs(expected).max())
 
@@ -117,7 +117,7 @@ def test_derivatives_with_damping_are_those_of_the_square_root(family):
     omega, x = 2 * np.pi * np.array([33.0, 260.0, 900.0]), np.array([0.2, -0.3, 0.1])
     K, M = summed(model, x)
     V = eigh(K, M)[1]  # mass-normalised coordinates: numbers of equal size
-    K, M, S, F = V.T @ K @ V, V.T @ M @ V, model.seen @ V, model.driven @ V
+    K, M, S, F = V.T @ K @ V, V.T @ M @ V, model.sensors @ V, model.driven @ V
     X = sqrtm(np.linalg.solve(M, K))
     found = logarithmic(model, x, np.full(2, zeta), omega)
     H = damped(K, M, zeta, omega, S, F)

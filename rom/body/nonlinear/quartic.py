@@ -9,6 +9,7 @@ T3 and T4 are symmetric in all indices, and only entries with i <= j <= k <= l a
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain, combinations_with_replacement
 from math import comb
 
 import numpy as np
@@ -102,13 +103,8 @@ class Quartic(Energy):
 
 def entries(r: int, order: int) -> Index:
     """(e, order) indices i <= j <= ... < r of the entries that are kept, last one fastest."""
-    found: Index = np.arange(r)[:, None]
-    for _ in range(order - 1):
-        count = r - found[:, -1]
-        found = np.repeat(found, count, axis=0)
-        further = np.arange(len(found)) - np.repeat(np.cumsum(count) - r, count)
-        found = np.column_stack([found, further])
-    return found
+    every = chain.from_iterable(combinations_with_replacement(range(r), order))
+    return np.fromiter(every, dtype=np.int64).reshape(-1, order)
 
 
 def n_entries(r: int, order: int) -> int:
@@ -128,7 +124,4 @@ def position(indices: Index, r: int) -> Index:
 
 def pair_numbers(r: int) -> Index:
     """(r, r) number of each pair among those with j <= k."""
-    number = np.empty((r, r), dtype=np.int64)
-    j, k = np.triu_indices(r)
-    number[j, k] = number[k, j] = np.arange(j.size)
-    return number
+    return position(np.moveaxis(np.indices((r, r)), 0, -1), r)

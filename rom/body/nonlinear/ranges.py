@@ -10,7 +10,7 @@ import numpy as np
 from rom.arguments import Between, Count, Modes, finite, typed
 from rom.body.recovery import CENTRIFUGAL_LOADS, PRODUCTS, centrifugal
 from rom.eigen.supports import DIRECTIONS, Fixed, supports
-from rom.eigen.verbs import Operators, mean_motion, own_points
+from rom.eigen.verbs import Operators, mean_motion, own_points, owned
 from rom.errors import ConfigError
 from rom.model import Array, FEModel
 
@@ -155,9 +155,9 @@ def nodal_forces(loads: list[Load], model: FEModel, ops: Operators, about: Array
             F[:, k] = field[:, load.component]
             continue
         interface = model.interfaces[load.interface]
-        at = interface.dofs - ops.first
-        mine = (at >= 0) & (at < ops.n_local)
-        F[at[mine], k] = load.largest * mean_motion(interface)[load.component, mine]
+        mine = owned(ops, interface.dofs)
+        at = interface.dofs[mine] - ops.first
+        F[at, k] = load.largest * mean_motion(interface)[load.component, mine]
     turning = [k for k, load in enumerate(loads) if not load.interface]
     if turning:
         F[:, turning] = ops.apply_M(F[:, turning]) * [loads[k].largest for k in turning]

@@ -34,6 +34,8 @@ OTHERS = (  # endings; words of which a line begins with one, if need be; what i
     (".msh", "$MESHFORMAT", "a mesh of gmsh", *MESHED),
     (".bdf .nas .dat .fem", "CTETRA CHEXA INCLUDE", "a deck of Nastran", *DECK),
     (".inp", "*ELEMENT *INCLUDE", "a deck of Abaqus or CalculiX", *DECK),
+    (".cdb", "ET NBLOCK", "an archive of Ansys", *DECK),
+    (".med", "", "a mesh of Salome", *MESHED),
     (".bdf .dat .pch .dmig", "DMIG", *MATRIX),
     (".op4 .mtx .mm .sti .mas", "", *MATRIX),
     (".unv", "-1/2412", "a mesh of another program", *MESHED),

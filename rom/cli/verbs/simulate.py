@@ -214,8 +214,7 @@ def _pendulum(args: argparse.Namespace) -> Answer:
         audit = rom.audit(solution)
 
     def write() -> None:
-        from rom.report.scene import motion_scene
-        from rom.report.scene_file import write_scene
+        from rom.report.scene import motion_scene, write_scene
 
         with _finishing(args, keep):
             _write_motion(path, tables, body, solution)

@@ -273,8 +273,7 @@ def _write(
 ) -> None:
     from rom.report.pages import of_body, of_run
     from rom.report.run import RECORD_FILE, SCENE_FILE, Record
-    from rom.report.scene import motion_scene
-    from rom.report.scene_file import write_scene
+    from rom.report.scene import motion_scene, write_scene
 
     rom.save(body, files[".rom.npz"])
     rom.write_history(solution, files[TABLE_FILE])

@@ -21,6 +21,7 @@ from rom.model import Array
 SCHEMA_NAME = "rom-family"
 VERSION = (1, 1)  # counts like that of the body file
 INTEGRALS = InertiaIntegrals.__slots__
+STRETCH = ("axis", "regions", "layers")  # of a manifest; its rigid motions are an array
 Damping = Rayleigh | ModalDamping
 Entry = dict[str, Any]  # of a manifest: names, numbers and lists, as JSON has them
 
@@ -44,7 +45,7 @@ def save(family: BodyFamily, path: str | Path) -> Path:
         "shares": [{"region": s.region, "fixed": s.fixed} for s in family.shares],
         "frame": family.reference,
         "damping": damping,
-        "stretch": None if stretch is None else _layers(stretch),
+        "stretch": None if stretch is None else {name: getattr(stretch, name) for name in STRETCH},
         "provenance": family.provenance,
         "certificate": None if family.certificate is None else asdict(family.certificate),
     }
@@ -67,11 +68,6 @@ def load(manifest: Entry, arrays: dict[str, Array], body: FlexibleBody, path: Pa
         )
     _verify(family, path)
     return family
-
-
-def _layers(stretch: Stretch) -> Entry:
-    layers = [[list(ends) for ends in layers] for layers in stretch.layers]
-    return {"axis": stretch.axis, "regions": list(stretch.regions), "layers": layers}
 
 
 def _stretch(entry: Entry | None, arrays: dict[str, Array]) -> Stretch | None:

@@ -25,7 +25,7 @@ from rom.errors import ConfigError
 from rom.mbs.elements.family import Family, Places, integers, rows_of
 from rom.mbs.kernels.algebra import add, cross, dot, row, scale, sub, turn
 from rom.mbs.kernels.compiled import inner
-from rom.mbs.kernels.coordinates import clear_tangent, followed_angle, place_tangent
+from rom.mbs.kernels.coordinates import followed_angle, place_tangent
 from rom.mbs.kernels.element_calls import energy, residuals, tangents
 from rom.mbs.kernels.tables import Array2, Index1, Scratch1, Scratch2, Scratch3, Table, table
 from rom.mbs.parts.bodies import Marker
@@ -147,7 +147,7 @@ def bearing_tangents(s, W, bearings, _lam, ck, cc):
     bearings; that of the whole bearing is left out, as displacements are small against its radius.
     """
     for k in range(bearings.i.size):
-        clear_tangent(bearings.tangent)
+        bearings.tangent[:] = 0.0
         frame = ring_frame(s, W, bearings, k)
         for ball in range(bearings.count[k]):
             place = ball_depth(W, bearings, k, ball, frame)

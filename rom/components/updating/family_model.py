@@ -240,7 +240,7 @@ class FamilyModel:
     M: Array  # (n_t, n, n) terms of the mass
     k_powers: Array  # (n_t, n_p) one where a parameter multiplies a term of the stiffness
     m_powers: Array  # (n_t, n_p) likewise of the mass
-    seen: Array  # (n_s, n) rows of the sensors
+    sensors: Array  # (n_s, n) rows that give the displacements
     driven: Array  # (n_e, n) rows of the inputs
     names: tuple[str, ...]  # of the parameters
     low: Array  # (n_p,) smallest factors
@@ -265,11 +265,6 @@ class FamilyModel:
         """(n_p,) smallest and largest logarithms of factors."""
         return np.log(self.low), np.log(self.high)
 
-    @property
-    def sensors(self) -> Array:
-        """The rows ``seen``, as a `SensorModel` calls them."""
-        return self.seen
-
     def labels(self, m: int) -> tuple[str, ...]:
         """Names of the parameters and of m damping ratios."""
         return (*self.names, *(f"zeta {k + 1}" for k in range(m)))
@@ -278,7 +273,7 @@ class FamilyModel:
         """The model at logarithms x (n_p,) of the factors, with the derivatives by them."""
         K, dK = summed(self.K, self.k_powers, x, self.amount)
         M, dM = summed(self.M, self.m_powers, x, self.amount)
-        return ParametricModel(K, M, dK, dM, self.seen, self.n_rigid)
+        return ParametricModel(K, M, dK, dM, self.sensors, self.n_rigid)
 
     def modal(self, here: ParametricModel, ratios: Array) -> Modal:
         """Modes of the model at some factors; the last damping ratio is that of all others too."""
@@ -293,7 +288,7 @@ class FamilyModel:
         lam = self.elastic(x)
         return min(int(np.count_nonzero(lam < (BAND_RATIO * highest) ** 2)) + 1, lam.size)
 
-    def reduced(self, T: Array, free: Index | Mask, x: Array, seen: Array) -> "FamilyModel":
+    def reduced(self, T: Array, free: Index | Mask, x: Array, sensors: Array) -> "FamilyModel":
         """The same in coordinates T (n, r), of parameters that stay free, others kept at x (n_p,).
 
         Rows of the sensors are given as (n_s, r).
@@ -302,11 +297,11 @@ class FamilyModel:
         kept[free] = 0.0
         K = (T.T @ self.K @ T) * np.exp(self.k_powers @ kept)[:, None, None]
         M = (T.T @ self.M @ T) * np.exp(self.m_powers @ kept)[:, None, None]
-        small = replace(self, K=K, M=M, seen=seen, driven=self.driven @ T, motions=self.motions @ T)
+        small = replace(self, K=K, M=M, sensors=sensors, driven=self.driven @ T)
         names = tuple(np.array(self.names)[free].tolist())
         k_powers, m_powers = self.k_powers[:, free], self.m_powers[:, free]
         small = replace(small, names=names, low=self.low[free], high=self.high[free])
-        return replace(small, k_powers=k_powers, m_powers=m_powers)
+        return replace(small, k_powers=k_powers, m_powers=m_powers, motions=self.motions @ T)
 
 
 def summed(
@@ -356,7 +351,7 @@ def family_model(
         M=N.T @ M @ N,
         k_powers=k_powers,
         m_powers=m_powers,
-        seen=rows[0] @ N,
+        sensors=rows[0] @ N,
         driven=rows[1] @ N,
         names=tuple(known),
         low=np.array([p.low for p in known.values()]),

@@ -96,7 +96,7 @@ def responses_at(model: FamilyModel, x: Array, ratios: Array, omega: Array) -> C
     Damping ratios (m,) are those of the lowest elastic modes, the last one of all others too [1].
     """
     modes = model.modal(model.at(x), ratios)
-    return receptance(model.seen @ modes.Phi, modes.g(omega), model.driven @ modes.Phi)
+    return receptance(model.sensors @ modes.Phi, modes.g(omega), model.driven @ modes.Phi)
 
 
 def sensitivity(
@@ -176,7 +176,7 @@ def in_sensors(model: FamilyModel, x: Array, free: Mask) -> FamilyModel:
 
     Of logarithms x (n_p,) of factors those that are not sought stay.
     """
-    S = model.seen
+    S = model.sensors
     R, order = qr(S.T, mode="r", pivoting=True)
     size = np.abs(np.diag(R))
     if (rank := int(np.count_nonzero(size > SENSOR_RTOL * size[0]))) < len(S):
@@ -208,7 +208,7 @@ def by_equations(
     lines = _whole_lines(data)
     inputs, signs = _collocated(model)
     m = int(np.count_nonzero(model.elastic(x) <= data.omega[lines[-1]] ** 2))
-    n_s, needed = len(model.seen), m + model.n_rigid
+    n_s, needed = len(model.sensors), m + model.n_rigid
     if n_s < needed:
         raise ConfigError(
             f"{n_s} sensors for {needed} modes up to the highest line, rigid ones included: "
@@ -248,7 +248,7 @@ def by_response_functions(
         (1989), chapter 8.
     """
     used = data.lines(_whole_lines(data))
-    inside, n_s = in_sensors(model, x, free), len(model.seen)
+    inside, n_s = in_sensors(model, x, free), len(model.sensors)
     F = inside.driven.T
 
     def triangle(x: Array, ratios: Array) -> Array:
@@ -289,7 +289,7 @@ def _collocated(model: FamilyModel) -> tuple[tuple[int, ...], Array]:
     found = []
     for k, row in enumerate(model.driven):
         signs = np.array([1.0, -1.0])[:, None]
-        off = np.linalg.norm(model.seen[None] - signs[..., None] * row, axis=2)
+        off = np.linalg.norm(model.sensors[None] - signs[..., None] * row, axis=2)
         sign, sensor = np.unravel_index(off.argmin(), off.shape)
         if off.min() > COLLOCATED_RTOL * np.linalg.norm(row):
             raise ConfigError(

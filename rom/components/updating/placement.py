@@ -263,7 +263,7 @@ def place(  # noqa: PLR0913  keywords of one call
 def _largest(model: FamilyModel, omega: Array, damping: float, order: int) -> float:
     """Largest response at factors of one, a derivative of this order [1/N]."""
     x = np.clip(np.zeros(len(model.names)), *model.ends)
-    lines = max(1, BLOCK_VALUES // (len(model.seen) * len(model.driven)))
+    lines = max(1, BLOCK_VALUES // (len(model.sensors) * len(model.driven)))
     sizes = []
     for w in (omega[block] for block in blocks(omega.size, lines)):
         size = np.abs(responses_at(model, x, np.array([damping]), w)).max(axis=(1, 2))
@@ -279,7 +279,7 @@ def _information(
     x = np.clip(np.zeros(len(model.names)), *model.ends)
     m = model.n_ratios(x, omega.max())
     at, n = sensitivity(model, x, np.full(m, damping)), x.size + m
-    n_s, n_e = len(model.seen), len(model.driven)
+    n_s, n_e = len(model.sensors), len(model.driven)
     told, size = np.zeros((n_s, n_e, n, n)), np.zeros((n_s, n_e))
     lines = max(1, BLOCK_VALUES // (n_s * n_e * n))
     for w in (omega[block] for block in blocks(omega.size, lines)):

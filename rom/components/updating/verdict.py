@@ -167,7 +167,7 @@ class Updated:
             channels.rows(Parts.of(self.family).bodies, what) @ self.model.motions
             for channels, what in ((sensors, "sensor"), (inputs, "input"))
         )
-        model = replace(self.model, seen=seen, driven=driven)
+        model = replace(self.model, sensors=seen, driven=driven)
         x = self.logarithms
         unknown = [model.labels(self.zeta.size).index(name) for name in self.names]
         theta = np.tile(np.r_[x, np.log(self.zeta)], (n, 1))

@@ -234,13 +234,6 @@ def sector_certificate(small: CyclicSector, full: CyclicSector) -> Report:
     return Report("certificate of the sector", tuple(chain.from_iterable(found)))
 
 
-def wheel_certificate(frequencies: Array, full: CyclicSector) -> Report:
-    """Frequencies [Hz] of a wheel of equal blades, ascending, against the full sector."""
-    return Report(
-        "certificate of the wheel", tuple(rows_of_wheel("equal blades", frequencies, full))
-    )
-
-
 def rows_of_wheel(what: str, found: Array, sector: CyclicSector, speed: float = 0.0) -> list[Row]:
     """The lowest frequencies of a wheel against the union of those of its sector."""
     exact, complete = [], np.inf

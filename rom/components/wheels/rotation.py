@@ -127,7 +127,11 @@ def largest_ratio(C: csr_matrix, K: csr_matrix) -> float:
     C (n, n) is symmetric or Hermitian, and so is K, which must be positive definite.
     """
     if K.shape[0] <= MAX_DENSE_DOFS:
-        return max(_largest(C.toarray(), K.toarray()), 0.0)
+        try:
+            return max(float(eigh(C.toarray(), K.toarray(), eigvals_only=True)[-1]), 0.0)
+        except LinAlgError as error:
+            text = "nothing holds the wheel, even at rest: see fixed= and rom.supported_sector."
+            raise ModelError(text) from error
     inverse = LinearOperator(K.shape, matvec=splu(K.tocsc()).solve, dtype=K.dtype)
     start = np.sin(1.0 + np.arange(K.shape[0])).astype(K.dtype)
     how = {"Minv": inverse, "v0": start, "return_eigenvectors": False}
@@ -137,14 +141,6 @@ def largest_ratio(C: csr_matrix, K: csr_matrix) -> float:
     # where none is positive they crowd at zero, which has no relative accuracy; one has
     most = float(eigsh(C / size + K, 1, K, which="LA", tol=EIGENVECTOR_RTOL, **how)[0]) - 1.0
     return most * size if most > NONE_POSITIVE else 0.0
-
-
-def _largest(C: Array, K: Array) -> float:
-    try:
-        return float(eigh(C, K, eigvals_only=True)[-1])
-    except LinAlgError as error:
-        text = "nothing holds the wheel, even at rest: see fixed= and rom.supported_sector."
-        raise ModelError(text) from error
 
 
 @typed

@@ -172,7 +172,7 @@ def read(request: Request) -> Read:
     """Arrays and notes of the mesh a request asks for, in the form of `packed`, in the child."""
     reader = request["reader"]
     try:
-        if reader in ("abaqus", "nastran"):  # only its own libraries are loaded
+        if reader in ("abaqus", "nastran", "ansys", "med"):  # only its own libraries are loaded
             return import_module(f"rom.fe.mesh.sources.{reader}").read(request["path"])
         return import_module("rom.fe.mesh.sources.gmsh_session").run(request)
     except (RomError, MemoryError):

@@ -59,7 +59,10 @@ READERS = {
     ".nas": "nastran",
     ".dat": "nastran",
     ".fem": "nastran",
+    ".cdb": "ansys",
+    ".med": "med",
 }
+DECKS = ("abaqus", "nastran", "ansys")  # may say what regions are made of
 
 
 @typed
@@ -82,8 +85,8 @@ def read_mesh(  # noqa: PLR0913  limits and trust beside what is read
 
     Args:
         path: ``.geo`` gmsh geometry; ``.py`` file with ``build(gmsh, **parameters)``; ``.step``;
-            ``.msh`` 2.2 or 4.1; ``.unv`` with groups of elements; Abaqus ``.inp``; Nastran
-            ``.bdf``.
+            ``.msh`` 2.2 or 4.1; ``.unv`` and ``.med`` with groups; Abaqus ``.inp``; Nastran
+            ``.bdf``; Ansys ``.cdb``.
         parameters: named values for a geometry: those with ``Name`` in a ``.geo``, the arguments of
             ``build``, or ``lc`` (element size [m]) for ``.step``.
         faces: surfaces to name in a ``.step``: a face number, a point (3) near the face, a box (6)
@@ -292,7 +295,7 @@ def _request(
     reader = READERS.get(path.suffix.lower())
     if reader is None:
         text = f"no reader for the suffix {path.suffix!r}; known are {sorted(READERS)}."
-        hint = "Export the mesh with its named surfaces as .unv, .msh, .bdf or .inp."
+        hint = "Export the mesh with its named surfaces as .msh, .med, .unv, .inp, .bdf or .cdb."
         raise ConfigError(text, hint=hint)
     request: Request = {
         "path": str(path.absolute()),
@@ -317,7 +320,7 @@ def is_geometry(path: str | Path) -> bool:
 
 def is_deck(path: str | Path) -> bool:
     """Whether a file may say what its regions are made of."""
-    return READERS.get(Path(path).suffix.lower()) in INCLUDES
+    return READERS.get(Path(path).suffix.lower()) in DECKS
 
 
 def _check_request(request: Request, scale: float) -> None:

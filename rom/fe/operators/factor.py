@@ -208,8 +208,9 @@ def dense_rows(A: PETSc.Mat, X: Array) -> Array:
     """A X for (n_local, k) rows."""
     if X.shape[1] == 0:
         return np.zeros((A.getLocalSize()[0], 0))
-    if not np.diff(A.getOwnershipRangesColumn()).all():
-        return _column_by_column(A, X)
+    if not np.diff(A.getOwnershipRangesColumn()).all():  # on which matMult of PETSc 3.25 crashes
+        x, y = A.createVecs()
+        return _column_by_column(A.mult, x, y, X)
     B = dense(X, A)
     Y = A.matMult(B)
     out = Y.getDenseArray().copy(order="F")
@@ -220,20 +221,16 @@ def dense_rows(A: PETSc.Mat, X: Array) -> Array:
 def transposed_rows(A: PETSc.Mat, F: Array) -> Array:
     """A^T F for (n_local, k) rows."""
     x, y = A.createVecs()
-    out = np.zeros((x.getLocalSize(), F.shape[1]))
-    for k, column in enumerate(F.T):
-        y.array[:] = column
-        A.multTranspose(y, x)
-        out[:, k] = x.array
-    return out
+    return _column_by_column(A.multTranspose, y, x, F)
 
 
-def _column_by_column(A: PETSc.Mat, X: Array) -> Array:
-    """A X where a rank owns no column of A, on which matMult of PETSc 3.25 crashes."""
-    out = np.empty((A.getLocalSize()[0], X.shape[1]))
-    x, y = A.createVecs()
+def _column_by_column(
+    multiply: Callable[[PETSc.Vec, PETSc.Vec], None], x: PETSc.Vec, y: PETSc.Vec, X: Array
+) -> Array:
+    """(n_local, k) products with the columns of X, each given as x and found as y."""
+    out = np.empty((y.getLocalSize(), X.shape[1]))
     for k, column in enumerate(X.T):
         x.array[:] = column
-        A.mult(x, y)
+        multiply(x, y)
         out[:, k] = y.array
     return out

@@ -26,10 +26,9 @@ class Solver:
 
 
 DIRECT_SOLVER = Solver()
-ITERATIVE_SOLVER = Solver(iterative=True)
 WHOLE_WORDS = {
     "direct": DIRECT_SOLVER,
-    "iterative": ITERATIVE_SOLVER,
+    "iterative": Solver(iterative=True),
     "auto": Solver(automatic=True),
 }
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any
 
 from mpi4py import MPI
 
@@ -10,18 +10,17 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from rom.eigen.scipy import SciPyOperators
+from rom.eigen.verbs import Value
+from rom.eigen.workers import Item, Workers
 from rom.fe.operators.aij import aij
 from rom.fe.operators.factor import Factor
 from rom.fe.operators.memory import collect
 from rom.fe.parallel import collective
 from rom.model import Array, Index
 
-Item = TypeVar("Item")
-Value = TypeVar("Value")
-
 
 @dataclass(frozen=True)
-class AllRanks:
+class AllRanks(Workers):
     """The `rom.eigen.workers.Workers` of finite elements: MUMPS, each matrix by one rank."""
 
     n_ranks: int  # that have the matrices; tasks are shared where these are all there are

@@ -147,11 +147,9 @@ def _dataset(data: bytes, place: int, kind: str, head: list[bytes]) -> tuple[int
 
 def _function(lines: list[str], values: Array, spacing: int, parts: int) -> Function:
     dof, form = lines[5], lines[6]
-    x = (
-        values[:, 0]
-        if spacing == 0
-        else float(form[30:43]) + np.arange(len(values)) * float(form[43:56])
-    )
+    x = values[:, 0]
+    if spacing != 0:
+        x = float(form[30:43]) + np.arange(len(values)) * float(form[43:56])
     y = values[:, -1] if parts == 1 else values[:, -2] + 1j * values[:, -1]
     return Function(
         kind=int(dof[:5]),

@@ -10,8 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from rom.io.fields.vtu import VTK_TRIANGLE
-from rom.io.files import write_whole
-from rom.io.hdf5 import h5py
+from rom.io.files import h5py, write_whole
 from rom.model import Array, Index
 from rom.names import ORIGIN_MARK
 

@@ -64,7 +64,7 @@ def write_body_fmu(body: FlexibleBody, path: str | Path, *, fixed: tuple[str, ..
     first = omega[omega > 0.0][:1] / (2 * np.pi)
     step = 1.0 / (STEPS_PER_PERIOD * float(first[0])) if first.size else 1e-3
     about = f"Small motions of the flexible body {path.stem}, inputs held over a step."
-    headers, tables = ("states.h",), _tables(body, omega, V)
+    headers, tables = ("shared.h",), _tables(body, omega, V)
     return write_archive(
         path, Content(path.stem, about, _variables(body), step, "linear.c", headers, tables)
     )

@@ -58,7 +58,7 @@ def interface_form(body: FlexibleBody) -> InterfaceForm:
     n_b = 6 * len(names)
     labels = np.r_[np.repeat(np.arange(len(names)) + 1, 6), FIRST_SCALAR + np.arange(omega.size)]
     components = np.r_[np.tile(np.arange(1, 7), len(names)), np.zeros(omega.size, dtype=int)]
-    A, B, C = (_projected(X, T) for X in (K, M, D))
+    A, B, C = (0.5 * (X + X.T) for X in (T.T @ Y @ T for Y in (K, M, D)))
     A[:n_b, n_b:], A[n_b:, :n_b] = 0.0, 0.0  # by the choice of the coordinates
     points = {k + 1: body.marker(name).point for k, name in enumerate(names)}
     return InterfaceForm(A, B, C, np.column_stack([labels, components]), points, names, omega)
@@ -83,8 +83,3 @@ def _coordinates(body: FlexibleBody, H: Array, K: Array, M: Array) -> tuple[Arra
     held = N @ V
     static = particular - held @ solve(np.diag(lam), held.T @ K @ particular)
     return np.hstack([static, held]), np.sqrt(lam)
-
-
-def _projected(A: Array, T: Array) -> Array:
-    B = T.T @ A @ T
-    return 0.5 * (B + B.T)

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
+from scipy.integrate import cumulative_trapezoid
 
 from rom.arguments import Ascending, typed
 from rom.errors import ModelError, reached
@@ -101,8 +102,8 @@ def _solution(
     def rows(name: str) -> Array:
         return np.array([getattr(state, name) for state in states])
 
-    t, work = rows("t"), np.zeros_like(powers)
-    work[1:] = np.cumsum(0.5 * np.diff(t)[:, None] * (powers[1:] + powers[:-1]), axis=0)
+    t = rows("t")
+    work = cumulative_trapezoid(powers, t, axis=0, initial=0.0)
     statistics = {"steps": t.size - 1, "rank": states[0].rank, "closed": states[0].closed}
     status = f"Prescribed from t = {t[0]:g} s to {t[-1]:g} s."
     q, v, a, lam = (rows(name) for name in ("q", "v", "a", "lam"))

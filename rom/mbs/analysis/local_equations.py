@@ -163,20 +163,12 @@ class Instant:
 
     def rate(self, state: State) -> float:
         """Speed of the mechanism in radians, or in its sizes, per second [1/s]."""
-        size = self.probe() / DIFFERENCE_STEP
-        v, a = np.abs(state.v) / size, np.abs(state.a) / size
+        v, a = np.abs(state.v) / self.packed.unit, np.abs(state.a) / self.packed.unit
         return float(max(v.max(initial=0.0), np.sqrt(a.max(initial=0.0))))
 
     def probe(self) -> Array:
         """(n,) small motion of each coordinate for differences."""
-        bodies, length = self.packed.system.bodies, self.packed.length
-        step = np.full(self.packed.v.size, DIFFERENCE_STEP)
-        for b, at in enumerate(bodies.v_at):
-            r, mass = bodies.r[b], bodies.mass[b]
-            step[at : at + 3] *= length
-            modal = np.diag(bodies.M[bodies.flex[b]])[:r]
-            step[at + 6 : at + 6 + r] *= length * np.sqrt(mass / modal)
-        return step
+        return DIFFERENCE_STEP * self.packed.unit
 
 
 def difference(f: Callable[[Array], Array | float], step: Array) -> Array:

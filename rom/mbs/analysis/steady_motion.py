@@ -8,13 +8,7 @@ from scipy.linalg import null_space
 
 from rom.arguments import typed
 from rom.errors import SolverError, warn
-from rom.mbs.analysis.local_equations import (
-    DIFFERENCE_STEP,
-    Instant,
-    consistent,
-    difference,
-    instant,
-)
+from rom.mbs.analysis.local_equations import Instant, consistent, difference, instant
 from rom.mbs.analysis.rotors.moving_axes import chosen, small_motions
 from rom.mbs.integrate.consistent_start import with_accelerations
 from rom.mbs.kernels.system import ROLL
@@ -93,9 +87,8 @@ def steady_motion(
     now = instant(mechanism, (0.0 if state is None else state.t) if t is None else t)
     axes = chosen(frame, now.packed.names)
     state = consistent(now, state, assemble)
-    size = now.probe() / DIFFERENCE_STEP
     rate = now.rate(state) or 1.0
-    both = np.concatenate([size, size * rate])
+    both = np.concatenate([now.packed.unit, now.packed.unit * rate])
     motions = tuple(T.toarray() for T in small_motions(now.packed, state, axes))
     A = _first_order(now, state, motions, rate) * both / both[:, None]
     B = _bound(now, state, motions) * both

@@ -139,14 +139,12 @@ class Tangent:
     @cached_property
     def _principal(self) -> tuple[Array, Array]:
         """(f,) curvatures and (f, f) their directions."""
-        squares, V = np.linalg.eigh(self.curvature)
-        return squares, V
+        return np.linalg.eigh(self.curvature)
 
     @cached_property
     def _singular(self) -> tuple[Array, Array, Array]:
         """Singular values of the stiffness of the free motions, between forces and motions."""
-        U, s, V = np.linalg.svd(self.Z.T @ self.K @ self.Z)
-        return U, s, V
+        return np.linalg.svd(self.Z.T @ self.K @ self.Z)
 
     def _answered(self, motion: Callable[[Array], Array]) -> tuple[Array, Array]:
         """The joints closed, and the motion (f,) that answers the forces left over (f,)."""
@@ -312,14 +310,11 @@ def faint_force(now: Instant, pull: float) -> float:
 
 def sizes(packed: Packed, step: Array) -> tuple[float, float]:
     """Size of a correction, in rad or lengths of the mechanism, and the share of it to be taken."""
-    bodies, at = packed.system.bodies, packed.system.bodies.v_at[:, None] + np.arange(3)
-    turns = np.linalg.norm(step[at + 3], axis=1)
-    shifts = [float(np.linalg.norm(step[at], axis=1).max()) / packed.length]
-    for b in np.flatnonzero(bodies.r):
-        first, r = bodies.v_at[b] + 6, bodies.r[b]
-        modal = np.diag(bodies.M[bodies.flex[b]])[:r]
-        bend = step[first : first + r] * np.sqrt(modal / bodies.mass[b])
-        shifts.append(float(np.linalg.norm(bend)) / packed.length)
-    turn, shift = max(turns), max(shifts)
+    bodies, x = packed.system.bodies, step / packed.unit
+    at = bodies.v_at[:, None] + np.arange(3)
+    flexible = ((bodies.v_at[b] + 6, bodies.r[b]) for b in np.flatnonzero(bodies.r))
+    bends = [np.linalg.norm(x[first : first + r]) for first, r in flexible]
+    turn, shift = (np.linalg.norm(x[some], axis=1).max() for some in (at + 3, at))
+    shift = max([shift, *bends])
     share = 1 / max(1.0, turn / MAX_ROTATION, shift / MAX_DISPLACEMENT)
     return float(max(turn, shift)), float(share)

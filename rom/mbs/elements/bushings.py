@@ -17,6 +17,7 @@ from scipy.interpolate import PchipInterpolator
 from rom import rotation
 from rom.arguments import Number, Orientation, ascending, finite, one_of, unit_quaternion
 from rom.errors import ConfigError
+from rom.mbs.connections.ends import ends_of
 from rom.mbs.elements.family import Family, Hooks, Places, integers, rows_of
 from rom.mbs.kernels.algebra import (
     add,
@@ -89,15 +90,12 @@ def bushing(  # noqa: PLR0913  one keyword per property
     Raises:
         ConfigError: for matrices without an energy, or tables that do not ascend.
     """
-    self.check_apart(name, m1, m2)
-    world = rotation.matrix(unit_quaternion(axes))
-    A1, A2 = (rotation.matrix(self.part(m.body).p) for m in (m1, m2))
-    gap = self.design_point(m2) - self.design_point(m1)
+    ends, world = ends_of(self, name, m1, m2), rotation.matrix(unit_quaternion(axes))
     K = _matrix66(f"stiffness of {name}", stiffness)
     C = _matrix66(f"damping of {name}", np.zeros(6) if damping is None else damping)
     tables = tuple(_curve(name, *item) for item in (curves or {}).items())
-    frames = (A1.T @ world, A2.T @ world)
-    self.add(name, Bushing(m1, m2, frames, world.T @ gap, K, C, tables), BUSHINGS_FAMILY)
+    one, two = (A.T @ world for A in ends.frames)
+    self.add(name, Bushing(m1, m2, (one, two), world.T @ ends.gap, K, C, tables), BUSHINGS_FAMILY)
 
 
 def _matrix66(name: str, value: npt.ArrayLike) -> Array:

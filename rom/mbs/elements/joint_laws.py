@@ -122,12 +122,7 @@ class Friction:
 
     joint: str
     row: Row
-    numbers: tuple[float, ...]
-
-    @property
-    def laws(self) -> tuple[tuple[float, ...], ...]:
-        """The same, as of all forces along joint coordinates."""
-        return (self.numbers,)
+    laws: tuple[tuple[float, ...], ...]
 
 
 def friction(  # noqa: PLR0913  one keyword per property
@@ -178,7 +173,7 @@ def friction(  # noqa: PLR0913  one keyword per property
             raise ConfigError(f"friction {name!r} {fault}.")
     level, fade = mu * (1.0 if radius is None else radius), stribeck_speed or 1.0
     numbers = (coulomb, level, static - 1.0, fade, viscous, transition_speed)
-    self.add(name, Friction(joint, row, numbers), FRICTIONS_FAMILY)
+    self.add(name, Friction(joint, row, (numbers,)), FRICTIONS_FAMILY)
 
 
 BY_LOAD = {

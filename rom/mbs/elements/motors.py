@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numba
 import numpy as np
@@ -25,11 +26,7 @@ class Motor:
     law: Callable[[float, float, float], float]
     compiled: Entry | None
     every: float | None = None  # from one sample to the next [s]
-
-    @property
-    def laws(self) -> tuple[tuple[float, ...], ...]:
-        """One, without numbers."""
-        return ((),)
+    laws: ClassVar[tuple[tuple[float, ...], ...]] = ((),)  # one, without numbers
 
     @property
     def address(self) -> int:

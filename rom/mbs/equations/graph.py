@@ -10,6 +10,7 @@ multipliers are not determined.
 """
 
 import heapq
+from collections import Counter
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -32,13 +33,13 @@ class Group(NamedTuple):
     couples: bool
 
 
-def forest(groups: list[Group], n_bodies: int) -> tuple[list[int], list[int]]:
+def forest(groups: list[Group], n_bodies: int) -> tuple[list[int], list[int], list[int]]:
     """Trees along joints of two bodies, breadth first, from all bodies joined to the ground.
 
-    Of each body the one towards the root, -1 for roots, and the group towards the root or the
-    ground, -1 for a free root.
+    Of each body the one towards the root, -1 for roots, the group towards the root or the ground,
+    -1 for a free root, and how many bodies lie on the way to the root.
     """
-    parent, joint = [-1] * n_bodies, [-1] * n_bodies
+    parent, joint, depth = [-1] * n_bodies, [-1] * n_bodies, [0] * n_bodies
     edges: list[list[tuple[int, int]]] = [[] for _ in range(n_bodies)]
     grounded: dict[int, int] = {}
     for g, group in enumerate(groups):
@@ -57,9 +58,9 @@ def forest(groups: list[Group], n_bodies: int) -> tuple[list[int], list[int]]:
             for b, g in edges[a]:
                 if b not in reached:
                     reached.add(b)
-                    parent[b], joint[b] = a, g
+                    parent[b], joint[b], depth[b] = a, g, depth[a] + 1
                     queue.append(b)
-    return parent, joint
+    return parent, joint, depth
 
 
 class Ordering:
@@ -71,11 +72,11 @@ class Ordering:
 
     def __init__(self, width: Index, neighbours: list[list[int]], groups: list[Group]):
         self.size = [*map(int, width), *(len(group.rows) for group in groups)]
-        self.groups, (self.parent, self.joint) = groups, forest(groups, len(width))
+        self.groups = groups
+        self.parent, self.joint, self.depth = forest(groups, len(width))
         self.sequence: list[int] = []
         self.later: dict[int, set[int]] = {}
         self.cost, self.n = 0.0, len(neighbours)
-        self.depth = self._depths()
         self.coupled = [set(others) - {b} for b, others in enumerate(neighbours)]
         self.coupled += [set(group.bodies) for group in groups]
         for g, group in enumerate(groups):
@@ -84,10 +85,7 @@ class Ordering:
 
     def run(self, limit: float) -> bool:
         """Eliminate all nodes; False as soon as that costs more than the limit."""
-        children = [0] * self.n
-        for p in self.parent:
-            if p >= 0:
-                children[p] += 1
+        children = Counter(self.parent)  # {body: how many hang on it}
         self.waiting, self.waits = self._loops()
         queue = [self._turn(b) for b in range(self.n) if not children[b]]
         heapq.heapify(queue)
@@ -143,17 +141,6 @@ class Ordering:
             for b in tops:
                 waiting.setdefault(b, []).append(g)
         return waiting, waits
-
-    def _depths(self) -> list[int]:
-        depth = [-1] * self.n
-        for b in range(self.n):
-            path = [b]
-            while depth[path[-1]] < 0 and self.parent[path[-1]] >= 0:
-                path.append(self.parent[path[-1]])
-            top = max(depth[path[-1]], 0)
-            for up, node in enumerate(reversed(path)):
-                depth[node] = top + up
-        return depth
 
     def _tops(self, bodies: tuple[int, ...]) -> set[int]:
         """Where paths from the bodies towards the ground meet, or the roots of different trees."""

@@ -21,7 +21,7 @@ from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import GROUND, Marker, Part, moving_start
 from rom.mbs.parts.joints import Joint, Row
 from rom.mbs.parts.signals import Signal, drive_signal
-from rom.model import OWN_FRAME, Array, Index
+from rom.model import Array, Index
 from rom.names import check_known
 
 FAR_JOINTS = 1e4  # sizes from the origin; reactions of a pendulum there miss 2e-5 of its weight
@@ -132,6 +132,16 @@ class Packed:
         lengths = np.isin(rows.kind, LENGTHS) | np.array(slides, dtype=bool)
         return np.where(lengths, self.length, 1.0)
 
+    @cached_property
+    def unit(self) -> Array:
+        """(n,) motion of each coordinate by one rad, or by the length of the mechanism."""
+        bodies, unit = self.system.bodies, np.ones(self.v.size)
+        for b, (at, r) in enumerate(zip(bodies.v_at, bodies.r, strict=True)):
+            modal = np.diag(bodies.M[bodies.flex[b]])[:r]
+            unit[at : at + 3] = self.length
+            unit[at + 6 : at + 6 + r] = self.length * np.sqrt(bodies.mass[b] / modal)
+        return unit
+
     @property
     def graph(self) -> Graph:
         """How the equations are stored and solved."""
@@ -170,11 +180,6 @@ class Packed:
     def coupled(self) -> list[Sequence[int]]:
         """Groups of bodies that elements couple."""
         return coupled_by(self.elements, self.system.markers.body)
-
-    @property
-    def frames(self) -> list[Marker]:
-        """The further markers of ``seen``."""
-        return [marker for marker in self.markers if marker.place == OWN_FRAME]
 
     def refuse_rolling(self, message: str, hint: str = "") -> None:
         """Refuse joints that roll, naming the first, where positions alone may be bound."""

@@ -15,7 +15,7 @@ from math import comb
 import numpy as np
 from numba import types
 
-from rom.mbs.kernels.algebra import add, cross, dot, scale, spatial_tangent, sub, vec
+from rom.mbs.kernels.algebra import add, cross, dot, half_turn, scale, spatial_tangent, sub, vec
 from rom.mbs.kernels.compiled import copy, inner
 from rom.mbs.kernels.stages import stage
 from rom.mbs.kernels.system import System
@@ -96,15 +96,6 @@ def keep_past(s, step):
                 past[t + 3 + p] = w[p] + step.psi[t + 3 + p]
         for i in range(step.psi.size):
             past[i] -= step.psi[i]
-
-
-@inner
-def half_turn(a):
-    """Quaternion of exp(a): its scalar and its vector."""
-    angle = math.sqrt(dot(a, a))
-    half = 0.5 * angle
-    s = math.sin(half) / angle if angle > 1e-4 else 0.5 - angle * angle / 48
-    return math.cos(half), scale(s, a)
 
 
 @inner

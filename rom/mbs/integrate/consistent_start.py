@@ -240,8 +240,7 @@ def _least_change(packed: Packed, W: Work, gap: Array, weight: Array, rows: Inte
     if packed.by_blocks and rows.size < gap.size:
         A, size = unit_rows(Pattern(packed).gradient(W.G)[rows] @ diags(weight))
         closing = Constrained(identity(weight.size), A, redundant=True)
-        found: Array = weight * closing.solve(0 * weight, gap[rows] / size)[0]
-        return found
+        return weight * closing.solve(0 * weight, gap[rows] / size)[0]
     if packed.by_blocks:
         _weigh(packed, W, weight)
         if not factorised(packed, W, 0.0):

@@ -107,15 +107,10 @@ def predict(s, step):
         predict_multistep(s, step)
     copy(step.lam, step.lam1)
     step.size[0] = step.size[4] = 0.0
-    if step.count[entry.LAST_ITERATIONS] > most_corrections(s, step):
+    few = FEW_CORRECTIONS + (step.v.size // CORRECTION_SIZE if s.renewed.shape[0] > 0 else 0)
+    if step.count[entry.LAST_ITERATIONS] > few:  # it begins with a new factorisation
         step.count[entry.HAS_FACTOR] = 0
     retract(s, step.q, step.psi, step.q1)
-
-
-@inner
-def most_corrections(s, step):
-    """Corrections of a step behind which the next one begins with a new factorisation."""
-    return FEW_CORRECTIONS + (step.v.size // CORRECTION_SIZE if s.renewed.shape[0] > 0 else 0)
 
 
 @inner
@@ -246,7 +241,7 @@ def correct(s, W, step, rank):
         step.lam1[k] += W.dlam[k] / bh2
     size = increment_norm(W, step)
     if step.count[entry.BOTH_LEVELS] == 1:
-        close_gaps(s, W, n, rank, lead)
+        close_gaps(s, W, rank, lead)
         size += increment_norm(W, step)
         for i in range(n):
             step.psi[i] += W.delta[i]
@@ -275,12 +270,6 @@ def imbalance(s, W, step):
     for k in range(step.lam.size):
         gap = max(gap, row_gap(s, W, step, k))
     return bh2 * math.sqrt(total) / (mass_factor(step) * step.size[3] * step.size[1]) + gap
-
-
-@inner
-def most_passes(step):
-    """Corrections behind which a step fails."""
-    return MAX_PASSES + (MAX_CAUTIOUS_PASSES if may_halve(step) else 0)
 
 
 @inner
@@ -356,7 +345,8 @@ def verdict(W, step, size, gap):
         return CONVERGED
     if shrink > 0.5 and size < 100 * floor and step.count[entry.STEP_PASSES] > 3:
         return CONVERGED
-    if step.count[entry.STEP_PASSES] >= most_passes(step):
+    most = MAX_PASSES + (MAX_CAUTIOUS_PASSES if may_halve(step) else 0)
+    if step.count[entry.STEP_PASSES] >= most:
         return FAILED
     if (last > 0.0 and shrink > 0.2) or step.count[entry.STEP_PASSES] >= MAX_PASSES:
         step.count[entry.HAS_FACTOR] = 0

@@ -46,20 +46,14 @@ def velocity_gaps(s, W, out):
             out[k] -= W.signal[rows.signal[k], 1]
 
 
-@stage(
-    *(types.void, System, Work, types.int64, types.int64, types.float64),
-    asked=Step,
-    needed=_is_stabilised,
-)
-def close_gaps(s, W, n, rank, lead):
+@stage(types.void, System, Work, types.int64, types.float64, asked=Step, needed=_is_stabilised)
+def close_gaps(s, W, rank, lead):
     """Set W.delta to the positions that close the gaps when `lead` times the velocity gaps go."""
     velocity_gaps(s, W, W.part)
-    for i in range(n):
-        W.rhs[i] = 0.0
     for k in range(W.part.size):
         residual = lead * W.part[k] - W.value[k]
         W.part[k] = 0.0 if s.rows.kind[k] == ROLL else residual
-    solve_bordered(s, W, rank, W.delta, W.dlam)
+    least_motion_across(s, W, rank, W.delta)
 
 
 @stage(types.void, System, Work, Step, types.int64, asked=Step, needed=_is_stabilised)
@@ -67,7 +61,7 @@ def fit_velocities(s, W, step, rank):
     """Remove the velocity gaps that the last correction left, to round-off."""
     h, _, gamma, alpha_m, alpha_f = step.method
     c = (1 - alpha_m) / ((1 - alpha_f) * gamma * h)
-    n, last = step.v1.size, math.inf
+    last = math.inf
     for _ in range(MAX_CORRECTIONS):
         evaluate(s, W, step.q1, step.v1)
         velocity_gaps(s, W, W.part)
@@ -78,10 +72,8 @@ def fit_velocities(s, W, step, rank):
         if not total < 0.25 * last:
             return
         last = total
-        for i in range(n):
-            W.rhs[i] = 0.0
-        solve_bordered(s, W, rank, W.delta, W.dlam)
-        for i in range(n):
+        least_motion_across(s, W, rank, W.delta)
+        for i in range(step.v1.size):
             step.v1[i] += W.delta[i]
             step.vd1[i] += c * W.delta[i]
 

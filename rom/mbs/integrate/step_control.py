@@ -46,7 +46,7 @@ MIN_STEP_RATIO = 1e-12
 LEAST_ERROR = 1e-6  # that the next length is chosen by
 MAX_INTERVAL = 1 << 62  # in steps, of what the method itself is to save: nothing
 
-weights_of_bdf = inner(bdf_weights)
+weights_of_bdf = inner(bdf_weights)  # as `bdf_coefficients` has them
 
 
 @table
@@ -312,7 +312,9 @@ def prepare(now):
     if step.count[entry.STEPS] == 0:
         return NEEDS_START
     if count[IS_BDF] == 1:
-        prepare_bdf(step, h, number[BEFORE])
+        c0, c1, c2 = weights_of_bdf(h, number[BEFORE])
+        step.bdf[0], step.bdf[1], step.bdf[2] = c0, c1, c2
+        step.method[0], step.method[1], step.method[2] = h, 1 / (c0 * h) ** 2, 1 / (c0 * h)
         count[UNEVEN] = 1 if h != number[BEFORE] else 0
         count[STAGE] = count[NEXT]
     else:
@@ -322,14 +324,6 @@ def prepare(now):
         count[STAGE] = RESETS
     number[LENGTH], step.count[entry.HAS_FACTOR] = h, 0
     return CONVERGED
-
-
-@inner
-def prepare_bdf(step, h, before):
-    """Set the weights of BDF, see `rom.mbs.integrate.generalized_alpha.bdf_coefficients`."""
-    c0, c1, c2 = weights_of_bdf(h, before)
-    step.bdf[0], step.bdf[1], step.bdf[2] = c0, c1, c2
-    step.method[0], step.method[1], step.method[2] = h, 1 / (c0 * h) ** 2, 1 / (c0 * h)
 
 
 @inner

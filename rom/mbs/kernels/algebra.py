@@ -145,12 +145,18 @@ def rotation(q, at, A):
 
 
 @inner
-def turned(q, at, theta, out):
-    """Write q[at:at+4] o exp(theta), of unit length, into out[at:at+4]."""
+def half_turn(theta):
+    """Quaternion of exp(theta): its scalar and its vector."""
     angle = math.sqrt(dot(theta, theta))
     half = 0.5 * angle
     s = math.sin(half) / angle if angle > 1e-4 else 0.5 - angle * angle / 48
-    f0, (f1, f2, f3) = math.cos(half), scale(s, theta)
+    return math.cos(half), scale(s, theta)
+
+
+@inner
+def turned(q, at, theta, out):
+    """Write q[at:at+4] o exp(theta), of unit length, into out[at:at+4]."""
+    f0, (f1, f2, f3) = half_turn(theta)
     e0, e1, e2, e3 = q[at], q[at + 1], q[at + 2], q[at + 3]
     p0 = e0 * f0 - e1 * f1 - e2 * f2 - e3 * f3
     p1 = e0 * f1 + e1 * f0 + e2 * f3 - e3 * f2

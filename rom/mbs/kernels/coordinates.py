@@ -116,14 +116,8 @@ def followed_angle(s, W, at, angle):
 
 
 @inner
-def clear_tangent(tangent):
-    """Empty the tangents (2, 12, 12) by motions and velocities of a pair of markers."""
-    tangent[:] = 0.0
-
-
-@inner
 def place_tangent(s, W, pair, tangent, ck, cc):
-    """Add ck times the first of them to W.Kt and cc times the second to W.S."""
+    """Add tangents (2, 12, 12) of a pair of markers: by motions to W.Kt, by velocities to W.S."""
     for kind in range(2):
         for p in range(12):
             for q in range(12):

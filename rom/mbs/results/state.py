@@ -13,7 +13,7 @@ from rom.arguments import typed
 from rom.errors import ConfigError
 from rom.io.archive import MAX_BYTES, Kind, read_archive, stated, write_archive
 from rom.mbs.equations.packing import Packed
-from rom.model import Array
+from rom.model import OWN_FRAME, Array
 from rom.names import named
 
 SCHEMA_NAME, VERSION = "rom-state", (2, 1)
@@ -83,7 +83,7 @@ def check_state(state: State, packed: Packed, *, joints: bool = True) -> None:
         text = "{}; this mechanism has {}, {} and {}: their bodies differ.".format(has, *needed)
         raise ConfigError(text, hint="Take one of the same mechanism: sol.final, rom.equilibrium.")
     stiffened = dict(zip(packed.names, packed.system.bodies.stiffened, strict=True))
-    moved = [marker.body for marker in packed.frames if not stiffened[marker.body]]
+    moved = [m.body for m in packed.markers if m.place == OWN_FRAME and not stiffened[m.body]]
     if state.in_own_frames and moved:
         text = f"the state counts {named(moved)} in the frame of its reference, as an older"
         hint = "Compute the motion up to there again."

@@ -7,6 +7,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import rom
+from cases.files.archives import archive
 from cases.files.cells import solid
 from cases.files.damage import changed, damaged, outcome
 from cases.files.random_decks import CARDS, KEYWORDS, SIZE, random_deck
@@ -195,13 +196,16 @@ def test_broken_nastran_deck_is_refused(tmp_path):
     refuses(RomError, "gone.blk: there is no such file", nastran.read, str(path))
 
 
-@pytest.mark.parametrize("ending", [".inp", ".bdf"])
+@pytest.mark.parametrize("ending", [".inp", ".bdf", ".cdb"])
 def test_damaged_decks_are_refused_or_harmless(ending, tmp_path):
     """In this process, without the guard of `rom.fe.mesh.child`, which names the file."""
-    meshio, box, _ = meshio_box("tet4")
-    path, kind = tmp_path / f"x{ending}", {".inp": "abaqus", ".bdf": "nastran"}[ending]
-    box.cell_data = {"nastran:ref": [np.ones(len(box.cells[0].data), dtype=int)]}
-    meshio.write(path, box, file_format=kind)
+    path = tmp_path / f"x{ending}"
+    kind = {".inp": "abaqus", ".bdf": "nastran", ".cdb": "ansys"}[ending]
+    path.write_text(archive("tet4")[0])
+    if kind != "ansys":
+        meshio, box, _ = meshio_box("tet4")
+        box.cell_data = {"nastran:ref": [np.ones(len(box.cells[0].data), dtype=int)]}
+        meshio.write(path, box, file_format=kind)
 
     def read(path):
         try:

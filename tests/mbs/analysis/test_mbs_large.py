@@ -311,8 +311,20 @@ def shaken_rod(viscosity=1e-3, n=12):
     return mech, rod.marker("end")
 
 
+def shaken_body():
+    """A flexible body bolted to such a table, whose own mass takes part in what the drive does."""
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    on_guide(mech, "table", mass=7.0)
+    mech.drive("shaker", "guide", lambda t: 0.0 * t)
+    part = mech.add_flexible("body", random_body(np.random.default_rng(4), 12))
+    first, *_, end = (part.marker(name) for name in part.flexible.markers)
+    mech.fixed("bolt", mech.parts["table"].marker(part.point(first)), first)
+    return mech, end
+
+
 def test_responses_of_large_mechanisms_are_those_of_dense_matrices(monkeypatch):
     f, (rod, tip), pair = np.array([0.0, 0.7, 3.1, 25.0]), shaken_rod(), flexible_pair()
+    bolted, end = shaken_body()
     marks = [pair.parts[k].marker(list(pair.parts[k].flexible.markers)[-1]) for k in ("one", "two")]
     answers = []
     for size in (200, 0):
@@ -323,6 +335,7 @@ def test_responses_of_large_mechanisms_are_those_of_dense_matrices(monkeypatch):
             rom.frequency_response(pair, other, f, force=marks[0], motion=marks[1]).receptance,
             *(rom.transmissibility(rod, state, f, drive="shaker", motion=at)
               for at in (tip, "table")),
+            rom.transmissibility(bolted, None, f, drive="shaker", motion=end),
         ))  # fmt: skip
     assert_allclose(answers[1][3][:, 0], 1.0, rtol=1e-9)  # the table moves as its drive does
     for whole, sparse in zip(*answers, strict=True):

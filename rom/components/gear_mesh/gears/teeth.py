@@ -39,7 +39,7 @@ from rom.components.gear_mesh.gears.wheels import (
     turn_forces,
 )
 from rom.mbs.kernels.compiled import inner
-from rom.mbs.kernels.coordinates import clear_tangent, place_tangent
+from rom.mbs.kernels.coordinates import place_tangent
 from rom.mbs.kernels.element_calls import energy, residuals, tangents
 
 
@@ -237,7 +237,7 @@ def mesh_tangents(s, W, meshes, _lam, ck, cc):
     """
     meshes.factor[0], meshes.factor[1] = ck, cc
     for k in range(meshes.i.size):
-        clear_tangent(meshes.tangent)
+        meshes.tangent[:] = 0.0
         add_lines(s, W, meshes, k, col.TANGENTS)
         place_tangent(s, W, (meshes.i[k], meshes.j[k]), meshes.tangent, ck, cc)
 

@@ -52,7 +52,7 @@ def write_observer_fmu(observer: Observer | ParameterTracker, path: str | Path) 
     for kind in ("estimate", "deviation"):
         variables += [Variable(f"{kind}.{name}", "output", unit) for name, unit in outputs]
     about = f"Estimates of {path.stem} from a few sensors, {when}."
-    headers = ("filter.h", "states.h")
+    headers = ("filter.h", "shared.h")
     return write_archive(path, Content(path.stem, about, variables, dt, core, headers, text))
 
 

@@ -153,7 +153,7 @@ def operation(
         what = named(body.name for body in parts.bodies.values())
         raise ConfigError(f"body {what} cannot move with {fixed!r} held; leave one of them free.")
     lam, U = eigh(model.K.sum(axis=0), model.M.sum(axis=0))
-    omega, V = np.sqrt(np.maximum(lam, 0.0)), model.seen @ U
+    omega, V = np.sqrt(np.maximum(lam, 0.0)), model.sensors @ U
     omega[: model.n_rigid] = 0.0
     XI = np.diag(2 * (damping or 0.0) * omega)
     if damping is None:

@@ -28,8 +28,7 @@ from rom.components.updating.responses.grid import Bodies, side_by_side
 from rom.components.updating.responses.tables import functions_of, points_of
 from rom.components.updating.responses.universal_test import functions_and_points, modes_of
 from rom.errors import ConfigError, FileFormatError, UnsafeFileError
-from rom.io.files import check_readable, write_whole
-from rom.io.hdf5 import h5py
+from rom.io.files import check_readable, h5py, write_whole
 from rom.model import Array
 from rom.names import check_ending
 

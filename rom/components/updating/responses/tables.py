@@ -36,8 +36,8 @@ Pair = tuple[tuple[int, int], tuple[int, int]]  # node and direction of sensor a
 
 def functions_of(path: Path) -> tuple[Function, ...]:
     """All functions of a table, in SI units."""
-    names, rows, separator = _cells(path, re.compile(r"freq", re.IGNORECASE))
-    values = _numbers(rows, separator)
+    names, rows = _cells(path, re.compile(r"freq", re.IGNORECASE))
+    values = _numbers(rows)
     if label := re.search(r"[\[(]([^\])]+)[\])]", names[0]):
         values[:, 0] *= in_si(label.group(1), "frequency")
     parts: dict[Pair, dict[str, tuple[str, Array]]] = {}
@@ -56,11 +56,11 @@ def functions_of(path: Path) -> tuple[Function, ...]:
 
 def points_of(path: Path) -> tuple[dict[int, Array], dict[int, str]]:
     """{node: point [m]} by columns node, x [m], y [m] and z [m]; {node: body} where one is body."""
-    names, rows, separator = _cells(path, re.compile(r"node", re.IGNORECASE))
+    names, rows = _cells(path, re.compile(r"node", re.IGNORECASE))
     named = names[-1].lower() == "body"
     owners = [cells.pop().strip().strip('"') for _, cells in rows] if named else []
     names = names[:-1] if named else names
-    values = _numbers(rows, separator)
+    values = _numbers(rows)
     found = [POINT_COLUMN.fullmatch(name) for name in names[1:]]
     axes = [m.group(1).lower() for m in found if m]
     if axes != ["x", "y", "z"] or len(names) != 4:
@@ -101,7 +101,7 @@ def _functions(pair: Pair, own: dict[str, tuple[str, Array]], x: Array) -> list[
     return found
 
 
-def _cells(path: Path, first: re.Pattern[str]) -> tuple[Row, list[tuple[int, Row]], str]:
+def _cells(path: Path, first: re.Pattern[str]) -> tuple[Row, list[tuple[int, Row]]]:
     """Names of columns, the first of which is like a pattern; cells of each line by its number."""
     text = _decoded(check_readable(path, MAX_TABLE_BYTES).read_bytes()).splitlines()
     for above, line in enumerate(text, 1):
@@ -122,7 +122,7 @@ def _cells(path: Path, first: re.Pattern[str]) -> tuple[Row, list[tuple[int, Row
             raise FileFormatError(f"line {number} has {len(cells)} numbers under {n} names.")
     if not rows:
         raise FileFormatError("there are no numbers under the names.")
-    return names, rows, separator
+    return names, rows
 
 
 def _decoded(data: bytes) -> str:
@@ -135,22 +135,17 @@ def _decoded(data: bytes) -> str:
         return data.decode("cp1252", "replace")
 
 
-def _numbers(rows: list[tuple[int, Row]], separator: str) -> Array:
-    """(n, columns) numbers of cells."""
+def _numbers(rows: list[tuple[int, Row]]) -> Array:
+    """(n, columns) numbers of cells, which have no comma where columns stand between commas."""
     found = []
-    if separator != "," and all(any(c in x for _, cells in rows for x in cells) for c in ",."):
+    if all(any(c in x for _, cells in rows for x in cells) for c in ",."):
         raise FileFormatError(
             "numbers have commas and points: one of them is of thousands.",
             hint="Write numbers without separators of thousands.",
         )
     for number, cells in rows:
         try:
-            found.append([_number(cell, separator) for cell in cells])
+            found.append([float(cell.strip().strip('"').replace(",", ".")) for cell in cells])
         except ValueError as error:
             raise FileFormatError(f"line {number}: {error}.") from error
     return np.array(found)
-
-
-def _number(cell: str, separator: str) -> float:
-    cell = cell.strip().strip('"')
-    return float(cell if separator == "," else cell.replace(",", "."))

@@ -28,7 +28,7 @@ from scipy.linalg import block_diag, eigh
 
 from rom.arguments import Between, lowest, matrix, one_each, rows_at, typed, vector
 from rom.components.wheels.blades.substructured_sector import ReducedBlade, SubstructuredSector
-from rom.components.wheels.reduced import wheel_certificate
+from rom.components.wheels.reduced import rows_of_wheel
 from rom.components.wheels.sector import Complex
 from rom.errors import ConfigError, ModelError
 from rom.model import Array, Modes, Report
@@ -117,7 +117,8 @@ class BladedWheel:
     def certificate(self) -> Report:
         """The wheel of equal blades against the full sector, solved when this is first asked."""
         nominal = [self.sector.blade] * self.sector.n_sectors
-        return wheel_certificate(self.modes(nominal).frequencies, self.sector.full)
+        found = rows_of_wheel("equal blades", self.modes(nominal).frequencies, self.sector.full)
+        return Report("certificate of the wheel", tuple(found))
 
     def matrices(
         self, blades: Sequence[ReducedBlade], *, speed: float = 0.0

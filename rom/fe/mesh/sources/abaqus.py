@@ -20,7 +20,7 @@ import numpy as np
 from rom.decks.keywords import Block, Sets
 from rom.decks.lines import Unread
 from rom.decks.nodes import NODE_KEYWORDS, SET_OPTIONS, Nodes, Table
-from rom.errors import FileFormatError, TagError
+from rom.errors import FileFormatError
 from rom.fe.mesh.cell_types import READ_TYPES
 from rom.fe.mesh.solid import Read, packed
 from rom.fe.mesh.sources.deck import (
@@ -29,6 +29,7 @@ from rom.fe.mesh.sources.deck import (
     only_type,
     outer_facets,
     positions,
+    regions_of,
     to_gmsh,
     unused,
 )
@@ -185,9 +186,8 @@ LOAD_KEYWORDS = set("STEP,BOUNDARY,INITIAL CONDITIONS,CLOAD,DLOAD,DSLOAD,TEMPERA
 def _regions(deck: Deck, ids: Index) -> tuple[dict[int, str], Index]:
     """{region number: name} and the region number of each cell."""
     sets = [section.option("ELSET") for section in deck.sections] or deck.own
-    names = dict(enumerate(dict.fromkeys(sets), 1))
-    regions = np.zeros(ids.size, dtype=np.int64)
-    for number, name in names.items():
+    chosen = {}
+    for name in dict.fromkeys(sets):
         members = deck.cell_sets.of(name)
         if (others := np.setdiff1d(members, ids)).size:
             raise FileFormatError(
@@ -195,19 +195,8 @@ def _regions(deck: Deck, ids: Index) -> tuple[dict[int, str], Index]:
                 f"{named(others.tolist())}.",
                 hint="Shells, trusses and beams are not read; take their section out.",
             )
-        chosen = np.isin(ids, members)
-        if (both := chosen & (regions > 0)).any():
-            raise TagError(
-                f"element {ids[both][0]} is in the sections {names[regions[both][0]]!r} and "
-                f"{name!r}; give it to only one."
-            )
-        regions[chosen] = number
-    if not regions.all():
-        raise TagError(
-            f"element {ids[regions == 0][0]} is in no section, while {sorted(names.values())} are.",
-            hint="Every solid element needs a *SOLID SECTION.",
-        )
-    return names, regions
+        chosen[name] = np.flatnonzero(np.isin(ids, members))
+    return regions_of(chosen, ids, "section", "Every solid element needs a *SOLID SECTION.")
 
 
 def _materials(deck: Deck) -> dict[str, list[float]]:

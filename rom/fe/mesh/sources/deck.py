@@ -1,10 +1,10 @@
-"""What Abaqus and Nastran decks share: node order, faces by number, faces by node set."""
+"""What files of other programs share: node order, regions, faces by number and by node set."""
 
 from collections.abc import Callable, Iterable, Mapping
 
 import numpy as np
 
-from rom.errors import FileFormatError, MeshError
+from rom.errors import FileFormatError, MeshError, TagError
 from rom.fe.mesh.cell_types import DECK_EDGES, READ_TYPES
 from rom.fe.mesh.solid import Notes
 from rom.fe.mesh.topology import faces_of
@@ -30,6 +30,26 @@ def only_type(found: Iterable[str]) -> str:
         text = f"the cells are of several types, {types}; one mesh needs one type"
         raise MeshError(f"{text}; mesh all volumes with tetrahedra, or all with hexahedra.")
     return types[0]
+
+
+def regions_of(
+    sets: Mapping[str, Index], ids: Index, what: str, hint: str = ""
+) -> tuple[dict[int, str], Index]:
+    """{region number: name} and the region number of each cell, of the rows in each set.
+
+    Without any set the whole solid is the region "body"; else each cell must be in one.
+    """
+    names, regions = dict(enumerate(sets or ["body"], 1)), np.full(ids.size, int(not sets))
+    for number, (name, rows) in enumerate(sets.items(), 1):
+        if (both := rows[regions[rows] > 0]).size:
+            first = names[regions[both[0]]]
+            text = f"element {ids[both[0]]} is in the {what}s {first!r} and {name!r}"
+            raise TagError(f"{text}; give it to only one.")
+        regions[rows] = number
+    if not regions.all():
+        text = f"element {ids[regions == 0][0]} is in no {what}, while {sorted(sets)} are."
+        raise TagError(text, hint=hint or f"Give every solid element a {what}, or none.")
+    return names, regions
 
 
 def of_materials(read: Callable[..., Notes], *deck: object) -> dict[str, Notes]:

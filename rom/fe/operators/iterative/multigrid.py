@@ -12,6 +12,7 @@ import numpy as np
 
 from rom.fe.operators.factor import dense_rows
 from rom.fe.operators.iterative.gradients import ConjugateGradients, Recurrence
+from rom.fe.operators.spectrum import vector
 from rom.model import Array
 
 SMOOTHING_DEGREE = 3  # of the polynomial, before and after the coarse correction; measured best
@@ -36,10 +37,7 @@ def multigrid(A: PETSc.Mat, near_null: Array) -> ConjugateGradients:
         Vanek, Mandel and Brezina, Computing 56 (1996) 179, levels as implemented in PETSc.
     """
     A.setOption(PETSc.Mat.Option.SPD, True)
-    columns = []
-    for values in _orthonormal(A, near_null).T:
-        columns.append(A.createVecRight())
-        columns[-1].array[:] = values
+    columns = [vector(A, values) for values in _orthonormal(A, near_null).T]
     A.setNearNullSpace(PETSc.NullSpace().create(vectors=columns, comm=A.comm))
     pc = PETSc.PC().create(A.comm)
     pc.setOperators(A)

@@ -1,35 +1,5 @@
-/* What all filters share. Before it: SENSORS and DT of the tables, and a Model whose State `now` has
-   the time t and the samples y. */
-
-#include "states.h"
-
-Model *model_open(const char *resources, char *message)
-{
-    Model *m = malloc(sizeof *m);
-    (void)resources;
-    if (!m)
-        snprintf(message, MESSAGE, "no memory for %d sensors and their filter.", SENSORS);
-    else
-        model_reset(m, message);
-    return m;
-}
-
-void model_close(Model *m) { free(m); }
-
-int model_set(Model *m, size_t n, const unsigned refs[], const double values[], char *message)
-{
-    for (size_t k = 0; k < n; k++) {
-        if (refs[k] >= SENSORS || !isfinite(values[k])) {
-            snprintf(message, MESSAGE, refs[k] >= SENSORS
-                         ? "value reference %u cannot be set (to %g); sensors are the first %d."
-                         : "the sample of value reference %u = %g is not a finite number.",
-                     refs[k], values[k], SENSORS);
-            return ERROR;
-        }
-        m->now.y[refs[k]] = values[k];
-    }
-    return OK;
-}
+/* What all filters share. Before it: DT of the tables, and a Model whose State `now` has the time t
+   at which it is. */
 
 static double product(const double *row, const double *x, int n)
 {

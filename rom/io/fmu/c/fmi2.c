@@ -25,6 +25,7 @@ typedef struct {
     Model *model;
     enum Phase phase;
     double start, reached;
+    char message[MESSAGE]; /* of the call under way */
 } Instance;
 
 #ifdef _WIN32
@@ -50,37 +51,27 @@ static void tell(const Callbacks *callbacks, String name, int status, String mes
                       status == WARNING ? "logStatusWarning" : "logStatusError", text);
 }
 
-static int answer(Instance *x, int status, String message)
+static int answer(Instance *x, int status)
 {
-    if (*message)
-        tell(&x->callbacks, x->name, status == OK ? WARNING : status, message);
+    if (*x->message)
+        tell(&x->callbacks, x->name, status == OK ? WARNING : status, x->message);
+    x->message[0] = 0;
     return status;
 }
 
 static int unsupported(void *instance, String what)
 {
-    char message[MESSAGE];
-    snprintf(message, sizeof message, "%s is not offered by this FMU.", what);
-    return answer(instance, ERROR, message);
+    Instance *x = instance;
+    snprintf(x->message, MESSAGE, "%s is not offered by this FMU.", what);
+    return answer(x, ERROR);
 }
 
 static int wrong_phase(Instance *x, String what)
 {
     static const String phases[] = {"before its initialisation", "in its initialisation",
                                     "after its initialisation", "after its end"};
-    char message[MESSAGE];
-    snprintf(message, sizeof message, "%s is not allowed for an instance %s.", what,
-             phases[x->phase]);
-    return answer(x, ERROR, message);
-}
-
-static int hexadecimal(char c)
-{
-    if (c >= '0' && c <= '9')
-        return c - '0';
-    if (c >= 'a' && c <= 'f')
-        return c - 'a' + 10;
-    return c >= 'A' && c <= 'F' ? c - 'A' + 10 : -1;
+    snprintf(x->message, MESSAGE, "%s is not allowed for an instance %s.", what, phases[x->phase]);
+    return answer(x, ERROR);
 }
 
 /* file:///a%20b or file:/a%20b -> /a b */
@@ -94,10 +85,12 @@ static char *path_of(String uri)
     }
     out = path = malloc(strlen(uri) + 1);
     while (path && *uri) {
-        int high = *uri == '%' ? hexadecimal(uri[1]) : -1;
-        int low = high >= 0 ? hexadecimal(uri[2]) : -1;
-        *out++ = low >= 0 ? (char)(16 * high + low) : *uri;
-        uri += low >= 0 ? 3 : 1;
+        int escaped = *uri == '%' && strspn(uri + 1, "0123456789abcdefABCDEF") > 1;
+        char digits[3] = "";
+        if (escaped)
+            memcpy(digits, uri + 1, 2);
+        *out++ = escaped ? (char)strtol(digits, NULL, 16) : *uri;
+        uri += escaped ? 3 : 1;
     }
     if (path)
         *out = 0;
@@ -176,14 +169,13 @@ API int fmi2EnterInitializationMode(void *instance)
 API int fmi2ExitInitializationMode(void *instance)
 {
     Instance *x = instance;
-    char message[MESSAGE] = "";
     int status;
     if (x->phase != INITIALISING)
         return wrong_phase(x, "fmi2ExitInitializationMode");
-    status = model_start(x->model, x->start, message);
+    status = model_start(x->model, x->start, x->message);
     if (status == OK)
         x->phase = STEPPING;
-    return answer(x, status, message);
+    return answer(x, status);
 }
 
 API int fmi2Terminate(void *instance)
@@ -198,82 +190,75 @@ API int fmi2Terminate(void *instance)
 API int fmi2Reset(void *instance)
 {
     Instance *x = instance;
-    char message[MESSAGE] = "";
-    int status = model_reset(x->model, message);
+    int status = model_reset(x->model, x->message);
     if (status == OK)
         x->phase = INSTANTIATED;
-    return answer(x, status, message);
+    return answer(x, status);
 }
 
 API int fmi2DoStep(void *instance, double t, double h, int no_way_back)
 {
     Instance *x = instance;
-    char message[MESSAGE] = "";
     int status;
     (void)no_way_back;
     if (x->phase != STEPPING)
         return wrong_phase(x, "fmi2DoStep");
-    status = model_step(x->model, t, h, message);
+    status = model_step(x->model, t, h, x->message);
     if (status == OK)
         x->reached = t + h;
-    return answer(x, status, message);
+    return answer(x, status);
 }
 
 API int fmi2SetReal(void *instance, const unsigned refs[], size_t n, const double values[])
 {
     Instance *x = instance;
-    char message[MESSAGE] = "";
     if (x->phase == TERMINATED)
         return wrong_phase(x, "fmi2SetReal");
-    return answer(x, model_set(x->model, n, refs, values, message), message);
+    return answer(x, model_set(x->model, n, refs, values, x->message));
 }
 
 /* Before the end of the initialisation outputs follow from the inputs of that moment. */
 API int fmi2GetReal(void *instance, const unsigned refs[], size_t n, double values[])
 {
     Instance *x = instance;
-    char message[MESSAGE] = "";
     int status = OK;
     if (x->phase == INITIALISING)
-        status = model_start(x->model, x->start, message);
+        status = model_start(x->model, x->start, x->message);
     if (status == OK)
-        status = model_get(x->model, n, refs, values, message);
-    return answer(x, status, message);
+        status = model_get(x->model, n, refs, values, x->message);
+    return answer(x, status);
 }
 
 API int fmi2GetFMUstate(void *instance, void **state)
 {
     Instance *x = instance;
-    char message[MESSAGE] = "";
     int status = OK;
     if (x->phase != STEPPING)
         return wrong_phase(x, "fmi2GetFMUstate");
     if (*state)
-        status = model_drop(x->model, *state, message);
+        status = model_drop(x->model, *state, x->message);
     if (status == OK)
-        status = model_keep(x->model, state, message);
-    return answer(x, status, message);
+        status = model_keep(x->model, state, x->message);
+    return answer(x, status);
 }
 
 API int fmi2SetFMUstate(void *instance, void *state)
 {
     Instance *x = instance;
-    char message[MESSAGE] = "";
-    int status = model_recall(x->model, state, message);
+    int status = model_recall(x->model, state, x->message);
     if (status == OK)
         x->phase = STEPPING;
-    return answer(x, status, message);
+    return answer(x, status);
 }
 
 API int fmi2FreeFMUstate(void *instance, void **state)
 {
     Instance *x = instance;
-    char message[MESSAGE] = "";
     int status = OK;
     if (*state)
-        status = model_drop(x->model, *state, message);
+        status = model_drop(x->model, *state, x->message);
     *state = NULL;
-    return answer(x, status, message);
+    return answer(x, status);
 }
 
 API int fmi2GetRealStatus(void *instance, int kind, double *value)

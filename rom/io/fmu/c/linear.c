@@ -13,11 +13,11 @@
 #include "model.h"
 #include "tables.h" /* MODES, INTERFACES, OMEGA, XI, LOADS, MOTION */
 
-enum { INPUTS = 6 * INTERFACES + 3, OUTPUTS = 12 * INTERFACES, SIZE = 3 * MODES };
+enum { INPUTS = 6 * INTERFACES + 3, VARIABLES = INPUTS + 12 * INTERFACES, SIZE = 3 * MODES };
 enum { TAYLOR = 17 }; /* terms; 0.5^18 / 18! is below round-off */
 
 typedef struct {
-    double t, u[INPUTS], s[MODES], v[MODES];
+    double t, given[INPUTS], s[MODES], v[MODES];
 } State;
 
 struct Model {
@@ -87,19 +87,6 @@ static int propagator(Model *m, double h)
     return 1;
 }
 
-Model *model_open(const char *resources, char *message)
-{
-    Model *m = malloc(sizeof *m);
-    (void)resources;
-    if (!m)
-        snprintf(message, MESSAGE, "no memory for %d modes.", MODES);
-    else
-        model_reset(m, message);
-    return m;
-}
-
-void model_close(Model *m) { free(m); }
-
 int model_reset(Model *m, char *message)
 {
     (void)message;
@@ -118,21 +105,6 @@ int model_start(Model *m, double t, char *message)
     return OK;
 }
 
-int model_set(Model *m, size_t n, const unsigned refs[], const double values[], char *message)
-{
-    for (size_t k = 0; k < n; k++) {
-        if (refs[k] >= INPUTS || !isfinite(values[k])) {
-            snprintf(message, MESSAGE, refs[k] >= INPUTS
-                         ? "value reference %u cannot be set (to %g); inputs are the first %d."
-                         : "the input of value reference %u = %g is not a finite number.",
-                     refs[k], values[k], INPUTS);
-            return ERROR;
-        }
-        m->now.u[refs[k]] = values[k];
-    }
-    return OK;
-}
-
 /* Of each interface 6 displacements, then 6 velocities. */
 static double output(const Model *m, unsigned k)
 {
@@ -141,19 +113,6 @@ static double output(const Model *m, unsigned k)
     for (int j = 0; j < MODES; j++)
         sum += row[j] * (k % 12 < 6 ? m->now.s[j] / scale(j) : m->now.v[j]);
     return sum;
-}
-
-int model_get(Model *m, size_t n, const unsigned refs[], double values[], char *message)
-{
-    for (size_t k = 0; k < n; k++) {
-        if (refs[k] >= INPUTS + OUTPUTS) {
-            snprintf(message, MESSAGE, "no variable has the value reference %u; all are < %d.",
-                     refs[k], INPUTS + OUTPUTS);
-            return ERROR;
-        }
-        values[k] = refs[k] < INPUTS ? m->now.u[refs[k]] : output(m, refs[k] - INPUTS);
-    }
-    return OK;
 }
 
 int model_step(Model *m, double t, double h, char *message)
@@ -173,7 +132,7 @@ int model_step(Model *m, double t, double h, char *message)
     for (int i = 0; i < MODES; i++) {
         x[2 * MODES + i] = 0.0;
         for (int j = 0; j < INPUTS; j++)
-            x[2 * MODES + i] += LOADS[i * INPUTS + j] * m->now.u[j];
+            x[2 * MODES + i] += LOADS[i * INPUTS + j] * m->now.given[j];
     }
     for (int i = 0; i < 2 * MODES; i++) {
         y[i] = 0.0;
@@ -190,4 +149,4 @@ int model_step(Model *m, double t, double h, char *message)
     return OK;
 }
 
-#include "states.h"
+#include "shared.h"

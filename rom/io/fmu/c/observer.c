@@ -8,8 +8,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+enum { INPUTS = SENSORS, VARIABLES = SENSORS + 2 * VALUES };
+
 typedef struct {
-    double t, y[SENSORS], x[STATES];
+    double t, given[SENSORS], x[STATES];
 } State;
 
 struct Model {
@@ -34,23 +36,10 @@ int model_start(Model *m, double t, char *message)
     return OK;
 }
 
-/* Sensors, then values, then their standard deviations. */
-int model_get(Model *m, size_t n, const unsigned refs[], double values[], char *message)
+/* Values, then their standard deviations. */
+static double output(const Model *m, unsigned k)
 {
-    for (size_t k = 0; k < n; k++) {
-        if (refs[k] >= SENSORS + 2 * VALUES) {
-            snprintf(message, MESSAGE, "no variable has the value reference %u; all are < %d.",
-                     refs[k], SENSORS + 2 * VALUES);
-            return ERROR;
-        }
-        if (refs[k] < SENSORS)
-            values[k] = m->now.y[refs[k]];
-        else if (refs[k] < SENSORS + VALUES)
-            values[k] = product(WANTED + (refs[k] - SENSORS) * STATES, m->now.x, STATES);
-        else
-            values[k] = DEVIATIONS[refs[k] - SENSORS - VALUES];
-    }
-    return OK;
+    return k < VALUES ? product(WANTED + k * STATES, m->now.x, STATES) : DEVIATIONS[k - VALUES];
 }
 
 int model_step(Model *m, double t, double h, char *message)
@@ -60,7 +49,7 @@ int model_step(Model *m, double t, double h, char *message)
         return ERROR;
     for (int i = 0; i < STATES; i++) {
         x[i] = product(CLOSED + i * STATES, m->now.x, STATES)
-               + product(DRIVEN + i * SENSORS, m->now.y, SENSORS);
+               + product(DRIVEN + i * SENSORS, m->now.given, SENSORS);
         if (!isfinite(x[i])) {
             snprintf(message, MESSAGE, "the estimate is not finite after t = %.9g s.", t);
             return ERROR;
@@ -70,3 +59,5 @@ int model_step(Model *m, double t, double h, char *message)
     m->now.t = t + h;
     return OK;
 }
+
+#include "shared.h"

@@ -15,11 +15,14 @@ enum {
     S = 2 * MODES + FORCES, /* states without parameters */
     N = S + PARAMETERS,
     V = WANTED + FORCES, /* values without parameters */
+    ALL = V + PARAMETERS,
+    INPUTS = SENSORS,
+    VARIABLES = SENSORS + 2 * ALL,
     TERMS_OF_SERIES = 24 /* of exponentials of matrices of norm 1/2: to the last digit */
 };
 
 typedef struct {
-    double t, y[SENSORS], z[N], P[N * N], values[V + PARAMETERS], deviations[V + PARAMETERS];
+    double t, given[SENSORS], z[N], P[N * N], values[ALL], deviations[ALL];
     int begun;
     /* the equations of a step about the point */
     double point[PARAMETERS], A[S * S], dA[PARAMETERS * S * S], Q[N * N];
@@ -317,7 +320,7 @@ static void correct(Model *m)
 {
     State *s = &m->now;
     for (int i = 0; i < SENSORS; i++) {
-        double e = s->y[i] - seen(s, s->C, s->dC, SENSORS, i, m->row), spread = VARIANCES[i];
+        double e = s->given[i] - seen(s, s->C, s->dC, SENSORS, i, m->row), spread = VARIANCES[i];
         for (int a = 0; a < N; a++) {
             m->push[a] = product(s->P + a * N, m->row, N);
             spread += m->row[a] * m->push[a];
@@ -368,25 +371,10 @@ int model_reset(Model *m, char *message)
     return model_start(m, 0.0, message);
 }
 
-/* Sensors, then values, then their standard deviations. */
-int model_get(Model *m, size_t n, const unsigned refs[], double values[], char *message)
+/* Values, then their standard deviations. */
+static double output(const Model *m, unsigned k)
 {
-    enum { ALL = V + PARAMETERS };
-    const State *s = &m->now;
-    for (size_t k = 0; k < n; k++) {
-        if (refs[k] >= SENSORS + 2 * ALL) {
-            snprintf(message, MESSAGE, "no variable has the value reference %u; all are < %d.",
-                     refs[k], SENSORS + 2 * ALL);
-            return ERROR;
-        }
-        if (refs[k] < SENSORS)
-            values[k] = s->y[refs[k]];
-        else if (refs[k] < SENSORS + ALL)
-            values[k] = s->values[refs[k] - SENSORS];
-        else
-            values[k] = s->deviations[refs[k] - SENSORS - ALL];
-    }
-    return OK;
+    return k < ALL ? m->now.values[k] : m->now.deviations[k - ALL];
 }
 
 int model_step(Model *m, double t, double h, char *message)
@@ -410,3 +398,5 @@ int model_step(Model *m, double t, double h, char *message)
             return linearise(m, message);
     return OK;
 }
+
+#include "shared.h"

@@ -109,8 +109,7 @@ def pack(contacts: Mapping[str, Contact], places: Places) -> Contacts:
 
 def kept(contacts: "Contacts", memory: Array) -> Array:
     """(n_t,) energy in springs of friction, from what is remembered (n_t, p) [J]."""
-    total: Array = memory[:, contacts.remembered[contacts.remembered >= 0] + STORED].sum(axis=1)
-    return total
+    return memory[:, contacts.remembered[contacts.remembered >= 0] + STORED].sum(axis=1)
 
 
 @inner
@@ -185,13 +184,6 @@ def spring_and_slider(bristle, limit, stretch, slide):
 
 
 @inner
-def ends_of_spring(W, at, i, j):
-    """One if bodies touched at the last instant, else zero; ends from their markers, world."""
-    on_i, on_j = turn(W.E, i, vec(W.base, at + ON_I)), turn(W.E, j, vec(W.base, at + ON_J))
-    return W.base[at + HELD], on_i, on_j
-
-
-@inner
 def keep_spring(W, at, markers, touching, stretch, stiffness):
     """Remember a spring; ``touching`` is the vector from each marker to the touching point."""
     i, j = markers
@@ -201,12 +193,6 @@ def keep_spring(W, at, markers, touching, stretch, stiffness):
     put(W.fresh, at + ON_I, mtv(W.E[i], sub(touching[0], stretch)))
     put(W.fresh, at + ON_J, mtv(W.E[j], touching[1]))
     W.fresh[at + STORED] = 0.5 * stiffness * dot(stretch, stretch)
-
-
-@inner
-def forget_spring(W, at):
-    """The bodies are apart."""
-    W.fresh[at + HELD] = W.fresh[at + STORED] = 0.0
 
 
 @inner
@@ -259,13 +245,18 @@ def contact_force(law, bristle, n, depth, down, motion):
 
 @inner
 def contact_state(contacts, k, W):
-    """Axes of contact k in the world, relative motion of its markers, ends of its spring."""
+    """Axes of contact k in the world, relative motion of its markers, ends of its spring.
+
+    With these, from the markers, whether the bodies touched at the last instant.
+    """
     i, j = contacts.i[k], contacts.j[k]
     e, axle = turn(W.E, i, row(contacts.e, k, 0)), turn(W.E, j, row(contacts.s, k, 0))
     gap, slide = sub(row(W.P, j, 0), row(W.P, i, 0)), sub(row(W.V, j, 0), row(W.V, i, 0))
     held, on_i, on_j = 0.0, e, e
     if contacts.remembered[k] >= 0:
-        held, on_i, on_j = ends_of_spring(W, W.x.size + contacts.remembered[k], i, j)
+        at = W.x.size + contacts.remembered[k]
+        held = W.base[at + HELD]
+        on_i, on_j = turn(W.E, i, vec(W.base, at + ON_I)), turn(W.E, j, vec(W.base, at + ON_J))
     apart = scale(held, sub(add(gap, on_j), on_i))
     return e, axle, (gap, slide, row(W.V, i, 3), row(W.V, j, 3), apart), (held, on_i, on_j)
 
@@ -279,7 +270,7 @@ def contact_wrenches(_s, W, contacts, _q, _v, _lam):
         n, depth, down = touch(contacts.kind[k], contacts.size[k], motion[0], e, axle)
         if not depth > 0.0:
             if at >= 0:
-                forget_spring(W, at)
+                W.fresh[at + HELD] = W.fresh[at + STORED] = 0.0
             continue
         bristle, arms = contacts.bristle[k], (add(motion[0], down), down)
         force, elastic, closing, u, stretch = contact_force(
