@@ -207,6 +207,8 @@ def test_the_basic_rack_of_iso_6336_counts_by_its_pressure_angle(degrees):
     angles = np.radians([20.0, degrees]).tolist()
     pairs = [GearPair((50, 60), 4e-3, 0.04, pressure_angle=a) for a in angles]
     usual, other = map(gear_mesh.iso_stiffness, pairs)
+    shifted = GearPair((25, 60), 4e-3, 0.04, shift=(0.3, -0.2))  # q by hand from all nine terms
+    assert gear_mesh.iso_stiffness(shifted)[0] == pytest.approx(1e9 / 0.0561867, rel=1e-5)
     assert other[0] == usual[0]
     assert other[1] / usual[1] == pytest.approx(1 - 0.02 * (20 - degrees), rel=1e-12)
 

@@ -6,19 +6,17 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from cases.files.archives import archive
+from cases.files.archives import TYPES, archive
 from cases.files.damage import changed
 from cases.refusals import refuses
 from rom.errors import FileFormatError, MeshError
 from rom.fe.mesh.read import read_mesh
 
 FOREIGN = Path(__file__).parents[2] / "reference" / "foreign"
+BOTH = [*((kind, False) for kind in TYPES), ("tet4", True), ("tet10", True)]
 
 
-@pytest.mark.parametrize(("kind", "bricks"), [
-    ("tet4", False), ("tet10", False), ("hex8", False), ("hex20", False),
-    ("tet4", True), ("tet10", True),
-])  # fmt: skip
+@pytest.mark.parametrize(("kind", "bricks"), BOTH)
 def test_archives_are_read_in_every_shape(kind, bricks, tmp_path):
     text, mesh = archive(kind, bricks=bricks)
     (tmp_path / "box.cdb").write_text(text)

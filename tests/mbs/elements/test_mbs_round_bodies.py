@@ -9,6 +9,8 @@ from numpy.testing import assert_allclose
 from scipy.linalg import eigvals
 
 import rom
+from cases.mbs.mechanisms import prepared
+from cases.mbs.tangents import check_tangents
 from cases.mbs.tubes import tube
 from cases.refusals import refused, refuses
 from rom.body.damping import damped
@@ -149,8 +151,11 @@ def test_damping_inside_a_shaft_feeds_whirl_beyond_the_critical_speed():
 
 
 def test_damping_inside_takes_from_what_turns_the_shaft():
-    """Energy that whirl gains is booked as work of forces from outside."""
+    """Energy that whirl gains is booked as work of forces from outside, whose tangents go along."""
     mech = held("spin", 4000.0, k=1e7, damping=20.0, inside=3e-6)
+    packed, W = prepared(mech)
+    rest = packed.q, 0 * packed.v, 0 * packed.v, 0 * W.value
+    check_tangents(packed, W, rest, np.eye(packed.v.size)[:, 6:], 1e-6)
     mech.force("push", mech.part("shaft").marker("low"), lambda t: (1e3 * (t < 1e-3), 0, 0))
     sol = rom.simulate(mech, t_end=5e-3, dt=5e-6)
     assert rom.audit(sol).ok, rom.audit(sol)
