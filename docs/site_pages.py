@@ -94,7 +94,8 @@ def gallery_page(thumbnails: Path = THUMBNAILS) -> str:
 def error_page() -> str:
     """Every error with its exit code, its meaning and what to do, from `rom.errors`."""
     rows = ["| error | exit code | what it is | if its message has no cure |", "|---|---|---|---|"]
-    kinds = [e for e in vars(errors).values() if inspect.isclass(e) and hasattr(e, "exit_code")]
+    every = (e for e in vars(errors).values() if inspect.isclass(e))
+    kinds = [e for e in every if issubclass(e, errors.RomError)]
     for kind in sorted(kinds, key=lambda e: e.exit_code):
         if kind is not errors.RomError:
             meaning = " ".join((kind.__doc__ or "").split())
