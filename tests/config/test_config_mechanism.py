@@ -144,7 +144,7 @@ def test_every_section_reaches_the_mechanism(folder):
     cable = mech.tendons["rope"]
     assert cable.numbers == (2e3, 3.0, 0.0, 1e-3) and cable.function(2.0) == pytest.approx(3.8)
     assert [(one.radius, one.friction) for one in cable.stations[1:]] == [(0.02, 0.1), (0.0, 0.2)]
-    assert mech.frictions["d"].numbers[0] == 4 and mech.frictions["d"].numbers[-1] == 1e-3
+    assert mech.frictions["d"].laws[0][0] == 4 and mech.frictions["d"].laws[0][-1] == 1e-3
     assert mech.stops["e"].limits == ((1, np.pi / 4),)
     assert mech.contacts["k"].radius[0] == 0.05 and mech.contacts["k"].law.exponent == 1.5
     (folder / "all.toml").write_text(ALL.replace('pulleys."a.tip"]', 'pulleys."a.tap"]'))
