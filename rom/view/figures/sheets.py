@@ -104,7 +104,7 @@ def deformed(  # noqa: PLR0913  keywords of one picture
         drawn = _shape(area, shape)
         if shape.values is not None:
             where = {"location": "bottom", "fraction": 0.03, "pad": 0.02, "aspect": 24}
-            page.scale_beside(area, drawn, shape.label, ticks=MaxNLocator(5), **where)
+            page.scale_beside(area, drawn, shape.label, ticks=MaxNLocator(4), **where)
     for k, (name, (x, y)) in enumerate(curves.items()):
         look = {"color": LINES[k], "marker": MARKERS[k], "lw": 1.5}
         axes.semilogx(np.asarray(x), np.asarray(y), label=name, **look)
