@@ -88,14 +88,14 @@ def deformed(  # noqa: PLR0913  keywords of one picture
     """
     from matplotlib.ticker import MaxNLocator
 
-    left = PAGE_WIDTH - 30 - sum(s.width + 30 for s in shapes)
+    left = PAGE_WIDTH - 10 - sum(s.width + 50 for s in shapes)
     if left < 400 and ax is None:
         raise ConfigError(f"{len(shapes)} shapes leave {left} pixels for the curves; take fewer.")
     places = [(110, 120, left - 140, PANEL_HEIGHT)]
     for shape in shapes:
         below = 0 if shape.values is None else BAR_HEIGHT
         places.append((left, 120, shape.width, PANEL_HEIGHT + below))
-        left += shape.width + 30
+        left += shape.width + 50
     size = PAGE_WIDTH, 225 + PANEL_HEIGHT
     figure, (axes, *areas) = page.areas(ax, places, "deformed", size, title, caption)
     axes.set_title(heading, size=page.BODY_SIZE, loc="left")
