@@ -27,7 +27,6 @@ from rom.fe.mesh.sources.deck import (
     facets_of_nodes,
     of_materials,
     only_type,
-    outer_facets,
     positions,
     regions_of,
     to_gmsh,
@@ -234,7 +233,6 @@ def _facets(
     deck: Deck, ids: Index, cells: Index, cell_type: str, node_ids: Index
 ) -> tuple[dict[str, Index], list[str]]:
     n = node_ids.size
-    outer = outer_facets(cells, cell_type, n)
     facets: dict[str, Index] = {}
     known = deck.node_sets.names.items()
     sets = {name: deck.node_sets.of(key) for key, name in known if name not in deck.surfaces}
@@ -246,7 +244,7 @@ def _facets(
     for name, nodes in _skin_nodes(deck).items():
         sets.setdefault(name, nodes)
     found = {name: positions(node_ids, members, "node") for name, members in sets.items()}
-    by_nodes, remarks = facets_of_nodes(outer, found, cell_type, n)
+    by_nodes, remarks = facets_of_nodes(cells, found, cell_type, n)
     return facets | by_nodes, remarks
 
 

@@ -24,7 +24,6 @@ from rom.fe.mesh.sources.deck import (
     facets_of_nodes,
     of_materials,
     only_type,
-    outer_facets,
     positions,
     to_gmsh,
     unused,
@@ -101,7 +100,7 @@ def read(path: str) -> Read:
     materials, raw = map(np.array, zip(*deck.solids.values(), strict=True))
     cells, n = to_gmsh(positions(labels, raw, "node"), cell_type), len(labels)
     sets = {name: positions(labels, np.array(rows), "node") for name, rows in deck.sets.items()}
-    facets, remarks = facets_of_nodes(outer_facets(cells, cell_type, n), sets, cell_type, n)
+    facets, remarks = facets_of_nodes(cells, sets, cell_type, n)
     names = {int(number): f"material_{number}" for number in np.unique(materials)}
     told = {"region_names": names, "warnings": [*remarks, *unused(labels, cells)]}
     told |= {"provenance": {"parameters": {}}} | of_materials(_materials, deck.laws, names)

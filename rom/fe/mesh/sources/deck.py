@@ -61,17 +61,13 @@ def of_materials(read: Callable[..., Notes], *deck: object) -> dict[str, Notes]:
         return {"unread": {"message": error.message, "where": error.where, "hint": hint}}
 
 
-def outer_facets(cells: Index, cell_type: str, n_points: int) -> Index:
-    """(f, kf) facets of the outer surface."""
-    faces = faces_of(cells, READ_TYPES[cell_type], n_points)
-    listed = cells[:, np.array(READ_TYPES[cell_type].face_nodes)]
-    return listed[faces.count[faces.of_cell] == 1]
-
-
 def facets_of_nodes(
-    outer: Index, sets: Mapping[str, Index], cell_type: str, n_points: int
+    cells: Index, sets: Mapping[str, Index], cell_type: str, n_points: int
 ) -> tuple[dict[str, Index], list[str]]:
     """Outer facets all of whose corners are in a node set, and remarks on sets left out."""
+    faces = faces_of(cells, READ_TYPES[cell_type], n_points)
+    listed = cells[:, np.array(READ_TYPES[cell_type].face_nodes)]
+    outer = listed[faces.count[faces.of_cell] == 1]
     facets, remarks = {}, []
     for name, nodes in sets.items():
         chosen = np.zeros(n_points, dtype=bool)

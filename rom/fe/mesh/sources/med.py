@@ -16,7 +16,6 @@ from rom.fe.mesh.solid import Read, packed
 from rom.fe.mesh.sources.deck import (
     facets_of_nodes,
     only_type,
-    outer_facets,
     regions_of,
     to_gmsh,
 )
@@ -59,11 +58,10 @@ def _mesh(step: Group, groups: dict[str, dict[int, list[str]]]) -> Read:
     names, regions = regions_of(_members(solid, groups["ELEME"]), ids, "group")
     facets: dict[str, Index] = {}
     for kind in sorted(blocks.keys() & set(SKINS)):
-        for name, rows in _members(blocks[kind], groups["ELEME"]).items():
-            facets[name] = _nodes(blocks[kind])[rows]
+        skin, members = _nodes(blocks[kind]), _members(blocks[kind], groups["ELEME"])
+        facets |= {name: skin[rows] for name, rows in members.items()}
     nodes = _members(step["NOE"], groups["NOEUD"])
-    outer = outer_facets(cells, cell_type, len(points))
-    found, remarks = facets_of_nodes(outer, nodes, cell_type, len(points))
+    found, remarks = facets_of_nodes(cells, nodes, cell_type, len(points))
     told = {"warnings": remarks, "provenance": {"parameters": {}}, "region_names": names}
     return packed(points, cells, cell_type, regions, ids, facets=found | facets, **told)
 

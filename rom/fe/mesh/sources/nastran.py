@@ -18,7 +18,6 @@ from rom.fe.mesh.sources.deck import (
     facets_of_nodes,
     of_materials,
     only_type,
-    outer_facets,
     positions,
     to_gmsh,
     unused,
@@ -58,7 +57,7 @@ def read(path: str) -> Read:
     labels = {name: np.array(nodes, dtype=np.int64) for name, nodes in _sets(found[0], ids).items()}
     sets = {name: positions(ids, nodes, "node") for name, nodes in labels.items()}
     n = len(points)
-    facets, remarks = facets_of_nodes(outer_facets(cells, cell_type, n), sets, cell_type, n)
+    facets, remarks = facets_of_nodes(cells, sets, cell_type, n)
     names = {int(p): f"property_{p}" for p in np.unique(properties)}
     remarks = [*found[1], *remarks, *unused(ids, cells)]
     told = {"region_names": names, "warnings": remarks, "provenance": {"parameters": {}}}
