@@ -117,7 +117,8 @@ class Corrected:
 
     With W = (V / c, E^T) that matrix is A + W C W^T, C = ((0, c), (c, D)), and its inverse
     A^-1 - Y S^-1 Y^T, Y = A^-1 W, S = C^-1 + W^T Y; c makes both halves of S as large. V and E_T
-    are (n_local, d), ``gram`` is X^T Y summed over the ranks.
+    are (n_local, d), ``gram`` is X^T Y summed over the ranks. Rows of E that sum over a surface
+    make much of a small error, which lies along Z = A^-1 E^T and is taken off there.
 
     Source:
         Woodbury, Inverting modified matrices, Princeton University, Statistical Research Group,
@@ -136,11 +137,16 @@ class Corrected:
         self.Y = factor.solve(W)
         S = np.block([[-D / c**2, eye / c], [eye / c, 0.0 * eye]]) + gram(W, self.Y)
         self.S = lu_factor(0.5 * (S + S.T))
+        self.Z = Z = self.Y[:, len(D) :]
+        EZ = gram(E_T, Z)
+        self.KZ = dense_rows(self.A, Z) + V @ EZ + E_T @ (gram(V, Z) + D @ EZ)
+        self.K_zz = lu_factor(gram(Z, self.KZ))
 
     def solve(self, F: Array) -> Array:
         """Solutions for (n_local, k) right-hand sides."""
         X = self.factor.solve(F)
         X -= self.Y @ lu_solve(self.S, self.gram(self.Y, F))
+        X += self.Z @ lu_solve(self.K_zz, self.gram(self.Z, F) - self.gram(self.KZ, X))
         return X
 
     def apply(self, b: PETSc.Vec, x: PETSc.Vec) -> None:
