@@ -6,6 +6,7 @@
 #   sudo .ci/other_systems.sh debian trixie   the tests that need dolfinx or mpirun
 #   sudo .ci/other_systems.sh pip testing     the same, on the newest Python of Debian
 #   sudo .ci/other_systems.sh pip trixie tests/fe/test_fe_modes.py   these tests
+#   sudo .ci/other_systems.sh walks trixie    what newcomers type, timed, see .ci/walks.py
 set -eu
 
 fail() {
@@ -16,8 +17,8 @@ fail() {
 way="${1:-}"
 release="${2:-}"
 case "$way" in
-  debian | pip) ;;
-  *) fail "the way in is debian or pip, not '$way'" ;;
+  debian | pip | walks) ;;
+  *) fail "the way in is debian, pip or walks, not '$way'" ;;
 esac
 [ -n "$release" ] || fail "which release of Debian?"
 [ "$(id -u)" -eq 0 ] || fail "needs root, try sudo"
@@ -49,7 +50,7 @@ mount -t sysfs -o ro sysfs "$system/sys"
 mount -t devpts devpts "$system/dev/pts"
 mount -t tmpfs tmpfs "$system/dev/shm" # ranks talk through it
 
-chroot "$system" /usr/bin/env HOME=/root PATH=/usr/sbin:/usr/bin:/sbin:/bin OMP_NUM_THREADS=1 \
+chroot "$system" /usr/bin/env -i HOME=/root PATH=/usr/sbin:/usr/bin:/sbin:/bin OMP_NUM_THREADS=1 \
   OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 sh -c '
     set -eu
     cd /opt/rom
@@ -61,6 +62,11 @@ chroot "$system" /usr/bin/env HOME=/root PATH=/usr/sbin:/usr/bin:/sbin:/bin OMP_
     stamp() { { echo "$packages"; python3 -V; cat pyproject.toml; } 2>/dev/null | sha256sum; }
     if [ "$way" = debian ]; then
       .ci/setup.sh
+    elif [ "$way" = walks ]; then
+      apt-get update -qq
+      DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $packages \
+        >/dev/null
+      exec python3 .ci/walks.py
     elif [ "$(cat .venv/.stamp 2>/dev/null)" != "$(stamp)" ]; then
       # a mirror of testing may be some weeks behind
       apt-get -o Acquire::Check-Valid-Until=false update -qq

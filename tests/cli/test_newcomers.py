@@ -192,16 +192,14 @@ def test_a_part_alone_is_told_its_faces_and_the_next_command_works(tmp_path):
     """A face that is drawn, the command that is proposed, a report that turns at the end."""
     pytest.importorskip("pyvista", reason="pictures need pyvista")
     step_plate(tmp_path / "plate.step")
-    listed = run_rom("swing", "plate.step", "--json", "-q", cwd=tmp_path)
-    found = json.loads(listed.stdout)
+    asked = ("swing", "plate.step", "-p", "lc=0.006", "--unite", "--json", "-q")
+    found = json.loads(run_rom(*asked, cwd=tmp_path).stdout)
     assert len(found["faces"]) == 9 and (tmp_path / found["files"][0]).stat().st_size > 20_000
     (command,) = found["next"]
-    assert command == "rom swing plate.step --hinge 7 -o plate_swing"
-    ended = run_rom(*command.split()[1:], "-p", "lc=0.006", "-m", 4, "--json", cwd=tmp_path,
-                    timeout=900)  # fmt: skip
+    assert command == f"rom {' '.join(asked)} --hinge 7"
+    ended = run_rom(*command.split()[1:], "-m", 4, cwd=tmp_path, timeout=900)
     assert ended.returncode in (0, 5), ended.stderr
     left = {Path(name).name for name in json.loads(ended.stdout)["files"]}
-    assert left == {"plate.rom.npz", "plate.png", "plate.html", "motion.csv", "scene.json",
-                    "run.json"}  # fmt: skip
+    assert left == set("plate.rom.npz plate.png plate.html motion.csv scene.json run.json".split())
     page = (tmp_path / "plate_swing" / "plate.html").read_text(encoding="utf-8")
     assert "The body: frequencies" in page and '"schema":"rom-scene"' in page

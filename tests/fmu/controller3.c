@@ -30,3 +30,22 @@ int fmi3DoStep(double *x, double t, double h, bool kept, bool *event, bool *end,
     *last = t + h;
     return 0;
 }
+
+/* what importers look for, and nobody calls */
+#define NO(name) int fmi3##name(void) { return 3; }
+NO(ActivateModelPartition) NO(CompletedIntegratorStep) NO(DeserializeFMUState)
+NO(EnterConfigurationMode) NO(EnterContinuousTimeMode) NO(EnterEventMode) NO(EnterStepMode)
+NO(EvaluateDiscreteStates) NO(ExitConfigurationMode) NO(FreeFMUState) NO(GetAdjointDerivative)
+NO(GetBinary) NO(GetBoolean) NO(GetClock) NO(GetContinuousStateDerivatives) NO(GetContinuousStates)
+NO(GetDirectionalDerivative) NO(GetEventIndicators) NO(GetFMUState) NO(GetFloat32) NO(GetInt16)
+NO(GetInt32) NO(GetInt64) NO(GetInt8) NO(GetIntervalDecimal) NO(GetIntervalFraction)
+NO(GetNominalsOfContinuousStates) NO(GetNumberOfContinuousStates) NO(GetNumberOfEventIndicators)
+NO(GetNumberOfVariableDependencies) NO(GetOutputDerivatives) NO(GetShiftDecimal)
+NO(GetShiftFraction) NO(GetString) NO(GetUInt16) NO(GetUInt32) NO(GetUInt64) NO(GetUInt8)
+NO(GetVariableDependencies) NO(GetVersion) NO(InstantiateModelExchange)
+NO(InstantiateScheduledExecution) NO(Reset) NO(SerializeFMUState) NO(SerializedFMUStateSize)
+NO(SetBinary) NO(SetBoolean) NO(SetClock) NO(SetContinuousStates) NO(SetDebugLogging)
+NO(SetFMUState) NO(SetFloat32) NO(SetInt16) NO(SetInt32) NO(SetInt64) NO(SetInt8)
+NO(SetIntervalDecimal) NO(SetIntervalFraction) NO(SetShiftDecimal) NO(SetShiftFraction)
+NO(SetString) NO(SetTime) NO(SetUInt16) NO(SetUInt32) NO(SetUInt64) NO(SetUInt8) NO(Terminate)
+NO(UpdateDiscreteStates)

@@ -9,9 +9,9 @@ there are the single verbs: mesh, reduce, check, simulate, view, report.
 
 import argparse
 import logging
-import os
 import shlex
-import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from math import pi, sqrt
@@ -40,6 +40,8 @@ from rom.cli.options import (
 from rom.cli.output import add_force, check_encoder, checked, claim, typed_command, usual
 from rom.model import Array
 from rom.names import inside
+from rom.process.child import end, python, start
+from rom.process.launcher import ranks
 from rom.view.canvas.scales import round_length
 
 if TYPE_CHECKING:
@@ -88,16 +90,12 @@ def run(args: argparse.Namespace) -> Answer:
         return _faces(args)
     files = _files(args)
     hinge, faces = hinge_of(args.hinge)
-    body, swing = _reduced(args, hinge, faces)
-    log.info("%s hangs on %s and swings for %.3g s", body.name, args.hinge, swing.t_end)
-    if not compiled_before():
-        log.info("move it without compiling first, which takes some seconds")
-        import numba
-
-        numba.config.DISABLE_JIT = True  # compiling takes longer than one swing in Python
-    hung = pendulum(body, hinge, axis=swing.axis, gravity=swing.gravity)
-    dt = swing.t_end / N_STEPS
-    solution = rom.simulate(hung, t_end=swing.t_end, dt=dt, rho_inf=0.5)
+    with _compiling():
+        body, swing = _reduced(args, hinge, faces)
+        log.info("%s hangs on %s and swings for %.3g s", body.name, args.hinge, swing.t_end)
+        hung = pendulum(body, hinge, axis=swing.axis, gravity=swing.gravity)
+        dt = swing.t_end / N_STEPS
+        solution = rom.simulate(hung, t_end=swing.t_end, dt=dt, rho_inf=0.5)
     magnify = args.magnify or magnification(body, solution.elastic(body.name))
     data = {
         "files": [str(path) for path in files.values()],
@@ -114,6 +112,24 @@ def run(args: argparse.Namespace) -> Answer:
     return Answer(data, _text(body, hinge, data), write, failed)
 
 
+@contextmanager
+def _compiling() -> Iterator[None]:
+    """Meanwhile another process compiles what a first motion needs, where nobody has yet."""
+    from rom.doctor.first_use import MODULE_NAME
+    from rom.mbs.compiler.cache import CODE_FILES
+    from rom.mbs.integrate.generalized_alpha import advance
+
+    code = CODE_FILES.get(advance.kernel.py_func)
+    if code is None or code.full() or ranks()[1] > 1:
+        yield
+        return
+    process = start(python(MODULE_NAME, "slider-crank"))
+    try:
+        yield
+    finally:
+        end(process)
+
+
 def _faces(args: argparse.Namespace) -> Answer:
     """What the part may hang on, with the command that does it."""
     from rom.cli.verbs import mesh
@@ -123,9 +139,7 @@ def _faces(args: argparse.Namespace) -> Answer:
     found = mesh.run(argparse.Namespace(**asked))
     bores = [face["number"] for face in found.data.get("faces", ()) if face["kind"] == "cylinder"]
     hinge = str((*bores, 1)[0]) if is_step else next(iter(found.data["interfaces"]), "FACE")
-    words = ["rom", "swing", str(args.file), "--hinge", hinge, "-o", str(args.output)]
-    units = ["--units", args.units] if args.units != "SI" else []
-    command = shlex.join([*words, *units])
+    command = f"{typed_command(args)} --hinge {shlex.quote(hinge)}"
     text = f"{found.text}\n\n{drawn} shows them. Choose one for --hinge, for example\n  {command}"
     data = {"files": [str(drawn)], "faces": found.data.get("faces", []), "next": [command]}
     return replace(found, data=data, text=text)
@@ -232,17 +246,6 @@ def _across(arm: Array, axis: Array | None) -> Array:
     down = -np.eye(3)[int(np.argmax(np.abs(np.cross(arm, axis)) + preferred))]
     down = down - (down @ axis) * axis
     return 9.81 * down / np.linalg.norm(down) + 0.0
-
-
-def compiled_before() -> bool:
-    """Whether the integrator is compiled; asked before it is imported, which decides."""
-    if "rom.mbs.kernels.compiled" in sys.modules:
-        return True
-    places = [Path(rom.mbs.__path__[0]), Path.home() / ".cache" / "numba"]
-    places += [Path(p) for p in (os.environ.get("NUMBA_CACHE_DIR"),) if p]
-    return any(
-        place.is_dir() and any(place.rglob("generalized_alpha.advance-*.nbi")) for place in places
-    )
 
 
 def pendulum(
