@@ -31,6 +31,7 @@ READER_ADVICE = {  # ending: what reads such a file
     ".toml": "rom.read_mechanism reads mechanisms, rom.read_component reads components.",
 }
 MAX_BYTES = 4 * 1024**3  # that the arrays may have in memory before reading is refused
+LARGER_HINT = "If it is yours, pass a larger limit to load."
 
 
 class Kind(NamedTuple):
@@ -107,13 +108,13 @@ def digest(A: Array) -> str:
     return hashlib.sha256(f"{A.dtype.str}{A.shape}".encode() + A.tobytes()).hexdigest()
 
 
-def refuse_hostile(archive: zipfile.ZipFile, limit: int) -> None:
+def refuse_hostile(archive: zipfile.ZipFile, limit: int, hint: str = LARGER_HINT) -> None:
     """What fills the memory, or is written elsewhere by whoever unpacks it by other means."""
     total = sum(info.file_size for info in archive.infolist())
     if total > limit:
         raise UnsafeFileError(
             f"the file unpacks to {total / 1e9:.2f} GB, above the limit of {limit / 1e9:.2f} GB.",
-            hint="If it is yours, pass a larger limit to load.",
+            hint=hint,
         )
     for name in archive.namelist():
         if name.startswith("/") or "\\" in name or ".." in name.split("/"):

@@ -29,7 +29,7 @@ def variables(path: str | Path) -> dict[str, str]:
     with in_file(path):
         try:
             with zipfile.ZipFile(path) as archive:
-                refuse_hostile(archive, MAX_BYTES)
+                refuse_hostile(archive, MAX_BYTES, "Leave out what it can do without.")
                 names = archive.namelist()
             found = fmpy.read_model_description(str(path), validate=False)
         except RomError:
