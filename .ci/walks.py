@@ -105,11 +105,11 @@ class Walk:
         print(f"{time.perf_counter() - begun:6.1f} s  {line}", flush=True)
         return said
 
-    def runs(self, page, *which, after=""):
+    def runs(self, page, *which):
         """These blocks of Python of a page, as one program."""
         text = (HOME / "docs" / page).read_text()
         blocks = re.findall(r"^```python\n(.*?)^```$", text, re.M | re.S)
-        (self.folder / "block.py").write_text("".join(blocks[k] for k in which) + after)
+        (self.folder / "block.py").write_text("".join(blocks[k] for k in which))
         return self.types("python block.py")
 
     def leaves(self, *names):
@@ -197,7 +197,6 @@ def control(_):
 
 
 if __name__ == "__main__":
-    start = time.perf_counter()
     subprocess.run([sys.executable, "-m", "venv", "--clear", HOME / ".venv"], check=True)
     start = time.perf_counter()
     subprocess.run([BIN / "pip", "install", "-q", "--no-compile", f"{HOME}[fe,view]"], check=True)
