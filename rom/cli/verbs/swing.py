@@ -45,6 +45,7 @@ from rom.process.launcher import ranks
 from rom.view.canvas.scales import round_length
 
 if TYPE_CHECKING:
+    from rom.config.component import Component
     from rom.reduction.full_model import MassProperties
 
 log = logging.getLogger("rom")
@@ -90,8 +91,10 @@ def run(args: argparse.Namespace) -> Answer:
         return _faces(args)
     files = _files(args)
     hinge, faces = hinge_of(args.hinge)
+    part, full = _model(args, faces)
+    swing = _planned(args, full, hinge)
     with _compiling():
-        body, swing = _reduced(args, hinge, faces)
+        body = part.body(full) if part else _reduced(args, full, hinge)
         log.info("%s hangs on %s and swings for %.3g s", body.name, args.hinge, swing.t_end)
         hung = pendulum(body, hinge, axis=swing.axis, gravity=swing.gravity)
         dt = swing.t_end / N_STEPS
@@ -167,24 +170,31 @@ def hinge_of(text: str) -> tuple[str, dict[str, str]]:
     return ("hinge", {"hinge": face(text, "--hinge")}) if is_pick(text) else (text, {})
 
 
-def _reduced(
-    args: argparse.Namespace, hinge: str, faces: dict[str, str]
-) -> "tuple[rom.FlexibleBody, Swing]":
-    """The body, and how it will swing, which is refused before the reduction."""
-    part = component(args, *OWN_OPTIONS) if described(args) else None
-    how = {} if part else reading(args)  # refused before dolfinx is loaded
-    if part is None:
-        how["faces"] = unique([*how["faces"].items(), *faces.items()], "--face")
+def _model(
+    args: argparse.Namespace, faces: dict[str, str]
+) -> "tuple[Component | None, rom.FEModel]":
+    """What a component file says, if that is given, and the part."""
+    if described(args):
+        part = component(args, *OWN_OPTIONS)
+        return part, part.model()
+    how = reading(args)  # refused before dolfinx is loaded
+    how["faces"] = unique([*how["faces"].items(), *faces.items()], "--face")
     from rom.fe.elasticity import model
+
+    return None, model(args.file, material=material(args, USUAL), **how)
+
+
+def _planned(args: argparse.Namespace, full: "rom.FEModel", hinge: str) -> "Swing":
+    """How the part will swing, which is refused before the reduction."""
     from rom.reduction.interfaces.connection import found
 
-    full = part.model() if part else model(args.file, material=material(args, USUAL), **how)
     (at,), rigid = found(full, [hinge]), rom.mass_properties(full)
     log.info("%s: %d dofs, %.4g kg", args.file, full.n_dofs, rigid.mass)
-    swing = planned(rigid, at.origin, args.gravity, args.t_end, axis=at.axis)
-    if part:
-        return part.body(full), swing
-    body = rom.reduce(
+    return planned(rigid, at.origin, args.gravity, args.t_end, axis=at.axis)
+
+
+def _reduced(args: argparse.Namespace, full: "rom.FEModel", hinge: str) -> "rom.FlexibleBody":
+    return rom.reduce(
         full,
         method=rom.CraigBampton(args.modes),
         interfaces={hinge: "rbe2"},
@@ -192,7 +202,6 @@ def _reduced(
         damping=rom.ModalDamping(0.01, fixed=(hinge,)),
         name=args.file.stem,
     )
-    return body, swing
 
 
 @dataclass(frozen=True, slots=True)
