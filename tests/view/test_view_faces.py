@@ -9,7 +9,6 @@ pytest.importorskip("matplotlib", reason="pictures need matplotlib")
 from cases.refusals import refuses
 from rom import view
 from rom.errors import ConfigError
-from rom.view.canvas.offscreen import render
 from rom.view.canvas.scene import aimed
 from rom.view.scenes import faces as scene
 
@@ -30,8 +29,7 @@ def test_a_box_shows_three_faces_to_each_side():
     points, patches = box_patches()
     camera = aimed(points, 200)
     both = np.stack([points, scene._turned(points, camera)])
-    colours = render(scene._coded(both, patches), camera, oversampling=1)
-    spots = [scene._spots(n, list(patches)) for n in scene._numbers(colours, 6)]
+    spots = [scene._spots(n, list(patches)) for n in scene._numbers(both, patches, camera)]
     seen = [{spot.label for spot in side} for side in spots]
     toward = {"xyz"[k] + ("-" if camera.toward[k] < 0 else "+") for k in range(3)}
     assert seen == [toward, set(patches) - toward]

@@ -45,7 +45,6 @@ from rom.process.launcher import ranks
 from rom.view.canvas.scales import round_length
 
 if TYPE_CHECKING:
-    from rom.config.component import Component
     from rom.reduction.full_model import MassProperties
 
 log = logging.getLogger("rom")
@@ -91,8 +90,13 @@ def run(args: argparse.Namespace) -> Answer:
         return _faces(args)
     files = _files(args)
     hinge, faces = hinge_of(args.hinge)
-    part, full = _model(args, faces)
-    swing = _planned(args, full, hinge)
+    part = component(args, *OWN_OPTIONS) if described(args) else None
+    full = part.model() if part else _model(args, faces)
+    from rom.reduction.interfaces.connection import found
+
+    (at,), rigid = found(full, [hinge]), rom.mass_properties(full)
+    log.info("%s: %d dofs, %.4g kg", args.file, full.n_dofs, rigid.mass)
+    swing = planned(rigid, at.origin, args.gravity, args.t_end, axis=at.axis)
     with _compiling():
         body = part.body(full) if part else _reduced(args, full, hinge)
         log.info("%s hangs on %s and swings for %.3g s", body.name, args.hinge, swing.t_end)
@@ -170,27 +174,12 @@ def hinge_of(text: str) -> tuple[str, dict[str, str]]:
     return ("hinge", {"hinge": face(text, "--hinge")}) if is_pick(text) else (text, {})
 
 
-def _model(
-    args: argparse.Namespace, faces: dict[str, str]
-) -> "tuple[Component | None, rom.FEModel]":
-    """What a component file says, if that is given, and the part."""
-    if described(args):
-        part = component(args, *OWN_OPTIONS)
-        return part, part.model()
+def _model(args: argparse.Namespace, faces: dict[str, str]) -> "rom.FEModel":
     how = reading(args)  # refused before dolfinx is loaded
     how["faces"] = unique([*how["faces"].items(), *faces.items()], "--face")
     from rom.fe.elasticity import model
 
-    return None, model(args.file, material=material(args, USUAL), **how)
-
-
-def _planned(args: argparse.Namespace, full: "rom.FEModel", hinge: str) -> "Swing":
-    """How the part will swing, which is refused before the reduction."""
-    from rom.reduction.interfaces.connection import found
-
-    (at,), rigid = found(full, [hinge]), rom.mass_properties(full)
-    log.info("%s: %d dofs, %.4g kg", args.file, full.n_dofs, rigid.mass)
-    return planned(rigid, at.origin, args.gravity, args.t_end, axis=at.axis)
+    return model(args.file, material=material(args, USUAL), **how)
 
 
 def _reduced(args: argparse.Namespace, full: "rom.FEModel", hinge: str) -> "rom.FlexibleBody":

@@ -1,6 +1,6 @@
-"""Child process: draws the scenes in folders with VTK and leaves the pixels there.
+"""Child process: draws the scene in a folder with VTK and leaves the pixels there.
 
-Started by `rom.view.canvas.offscreen` as ``python -m rom.view.canvas.draw FOLDER ...``.
+Started by `rom.view.canvas.offscreen` as ``python -m rom.view.canvas.draw FOLDER``.
 """
 
 import json
@@ -115,5 +115,4 @@ def _grid(points: "Array", cells: "Index") -> Any:
 
 
 if __name__ == "__main__":
-    for name in sys.argv[1:]:
-        main(Path(name))
+    main(Path(sys.argv[1]))

@@ -31,30 +31,19 @@ PAGE_STYLE = {"font.family": "DejaVu Sans", "axes.edgecolor": "#5c636e", "axes.l
 def render(
     actors: Sequence[Actor],
     camera: Camera,
+    *,
     limits: tuple[float, float] = (0.0, 1.0),
     oversampling: int = OVERSAMPLING,
 ) -> Image:
     """(f, height, width, 3) pixels; limits are of the colours, and what has one frame stays."""
-    return renders((actors, camera, limits, oversampling))[0]
-
-
-def renders(*scenes: tuple[Sequence[Actor], Camera, tuple[float, float], int]) -> list[Image]:
-    """The same of several scenes, drawn by one process."""
     require("pyvista")
-    with scratch("view") as place:
-        folders = [place / str(k) for k in range(len(scenes))]
-        for folder, scene in zip(folders, scenes, strict=True):
-            folder.mkdir()
-            write_scene(folder, *scene)
-        n = sum(max(len(actor.points) for actor in scene[0]) for scene in scenes)
-        with followed(n, f"drawing {n} pictures", lambda: _drawn(folders)):
-            show("rom.view.canvas.draw", *folders)
-        return [np.load(folder / "pictures.npy", allow_pickle=False) for folder in folders]
-
-
-def _drawn(folders: Sequence[Path]) -> int:
-    counts = [folder / COUNT_FILE for folder in folders]
-    return sum(count.stat().st_size for count in counts if count.exists())
+    with scratch("view") as folder:
+        write_scene(folder, actors, camera, limits, oversampling)
+        n, count = max(len(actor.points) for actor in actors), folder / COUNT_FILE
+        label = f"drawing {n} pictures"
+        with followed(n, label, lambda: count.stat().st_size if count.exists() else 0):
+            show("rom.view.canvas.draw", folder)
+        return np.load(folder / "pictures.npy", allow_pickle=False)
 
 
 def require(package: str) -> None:
@@ -102,9 +91,9 @@ def write_scene(
     (folder / "scene.json").write_text(json.dumps(scene | {"colours": COLOUR_MAP}))
 
 
-def show(module: str, *folders: Path) -> None:
-    """Let a module that draws do so with what it finds in folders, to its good end."""
-    done = run(python(module, *map(str, folders)))
+def show(module: str, folder: Path) -> None:
+    """Let a module that draws do so with what it finds in a folder, to its good end."""
+    done = run(python(module, str(folder)))
     if done.code:
         how = f"signal {-done.code}" if done.code < 0 else f"code {done.code}"
         raise ConfigError(

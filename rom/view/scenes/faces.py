@@ -13,7 +13,7 @@ from rom.arguments import typed
 from rom.errors import ConfigError
 from rom.model import Array, Index
 from rom.view.canvas import page
-from rom.view.canvas.offscreen import OVERSAMPLING, Image, renders
+from rom.view.canvas.offscreen import render
 from rom.view.canvas.scene import TEXT_COLOUR, Actor, Camera, aimed, boundary
 
 if TYPE_CHECKING:
@@ -65,10 +65,8 @@ def faces(
     used = np.unique(np.concatenate([t.ravel() for t in triangles.values()]))
     camera = aimed(x[used], PAGE_WIDTH, view=view, up=up, heights=(0.2, 0.6))
     both = np.stack([x, _turned(x, camera)])
-    seen, coded = list(_actors(both, triangles)), _coded(both, triangles)
-    ways = camera, (0.0, 1.0)
-    images, colours = renders((seen, *ways, OVERSAMPLING), (coded, *ways, 1))
-    sides = _numbers(colours, len(triangles))
+    images = render(list(_actors(both, triangles)), camera)
+    sides = _numbers(both, triangles, camera)
     placed = [_placed(_spots(side, list(triangles)), camera.size) for side in sides]
     below = images.shape[1] + GAP
     words = _words(x[used], triangles, placed)
@@ -98,17 +96,13 @@ def _actors(x: Array, triangles: Mapping[str, Index]) -> Iterator[Actor]:
     yield Actor(x, edges, colour=EDGE_COLOUR, width=1.2)
 
 
-def _coded(x: Array, triangles: Mapping[str, Index]) -> list[Actor]:
-    """Faces whose colours are their numbers, from 1 on."""
+def _numbers(x: Array, triangles: Mapping[str, Index], camera: Camera) -> Index:
+    """(2, height, width) from 1 on, the face seen in each pixel; other numbers at edges."""
     every = enumerate(triangles.values(), 1)
-    return [Actor(x, t, colour=f"#{k:06x}", lit=False) for k, t in every if len(t)]
-
-
-def _numbers(colours: Image, n: int) -> Index:
-    """(2, height, width) from 1 to n, the face seen in each pixel; other numbers at edges."""
-    r, g, b = np.moveaxis(colours.astype(np.int64), -1, 0)
+    flat = [Actor(x, t, colour=f"#{k:06x}", lit=False) for k, t in every if len(t)]
+    r, g, b = np.moveaxis(render(flat, camera, oversampling=1).astype(np.int64), -1, 0)
     numbers = (r << 16) + (g << 8) + b
-    return np.where(numbers <= n, numbers, 0)
+    return np.where(numbers <= len(triangles), numbers, 0)
 
 
 @dataclass(frozen=True, slots=True)
