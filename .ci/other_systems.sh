@@ -60,18 +60,19 @@ chroot "$system" /usr/bin/env -i HOME=/root PATH=/usr/sbin:/usr/bin:/sbin:/bin O
     packages="python3-venv python3-dev gcc libgl1 libegl1 libxrender1 libglu1-mesa libxcursor1
       libxft2 libxinerama1"
     stamp() { { echo "$packages"; python3 -V; cat pyproject.toml; } 2>/dev/null | sha256sum; }
-    if [ "$way" = debian ]; then
-      .ci/setup.sh
-    elif [ "$way" = walks ]; then
-      apt-get update -qq
-      DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $packages \
-        >/dev/null
-      exec python3 .ci/walks.py
-    elif [ "$(cat .venv/.stamp 2>/dev/null)" != "$(stamp)" ]; then
+    install() {
       # a mirror of testing may be some weeks behind
       apt-get -o Acquire::Check-Valid-Until=false update -qq
       DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $packages \
         >/dev/null
+    }
+    if [ "$way" = debian ]; then
+      .ci/setup.sh
+    elif [ "$way" = walks ]; then
+      install
+      exec python3 .ci/walks.py
+    elif [ "$(cat .venv/.stamp 2>/dev/null)" != "$(stamp)" ]; then
+      install
       python3 -m venv --clear .venv
       .venv/bin/python -m pip install -q --disable-pip-version-check -e ".[fe,view,dev]"
       stamp >.venv/.stamp
