@@ -38,6 +38,7 @@ FIELDS = {
     "rom.components.masonry.field": "masonry",
     "rom.components.orbits.field": "orbits",
     "rom.components.rockfall.field": "rockfall",
+    "rom.components.studies.field": "study",
     "rom.components.updating.field": "update",
     "rom.components.wheels.field": "reduce.CyclicSector",
     "rom.components.wind.field": "wind",

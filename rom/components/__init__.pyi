@@ -7,6 +7,7 @@ from rom.components import journal_bearing as journal_bearing
 from rom.components import linkages as linkages
 from rom.components import masonry as masonry
 from rom.components import rockfall as rockfall
+from rom.components import studies as studies
 from rom.components import transmission as transmission
 from rom.components import updating as updating
 from rom.components import wind as wind

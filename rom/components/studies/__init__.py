@@ -1,0 +1,9 @@
+"""Runs in hundreds: samples of parameters, measured on many processes, kept one by one.
+
+`samples` makes tables of parameters, `running` hands them to executors, `worker` measures them
+there, `journal` keeps what came back, and `study` is the call and what it answers.
+"""
+
+from rom.lazy import front
+
+front(__name__)

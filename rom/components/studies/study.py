@@ -1,0 +1,367 @@
+"""A study: a measure at many samples of its parameters, and what that tells."""
+
+import pickle
+import platform
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import Annotated, Any
+
+import numpy as np
+from scipy.stats import binom
+
+import rom
+from rom.arguments import Count, NotNegative, typed
+from rom.components.studies.journal import Journal, Row, packed, read, unpacked
+from rom.components.studies.running import answers, here, processes
+from rom.components.studies.worker import Answer
+from rom.errors import ConfigError, warn
+from rom.model import Array, Index
+from rom.names import check_known
+from rom.process.progress import Progress, looked_for
+
+BYTES_PER_GIGABYTE = 2**30
+MOST_TOLD = 3  # failures that a report names
+SEND = "Define it with def in a file that can be imported, without what cannot be pickled."
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """What was measured at each sample; rows of samples that failed hold NaN."""
+
+    parameters: dict[str, Array]  # {parameter: (n,) values}
+    values: dict[str, Array]  # {what was measured: (n, ...)}
+    failed: dict[int, str]  # {sample: class of the error, and its text}
+    seconds: Array  # (n,) that each sample took
+
+    def __repr__(self) -> str:
+        n, names = len(self.seconds), ", ".join(map(repr, self.values))
+        bad = f", {len(self.failed)} failed" if self.failed else ""
+        return f"Study({n} samples of {len(self.parameters)} parameters: {names}{bad})"
+
+    @property
+    def good(self) -> Index:
+        """Numbers of the samples that did not fail."""
+        return np.setdiff1d(np.arange(len(self.seconds)), list(self.failed))
+
+    @property
+    def table(self) -> Any:
+        """Parameters, numbers and failures by sample: a DataFrame, or without pandas a dict."""
+        numbers = {name: x for name, x in self.values.items() if x.ndim == 1}
+        failed = [self.failed.get(k, "") for k in range(len(self.seconds))]
+        columns = {**self.parameters, **numbers, "failed": np.array(failed)}
+        try:
+            import pandas as pd
+        except ModuleNotFoundError:
+            return columns
+        return pd.DataFrame(columns).rename_axis("sample")
+
+    def to_xarray(self, clock: str = "t") -> Any:
+        """All of it as a Dataset by sample, and by the values of a clock that all samples share.
+
+        Raises:
+            ModuleNotFoundError: without xarray.
+        """
+        import xarray as xr
+
+        times = self.values.get(clock, np.zeros(0))
+        shared = times.ndim == 2 and bool((times[self.good] == times[self.good][:1]).all())
+        found: dict[str, Any] = {name: ("sample", x) for name, x in self.parameters.items()}
+        coordinates: dict[str, Any] = {"sample": np.arange(len(self.seconds))}
+        if shared:
+            coordinates[clock] = times[self.good][0]
+        for name, x in self.values.items():
+            of = [clock if shared and m == times.shape[1] else f"{name}_{k}"
+                  for k, m in enumerate(x.shape[1:])]  # fmt: skip
+            found |= {} if shared and name == clock else {name: (("sample", *of), x)}
+        return xr.Dataset(found, coordinates)
+
+    def quantiles(
+        self, name: str, shares: Sequence[float] = (0.05, 0.5, 0.95), level: float = 0.95
+    ) -> tuple[Array, Array]:
+        """Quantiles (q, ...) of a value, and the ends (q, 2, ...) between which they lie.
+
+        The ends are order statistics, right for every distribution; infinite where the samples are
+        too few to say.
+
+        Source:
+            Conover, Practical nonparametric statistics, 1999, section 3.2.
+        """
+        x = np.sort(self._value(name)[self.good], axis=0)
+        n, tail = len(x), (1 - level) / 2
+        if not n:
+            raise ConfigError(f"all samples of {name!r} failed.")
+        edge = np.full((1, *x.shape[1:]), np.inf)
+        ordered = np.concatenate([-edge, x, edge])
+        low, high = (binom.ppf(p, n, shares).astype(int) for p in (tail, 1 - tail))
+        ends = np.stack([ordered[low], ordered[np.minimum(high + 1, n + 1)]], axis=1)
+        return np.quantile(x, shares, axis=0), ends
+
+    def indices(
+        self, name: str, *, rng: np.random.Generator, resamples: int = 1000, level: float = 0.95
+    ) -> "Indices":
+        """Sobol indices of a number, of a study of the samples of `indices_design`.
+
+        Samples that failed leave out those that belong to them. The intervals are of a bootstrap.
+
+        Source:
+            Saltelli et al., Comput. Phys. Comm. 181 (2010) 259, table 2: (b), and (f) of
+            Jansen.
+
+        Raises:
+            ConfigError: for samples that are not of `indices_design`.
+        """
+        k, value = len(self.parameters), self._value(name)
+        n = len(value) // (k + 2)
+        X = np.stack([x.reshape(k + 2, n) if x.size == n * (k + 2) else np.zeros((k + 2, n))
+                      for x in self.parameters.values()])  # fmt: skip
+        swapped = [X[j, 2 + i] == X[j, int(i == j)] for i in range(k) for j in range(k)]
+        if n < 2 or value.ndim > 1 or not np.all(swapped):
+            raise ConfigError(
+                "indices are of a number at the samples of rom.components.studies.indices_design."
+            )
+        f = value.reshape(k + 2, n)
+        f = f[:, np.isfinite(f).all(axis=0)]
+        chosen = rng.integers(f.shape[1], size=(resamples, f.shape[1]))
+        drawn = np.array([_indices(f[:, rows]) for rows in chosen])
+        ends = np.quantile(drawn, [(1 - level) / 2, (1 + level) / 2], axis=0)
+        first, total = _indices(f)
+        names = tuple(self.parameters)
+        return Indices(names, first, total, ends[:, 0].T, ends[:, 1].T)
+
+    def _value(self, name: str) -> Array:
+        check_known(name, self.values, f"nothing measured is called {name!r}; there are")
+        return self.values[name]
+
+
+@dataclass(frozen=True, eq=False)
+class Indices:
+    """Shares of a variance that come from each parameter."""
+
+    parameters: tuple[str, ...]
+    first: Array  # (k,) from this parameter alone
+    total: Array  # (k,) from it and from what it does together with others
+    first_ends: Array  # (k, 2) of the interval
+    total_ends: Array  # (k, 2)
+
+    def __str__(self) -> str:
+        width = max(map(len, self.parameters))
+        rows = zip(
+            self.parameters, self.first, self.first_ends, self.total, self.total_ends, strict=True
+        )
+        head = f"{'':{width}}  first order              total"
+        return "\n".join([head, *(
+            f"{name:{width}}  {s:6.3f} ({a:6.3f} to {b:6.3f})  {t:6.3f} ({c:6.3f} to {d:6.3f})"
+            for name, s, (a, b), t, (c, d) in rows
+        )])  # fmt: skip
+
+
+def _indices(f: Array) -> tuple[Array, Array]:
+    """First-order and total indices of (k + 2, n) values."""
+    variance = f[:2].var()
+    f = f - f[:2].mean()
+    first = (f[1] * (f[2:] - f[0])).mean(axis=1) / variance
+    return first, 0.5 * ((f[0] - f[2:]) ** 2).mean(axis=1) / variance
+
+
+@typed
+def study(  # noqa: PLR0913  what runs, where, within which limits, and what is kept
+    measure: Callable[..., Any],
+    samples: Mapping[str, Any],
+    *,
+    executor: Any = None,
+    workers: Annotated[int, Count(0)] | None = None,
+    into: str | Path | None = None,
+    resume: bool = False,
+    time_limit: Annotated[float, NotNegative("s")] = 0.0,
+    memory_limit: Annotated[float, NotNegative("1")] = 0.0,
+    progress: bool = True,
+) -> Study:
+    """Measure something at many samples of its parameters, on many processes.
+
+    The answer is the same to the bit whatever the workers and the order in which they end, as far
+    as the measure is. A sample that fails is a row with its error, and the study goes on; so is one
+    that ends its process.
+
+    Args:
+        measure: function of named parameters that returns named numbers or arrays, always the same
+            names and shapes. It goes to other processes, so it stands in a file that can be
+            imported, or in the script that runs, whose call of `study` then stands under
+            ``if __name__ == "__main__"``.
+        samples: {parameter: (n,) values}, numbers or texts, or a DataFrame; see
+            `rom.components.studies.design`.
+        executor: of the standard's kind: `concurrent.futures`, ``mpi4py.futures``,
+            ``dask.distributed.Client().get_executor()``; None for processes of this machine.
+        workers: processes of this machine, None for one on each core, 0 for this process itself.
+        into: file, ending in ``.study``, to which each answer is added as it comes.
+        resume: go on with that file, and repeat nothing of it.
+        time_limit: of a sample, by the clock [s]; 0 for none.
+        memory_limit: of a worker [GiB]; 0 for none.
+        progress: show how many are done, how fast, and the time that is left.
+
+    Raises:
+        ConfigError: for a measure that cannot be sent, samples of different lengths, or a file of
+            another study.
+        ResourceError: for a full disk, a file that another study writes, or a broken executor;
+            what was measured is kept.
+    """
+    columns = _columns(samples)
+    n = len(next(iter(columns.values())))
+    payload = b"" if executor is None and workers == 0 else _pickled(measure)
+    head = {"measure": _name(measure), "parameters": columns, "made with": {
+        "rom": rom.__version__, "python": platform.python_version(), "numpy": np.__version__,
+    }}  # fmt: skip
+    limits = time_limit, int(memory_limit * BYTES_PER_GIGABYTE)
+    if executor is None and workers == 0 and any(limits):
+        raise ConfigError("limits are of processes of their own; leave out workers=0.")
+    with Journal(Path(into), head, resume=resume) if into else nullcontext() as journal:
+        rows = {row["sample"]: row for row in journal.rows} if journal else {}
+        shapes = _shapes(rows.values())
+        todo = [(k, {name: x[k] for name, x in columns.items()}) for k in range(n) if k not in rows]
+        with (
+            _executor(executor, workers, len(todo)) as ready,
+            _told(progress, n, len(rows)) as tell,
+        ):
+            found = (
+                here(measure, todo, limits)
+                if ready is None
+                else answers(ready, payload, todo, limits)
+            )
+            for number, answer in found:
+                row = _row(number, answer, shapes)
+                rows[number] = row
+                if journal:
+                    journal.add(row)
+                tell("failed" in row)
+    made = _study(columns, rows)
+    warn(_failures(made))
+    return made
+
+
+def read_study(path: str | Path) -> Study:
+    """What a file holds, of a study that came to its end or did not.
+
+    Raises:
+        FileFormatError: for a file that is none, or damaged; a last line that is cut is left out.
+    """
+    head, rows = read(path)
+    return _study(head["parameters"], {row["sample"]: row for row in rows})
+
+
+def _columns(samples: Mapping[str, Any]) -> dict[str, list[Any]]:
+    """Values of each parameter, as JSON has them."""
+    found = {str(name): np.asarray(samples[name]) for name in samples}
+    if (
+        not found
+        or {x.ndim for x in found.values()} != {1}
+        or len({x.size for x in found.values()}) > 1
+    ):
+        sizes = ", ".join(f"{name!r} {x.shape}" for name, x in found.items())
+        raise ConfigError(
+            f"samples are one list of values for each parameter, all as long: {sizes}."
+        )
+    for name, x in found.items():
+        if (
+            not x.size
+            or x.dtype.kind not in "fiubU"
+            or (x.dtype.kind == "f" and not np.isfinite(x).all())
+        ):
+            raise ConfigError(f"values of {name!r} are finite numbers or texts, at least one.")
+    return {name: x.tolist() for name, x in found.items()}
+
+
+def _pickled(measure: Callable[..., Any]) -> bytes:
+    try:
+        return pickle.dumps(measure)
+    except Exception as error:  # of whatever kind what it holds raises
+        text = f"the measure {_name(measure)!r} cannot be sent to another process: {error}."
+        raise ConfigError(text, hint=SEND) from error
+
+
+def _name(measure: Callable[..., Any]) -> str:
+    kind = measure if hasattr(measure, "__qualname__") else type(measure)
+    return str(getattr(measure, "name", kind.__qualname__))
+
+
+@contextmanager
+def _executor(executor: Executor | None, workers: int | None, n: int) -> Iterator[Any]:
+    """What measures, None for this process."""
+    if executor is not None or workers == 0 or not n:
+        yield executor
+        return
+    import os
+
+    with processes(min(workers or len(os.sched_getaffinity(0)), n)) as pool:
+        yield pool
+
+
+@contextmanager
+def _told(progress: bool, n: int, begun: int) -> Iterator[Callable[[bool], None]]:
+    """Around samples, some of which are there; gives what is called behind each other one."""
+    done, failed, clock = begun, 0, perf_counter()
+    bar = Progress(n) if progress and looked_for() else None
+
+    def tell(bad: bool) -> None:
+        nonlocal done, failed
+        done, failed = done + 1, failed + bad
+        if bar:
+            rate = (done - begun) / (perf_counter() - clock)
+            left = f"{rate:.3g} a second, {(n - done) / rate:.0f} s left"
+            bar.reach(done, f"{done} of {n} samples, {left}" + f", {failed} failed" * bool(failed))
+
+    try:
+        yield tell
+    finally:
+        if bar:
+            bar.end()
+
+
+def _shapes(rows: Any) -> dict[str, tuple[int, ...]]:
+    """Names and shapes of what the first row that did not fail holds."""
+    good: dict[str, Any] = next((row["values"] for row in rows if "values" in row), {})
+    return {name: unpacked(value).shape for name, value in good.items()}
+
+
+def _row(number: int, answer: Answer, shapes: dict[str, tuple[int, ...]]) -> Row:
+    """The row of an answer; one of other names or shapes than the first failed."""
+    kind, found, text, seconds = answer
+    if kind == "lost":
+        raise ConfigError(f"the measure cannot be loaded by workers: {found}: {text}.", hint=SEND)
+    if kind == "values":
+        own = {name: x.shape for name, x in found.items()}
+        shapes.update({} if shapes else own)
+        if own == shapes:
+            values = {name: packed(x) for name, x in found.items()}
+            return {"sample": number, "seconds": seconds, "values": values}
+        found, text = "ConfigError", f"it returned {own}, others {shapes}"
+    return {"sample": number, "seconds": seconds, "failed": f"{found}: {text}"}
+
+
+def _study(columns: Mapping[str, list[Any]], rows: Mapping[int, Row]) -> Study:
+    n = len(next(iter(columns.values())))
+    first = min((k for k, row in rows.items() if "values" in row), default=None)
+    shapes = {} if first is None else _shapes([rows[first]])
+    values = {name: np.full((n, *shape), np.nan) for name, shape in shapes.items()}
+    seconds, failed = np.zeros(n), dict[int, str]()
+    for k in range(n):
+        row = rows.get(k, {"failed": "it was not reached", "seconds": 0.0})
+        seconds[k] = row["seconds"]
+        for name, value in row.get("values", {}).items():
+            values[name][k] = unpacked(value)
+        if "failed" in row:
+            failed[k] = row["failed"]
+    return Study({name: np.array(x) for name, x in columns.items()}, values, failed, seconds)
+
+
+def _failures(made: Study) -> str:
+    """A sentence on the samples that failed, if any did."""
+    if not made.failed:
+        return ""
+    n = len(made.seconds)
+    some = "; ".join(
+        f"sample {k}: {text:.100}" for k, text in list(made.failed.items())[:MOST_TOLD]
+    )
+    return f"{len(made.failed)} of {n} samples failed ({len(made.failed) / n:.0%}): {some}."
