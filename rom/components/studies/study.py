@@ -272,7 +272,7 @@ def _studied(  # noqa: PLR0913
         shapes = _shapes(rows.values())
         todo = [(k, {name: x[k] for name, x in columns.items()}) for k in range(n) if k not in rows]
         with (
-            _executor(executor, workers, len(todo)) as ready,
+            _executor(executor, workers, len(todo), b"__main__" in payload) as ready,
             _told(progress, n, len(rows)) as tell,
         ):
             found = (
@@ -336,14 +336,16 @@ def _name(measure: Callable[..., Any]) -> str:
 
 
 @contextmanager
-def _executor(executor: Executor | None, workers: int | None, n: int) -> Iterator[Any]:
+def _executor(
+    executor: Executor | None, workers: int | None, n: int, script: bool
+) -> Iterator[Any]:
     """What measures, None for this process."""
     if executor is not None or workers == 0 or not n:
         yield executor
         return
     import os
 
-    with processes(min(workers or len(os.sched_getaffinity(0)), n)) as pool:
+    with processes(min(workers or len(os.sched_getaffinity(0)), n), script=script) as pool:
         yield pool
 
 
