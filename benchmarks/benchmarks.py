@@ -448,6 +448,18 @@ def large_deflection(size: float = 100e3, **more: Any) -> Iterator[Figure]:
         yield Figure("large-deflection", case, quantity, value, unit, aim)
 
 
+def studies(**sizes: int) -> Iterator[Figure]:
+    """Hundreds of slider-cranks on two cores, by rom and by Exudyn; thousands of short samples.
+
+    Args:
+        sizes: as `benchmarks.studies.measured` takes them.
+    """
+    from benchmarks.studies import measured
+
+    for row in measured(**sizes):
+        yield Figure("studies", *row)
+
+
 BENCHMARKS: dict[str, Callable[[], Iterator[Figure]]] = {
     "blade": blade,
     "film": film,
@@ -465,6 +477,7 @@ BENCHMARKS: dict[str, Callable[[], Iterator[Figure]]] = {
     "motion": motion,
     "rods": rods,
     "start": start,
+    "studies": studies,
     "updating": updating,
     "large-deflection": large_deflection,
 }

@@ -37,6 +37,10 @@ TASKS: dict[str, tuple[str, str]] = {
         updating.parameter_tracker updating.ParameterTracker updating.Drift updating.compare
         updating.Comparison updating.JointSpring""",
     ),
+    "Study": (
+        "The same at many samples of its parameters, on all cores or a cluster.",
+        """study Study""",
+    ),
     "Check": (
         "How far a model, a body, a motion or a law can be trusted.",
         """check Report audit check_law eigen.mac eigen.residual_errors io.check_sid""",
@@ -102,7 +106,7 @@ TASKS: dict[str, tuple[str, str]] = {
         """components.cosserat components.assumed_strain components.masonry components.rockfall
         components.hand components.linkages components.wind components.gear_mesh
         components.journal_bearing components.transmission components.updating
-        components.best_matching""",
+        components.best_matching components.studies""",
     ),
     "Rotations and units": (
         "Quaternions, and quantities as text.",
@@ -135,7 +139,7 @@ SUBJECTS = {
     "Reduce a body": """beam assembly compressor_blade reference_conditions parameters large_mesh
     exchange""",
     "Mechanisms": """slider_crank robot_arm satellite pendulum_chain hand rolling_wheel periodic
-    isotropy best_matching""",
+    isotropy best_matching study""",
     "Large deflection and metal forming": """large_deflection flexure snap_through spin_up sheet
     forming""",
     "Rotating blades, wheels and rotors": """rotating_blade bladed_disk mistuning lost_tip

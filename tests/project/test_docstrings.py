@@ -24,7 +24,7 @@ PLAIN = {"rom.reduction.full_model"} | {
     for name in """
 gear_mesh.gears.corrections gear_mesh.tooth_elements gear_mesh.tooth_loads hand.solid_finger
 journal_bearing.films.bearing journal_bearing.films.oil journal_bearing.record
-linkages.two_dof_linkages masonry.drawings transmission.loaded
+linkages.two_dof_linkages masonry.drawings studies.pictures transmission.loaded
 """.split()
 }
 

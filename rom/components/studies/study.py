@@ -1,4 +1,7 @@
-"""A study: a measure at many samples of its parameters, and what that tells."""
+"""A study: a measure at many samples of its parameters, and what that tells.
+
+See docs/theory/studies.md.
+"""
 
 import platform
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -33,13 +36,21 @@ MOST_TOLD = 3  # failures that a report names
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """What was measured at each sample; rows of samples that failed hold NaN."""
+    """What was measured at each sample.
 
-    parameters: dict[str, Array]  # {parameter: (n,) values}
-    values: dict[str, Array]  # {what was measured: (n, ...)}
-    failed: dict[int, str]  # {sample: class of the error, and its text}
-    warned: dict[int, list[str]]  # {sample: what was warned of}
-    seconds: Array  # (n,) that each sample took
+    Attributes:
+        parameters: {parameter: (n,) values}.
+        values: {what was measured: (n, ...)}, NaN in the rows of samples that failed.
+        failed: {sample: class of the error, and its text}.
+        warned: {sample: what was warned of}.
+        seconds: (n,) that each sample took [s].
+    """
+
+    parameters: dict[str, Array]
+    values: dict[str, Array]
+    failed: dict[int, str]
+    warned: dict[int, list[str]]
+    seconds: Array
 
     def __repr__(self) -> str:
         n, names = len(self.seconds), ", ".join(map(repr, self.values))
@@ -48,7 +59,7 @@ class Study:
 
     @property
     def good(self) -> Index:
-        """Numbers of the samples that did not fail."""
+        """(m,) numbers of the samples that did not fail."""
         return np.setdiff1d(np.arange(len(self.seconds)), list(self.failed))
 
     @property
@@ -154,13 +165,20 @@ class Study:
 
 @dataclass(frozen=True, eq=False)
 class Indices:
-    """Shares of a variance that come from each parameter."""
+    """Shares of a variance that come from each of k parameters.
+
+    Attributes:
+        parameters: their names.
+        first: (k,) from this parameter alone [1].
+        total: (k,) from it and from what it does together with others [1].
+        first_ends, total_ends: (k, 2) ends of their intervals [1].
+    """
 
     parameters: tuple[str, ...]
-    first: Array  # (k,) from this parameter alone
-    total: Array  # (k,) from it and from what it does together with others
-    first_ends: Array  # (k, 2) of the interval
-    total_ends: Array  # (k, 2)
+    first: Array
+    total: Array
+    first_ends: Array
+    total_ends: Array
 
     def __str__(self) -> str:
         width = max(map(len, self.parameters))
