@@ -34,7 +34,8 @@ class Journal:
         try:
             self.file: IO[bytes] = path.open("r+b" if path.exists() else "w+b")
         except OSError as error:
-            raise ResourceError(f"{path} cannot be written: {error.strerror}.") from error
+            text = f"{path} cannot be written: {error.strerror}."
+            raise ConfigError(text, hint="Choose a file in a folder that is there.") from error
         try:
             fcntl.flock(self.file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
@@ -42,8 +43,8 @@ class Journal:
             raise ResourceError(f"another study is writing {path}; wait for its end.") from error
         if path.stat().st_size:
             if not resume:
-                text = f"{path} holds a study already"
-                raise ConfigError(f"{text}; go on with it by resume=True (--resume), or remove it.")
+                text = f"{path} exists already; go on with its study by resume=True (--resume)"
+                raise ConfigError(f"{text}, or remove it.")
             there, self.rows, whole = _read(path)
             _check_same(path, there, head)
             self.file.truncate(whole)

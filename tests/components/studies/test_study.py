@@ -179,7 +179,7 @@ def test_a_file_of_another_study_is_refused_and_stays(samples, measure, words, t
     with pytest.raises(ConfigError, match=words):
         _refused_beside(tmp_path, samples, measure)
     assert len(read_study(tmp_path / "x.study").seconds) == 12
-    with pytest.raises(ConfigError, match="holds a study already"):
+    with pytest.raises(ConfigError, match="exists already"):
         rom.study(histories, X, workers=0, into=tmp_path / "x.study")
 
 
@@ -200,6 +200,8 @@ test_of_bad_calls = refused(
     (lambda: rom.study(histories, {"x": [np.nan]}), "'x' are finite"),
     (lambda: rom.study(histories, {"x": [None]}), "'x' are finite"),
     (lambda: rom.study(histories, X, workers=0, time_limit=1.0), "leave out workers=0"),
+    (lambda: rom.study(histories, X, workers=0, into="/no/x.study"), "/no/x.study cannot be"),
+    (lambda: rom.study(histories, X, workers=0, into="/proc"), "/proc cannot be written"),
     (lambda: rom.study(histories, X, keep="max(x)"), "keep= is of a mechanism file"),
     (lambda: design({"x": (1.0, 0.0)}, 4, rng=rng()), r"'x' is \(1.0, 0.0\)"),
     (lambda: design({"x": (0.0, 1.0)}, 4, log=["x"], rng=rng()), "'x' begins at 0: no logarithm"),

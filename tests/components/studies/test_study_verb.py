@@ -14,7 +14,7 @@ from cases.command import rom as run
 from cases.paths import ROOT
 from cases.refusals import refuses
 from cases.studied import PENDULUM
-from rom.components.studies import pictures, read_study
+from rom.components.studies import design, pictures, read_study
 from rom.components.studies.described import key_path
 from rom.errors import ConfigError
 from rom.process.mpirun import mpirun
@@ -191,9 +191,9 @@ def test_geometries_vary_and_bodies_of_equal_parameters_are_made_once(swing, tmp
     assert list(bad.failed) == [1] and "beam.geo" in bad.failed[1]
 
 
+@pytest.mark.long
 @pytest.mark.fenicsx
 @pytest.mark.mpi
-@pytest.mark.slow
 def test_ranks_of_mpi_mesh_alone(swing, tmp_path):
     out, script = tmp_path / "x.study", tmp_path / "by_mpi.py"
     samples = {"mesh.h": [0.01, 0.011, -1.0]}
@@ -210,3 +210,54 @@ def test_ranks_of_mpi_mesh_alone(swing, tmp_path):
     assert found.failed == here.failed and list(here.failed) == [2]
     bits = [x.values["rod tip position"].tobytes() for x in (found, here)]
     assert bits[0] == bits[1]
+
+
+@pytest.mark.long
+@pytest.mark.fenicsx
+@pytest.mark.mpi
+@pytest.mark.timeout(3600)
+def test_two_hundred_rods_are_the_same_by_all_engines_and_after_ten_kills(swing, tmp_path):
+    """Each with a length, a width and a height of its own: meshed, reduced, certified, moved."""
+    distributed = pytest.importorskip("distributed", reason="dask's cluster is not installed")
+    generator, n = np.random.default_rng(5), 200
+    ranges = {"mesh.L": (0.1, 0.3), "mesh.b": (0.01, 0.03), "mesh.h": (0.008, 0.02)}
+    samples, keep = design(ranges, n, rng=generator), "max(abs(pivot force))"
+    (tmp_path / "samples.json").write_text(json.dumps({k: x.tolist() for k, x in samples.items()}))
+    script = tmp_path / "rods.py"
+    script.write_text(
+        "import json, sys\nfrom pathlib import Path\nimport rom\n"
+        f"samples = json.loads(Path({str(tmp_path / 'samples.json')!r}).read_text())\n"
+        f"def study(**how):\n    rom.study({str(swing)!r}, samples, keep={keep!r}, "
+        "into=sys.argv[1], resume=True, **how)\n"
+        "if __name__ == '__main__' and len(sys.argv) < 3:\n    study(workers=2)\n"
+        "elif __name__ == '__main__':\n"
+        "    from mpi4py.futures import MPIPoolExecutor\n"
+        "    with MPIPoolExecutor() as executor:\n        study(executor=executor)\n"
+    )
+    whole, cut, ranks = (tmp_path / f"{name}.study" for name in ("whole", "cut", "ranks"))
+    assert python(script, whole, timeout=1800).returncode == 0
+    rows = 1
+    for at in np.sort(generator.choice(np.arange(5, n - 5), 10, replace=False)):
+        begun = subprocess.Popen([sys.executable, script, cut], env=environment())
+        wait_until(lambda at=at: cut.exists() and cut.read_bytes().count(b"\n") > at, 900)
+        begun.kill()
+        begun.wait()
+        assert cut.read_bytes().count(b"\n") >= rows
+        rows = cut.read_bytes().count(b"\n")
+    assert python(script, cut, timeout=1800).returncode == 0
+    done = python("-m", "mpi4py.futures", script, ranks, "mpi", launcher=mpirun(3), timeout=3000)
+    assert done.returncode == 0, done.stderr
+    how = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None}
+    with distributed.LocalCluster(**how) as cluster, distributed.Client(cluster) as client:
+        dask = rom.study(swing, samples, keep=keep, executor=client.get_executor())
+    found = [read_study(path) for path in (whole, cut, ranks)] + [dask]
+    force = found[0].values[keep]
+    assert force.shape == (n,) and np.isfinite(force).all()
+    for other in found:
+        assert other.values[keep].tobytes() == force.tobytes() and not other.failed
+    numbers = [row["sample"] for row in _rows(cut)]
+    assert sorted(numbers) == list(range(n))
+
+
+def _rows(path):
+    return [json.loads(line[9:]) for line in path.read_bytes().splitlines()[1:]]
