@@ -41,18 +41,18 @@ def design(
         ConfigError: for a range upside down, or below zero on a scale of logarithms.
     """
     one_of("kind", kind, KINDS)
-    _check(ranges, log)
+    check_ranges(ranges, log)
     k = len(ranges)
     if kind == "grid":
         if drawn := [name for name, given in ranges.items() if hasattr(given, "ppf")]:
             raise ConfigError(f"a grid has no ends for the distribution of {drawn[0]!r}.")
         axes = np.meshgrid(*k * [np.linspace(0.0, 1.0, n)], indexing="ij")
-        return _scaled(np.stack(axes, axis=-1).reshape(-1, k), ranges, log)
+        return scaled(np.stack(axes, axis=-1).reshape(-1, k), ranges, log)
     rng = _generator(rng)
     if kind == "random":
-        return _scaled(rng.random((n, k)), ranges, log)
+        return scaled(rng.random((n, k)), ranges, log)
     made = qmc.LatinHypercube if kind == "latin" else qmc.Sobol
-    return _scaled(made(k, seed=rng).random(n), ranges, log)
+    return scaled(made(k, seed=rng).random(n), ranges, log)
 
 
 @typed
@@ -71,12 +71,12 @@ def indices_design(
     Source:
         Saltelli et al., Comput. Phys. Comm. 181 (2010) 259.
     """
-    _check(ranges, log)
+    check_ranges(ranges, log)
     k = len(ranges)
     U = qmc.Sobol(2 * k, seed=_generator(rng)).random(n)
     A, B = U[:, :k], U[:, k:]
     mixed = [np.where(np.arange(k) == j, B, A) for j in range(k)]
-    return _scaled(np.vstack([A, B, *mixed]), ranges, log)
+    return scaled(np.vstack([A, B, *mixed]), ranges, log)
 
 
 def _generator(rng: np.random.Generator | None) -> np.random.Generator:
@@ -85,7 +85,8 @@ def _generator(rng: np.random.Generator | None) -> np.random.Generator:
     return rng
 
 
-def _check(ranges: Mapping[str, Range], log: Sequence[str]) -> None:
+def check_ranges(ranges: Mapping[str, Range], log: Sequence[str]) -> None:
+    """Refuse ranges upside down, and names that are none."""
     if not ranges:
         raise ConfigError("there is no parameter to vary.")
     check_all_known(log, ranges, "log= names no parameter")
@@ -102,7 +103,7 @@ def _check(ranges: Mapping[str, Range], log: Sequence[str]) -> None:
             raise ConfigError(f"the range of {name!r} begins at {ends[0]:g}: no logarithm there.")
 
 
-def _scaled(U: Array, ranges: Mapping[str, Range], log: Sequence[str]) -> dict[str, Array]:
+def scaled(U: Array, ranges: Mapping[str, Range], log: Sequence[str]) -> dict[str, Array]:
     """Values of parameters at places in the unit cube."""
     found = {}
     for u, (name, given) in zip(U.T, ranges.items(), strict=True):
