@@ -47,12 +47,12 @@ def design(
         if drawn := [name for name, given in ranges.items() if hasattr(given, "ppf")]:
             raise ConfigError(f"a grid has no ends for the distribution of {drawn[0]!r}.")
         axes = np.meshgrid(*k * [np.linspace(0.0, 1.0, n)], indexing="ij")
-        return scaled(np.stack(axes, axis=-1).reshape(-1, k), ranges, log)
+        return _scaled(np.stack(axes, axis=-1).reshape(-1, k), ranges, log)
     rng = _generator(rng)
     if kind == "random":
-        return scaled(rng.random((n, k)), ranges, log)
+        return _scaled(rng.random((n, k)), ranges, log)
     made = qmc.LatinHypercube if kind == "latin" else qmc.Sobol
-    return scaled(made(k, seed=rng).random(n), ranges, log)
+    return _scaled(made(k, seed=rng).random(n), ranges, log)
 
 
 @typed
@@ -76,7 +76,7 @@ def indices_design(
     U = qmc.Sobol(2 * k, seed=_generator(rng)).random(n)
     A, B = U[:, :k], U[:, k:]
     mixed = [np.where(np.arange(k) == j, B, A) for j in range(k)]
-    return scaled(np.vstack([A, B, *mixed]), ranges, log)
+    return _scaled(np.vstack([A, B, *mixed]), ranges, log)
 
 
 def _generator(rng: np.random.Generator | None) -> np.random.Generator:
@@ -86,7 +86,7 @@ def _generator(rng: np.random.Generator | None) -> np.random.Generator:
 
 
 def check_ranges(ranges: Mapping[str, Range], log: Sequence[str]) -> None:
-    """Refuse ranges upside down, and names that are none."""
+    """Refuse ranges upside down, and logarithms of what they do not have."""
     if not ranges:
         raise ConfigError("there is no parameter to vary.")
     check_all_known(log, ranges, "log= names no parameter")
@@ -103,7 +103,7 @@ def check_ranges(ranges: Mapping[str, Range], log: Sequence[str]) -> None:
             raise ConfigError(f"the range of {name!r} begins at {ends[0]:g}: no logarithm there.")
 
 
-def scaled(U: Array, ranges: Mapping[str, Range], log: Sequence[str]) -> dict[str, Array]:
+def _scaled(U: Array, ranges: Mapping[str, Range], log: Sequence[str]) -> dict[str, Array]:
     """Values of parameters at places in the unit cube."""
     found = {}
     for u, (name, given) in zip(U.T, ranges.items(), strict=True):
