@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 # of the mechanism's size; bores of a mesh are polygons, so that small gaps are normal
 GAP_RTOL = 1e-2
+LEAST_SIZE = 1e-6  # [m], where all markers are in one point
 MARKER_KEYS = ("between", "marker", "markers", "path")
 JOINT_KEYS = ("joint", "joint1", "joint2")
 
@@ -73,7 +74,8 @@ class MechanismFile(Described):
             return simulate(made, progress=progress, keep=keep, **self.values["simulation"])
 
     def _entries(self, *, bodies: bool) -> list[tuple[str, str, Values]]:
-        some = [name for name, section in sections().items() if section.bodies is bodies]
+        some = [name for name, section in sections().items()
+                if section.bodies is bodies and not section.single]  # fmt: skip
         return [(s, name, values) for s in some for name, values in self.values[s].items()]
 
     def _connections(self) -> list[tuple[str, str, Values]]:
@@ -111,7 +113,7 @@ class MechanismFile(Described):
         ends = [made.design_point(marker) for marker in joint.markers]
         placed = [part.at for part in made.parts.values()] + ends
         gap = float(np.linalg.norm(ends[0] - ends[1]))
-        if gap > GAP_RTOL * max(float(np.ptp(placed, axis=0).max()), 1e-300):
+        if gap > GAP_RTOL * max(float(np.ptp(placed, axis=0).max()), LEAST_SIZE):
             where = self.document.where(("joints", name))
             warn(
                 f"{where}: the markers of joint {name!r} are {gap:.3g} m apart as the bodies are "

@@ -197,11 +197,13 @@ class Section(NamedTuple):
     connect: Callable[[Any], None] | None = None
     bodies: bool = False  # whether they are bodies, which markers name
     summary: str = ""  # a sentence about them, where there is more to say
+    single: bool = False  # whether it is one table, for whoever asks for it
 
     def key(self, name: str) -> Key:
         """The section as a key of the file."""
         summary = self.summary or f"{self.about.capitalize()}."
-        return Key(name, Named(self.kind, self.about), summary, {})
+        kind = self.kind if self.single else Named(self.kind, self.about)
+        return Key(name, kind, summary, None if self.single else {})
 
 
 BEFORE_FIELDS: dict[str, tuple[str, Kind]] = {  # connections and forces: what, and how

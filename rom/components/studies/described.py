@@ -1,22 +1,35 @@
 """The motion of a mechanism file as a measure: which of its keys vary, and what is kept of it."""
 
 import hashlib
+import json
 import re
+import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 import rom
+from rom.components.studies.worker import Unmeasurable
+from rom.config.component_keys import TABLE
 from rom.errors import ConfigError
 from rom.io.history import asked
 from rom.model import Array
-from rom.names import check_known, named
+from rom.names import named
+from rom.process.child import python, run
+from rom.process.launcher import ranks
+from rom.process.patience import Turns
 
-KEY_WORDS = re.compile(r'"([^"]*)"|([^."]+)')  # of a key, "joints"."main bearing"
+if TYPE_CHECKING:
+    from rom.config.mechanism import MechanismFile
+
+Changes = dict[tuple[str, ...], Any]
+KEY_WORDS = re.compile(r'"([^"]*)"|([^."]+)')  # of a key, joints."main bearing"
 CALL = re.compile(r"\s*(\w+)\s*\((.*)\)\s*", re.DOTALL)
+OF_COMPONENTS = {key.name for key in TABLE.keys} - {"name"}
 FUNCTIONS: dict[str, Callable[[Array], Any]] = {
     "max": np.max,
     "min": np.min,
@@ -26,31 +39,107 @@ FUNCTIONS: dict[str, Callable[[Array], Any]] = {
     "last": lambda x: x[-1],
 }
 WRITE = f'Write it as "max(abs(crank pin force))"; there are abs, {named(FUNCTIONS)}.'
+TURNS = Turns()
 
 
 @dataclass(frozen=True)
 class MotionOf:
-    """What is kept of the motion that a file describes, with the keys that are given changed."""
+    """What is kept of the motion that a file describes, with the keys that are given changed.
+
+    Keys are those of the mechanism; behind ``bodies.NAME`` also those of the component file of that
+    body. ``mesh.NAME`` is a parameter of its geometry, and without a body in front of it that of
+    all geometries.
+    """
 
     file: str
     kept: tuple[str, ...]
-    bodies: Mapping[str, str]  # {body: file of it, reduced already}
-    trust: bool = False  # run functions in Python of the file
+    folder: str  # of bodies that are made, each once
+    trust: bool = False  # run what is written in Python
 
-    def __call__(self, **given: float) -> dict[str, Any]:
+    def __call__(self, **given: Any) -> dict[str, Any]:
         """Move it, and say what is kept."""
-        changes: dict[tuple[str, ...], object] = {
-            ("bodies", name, "file"): place for name, place in self.bodies.items()
+        own, parts = self.sorted(given)
+        own |= {
+            ("bodies", name, "file"): body_of(
+                place, tuple(changes.items()), self.folder, self.trust
+            )
+            for name, (place, changes) in parts.items()
         }
-        changes |= {key_path(name): value for name, value in given.items()}
-        solution = rom.read_mechanism(self.file, changes, trust=self.trust).simulate()
+        solution = rom.read_mechanism(self.file, own, trust=self.trust).simulate()
         return {text: value_of(text, solution) for text in self.kept}
 
     @property
     def name(self) -> str:
-        """By which a study knows this file, as it is now, and what is kept of it."""
-        digest = hashlib.sha256(Path(self.file).read_bytes()).hexdigest()[:16]
+        """By which a study knows the files, as they are now, and what is kept."""
+        files = {Path(self.file), *components(self.file).values()}
+        digest = _digest("".join(map(_content, sorted(files))))
         return "; ".join([f"{Path(self.file).name} {digest}", *self.kept])
+
+    def sorted(self, given: Mapping[str, Any]) -> tuple[Changes, dict[str, tuple[str, Changes]]]:
+        """Changes of the mechanism, and component file and changes by body."""
+        parts = {name: (str(place), Changes()) for name, place in components(self.file).items()}
+        own = Changes()
+        for text, value in given.items():
+            match key_path(text):
+                case ["mesh", *rest] if parts:
+                    for _, changes in parts.values():
+                        changes["geometry", "parameters", *rest] = value
+                case ["bodies", body, "mesh", *rest] if body in parts:
+                    parts[body][1]["geometry", "parameters", *rest] = value
+                case ["bodies", body, section, *rest] if body in parts and section in OF_COMPONENTS:
+                    parts[body][1][section, *rest] = value
+                case path:
+                    own[path] = value
+        return own, parts
+
+    def check(self, given: Mapping[str, Any]) -> "MechanismFile":
+        """The file with such changes, if it and its components may be changed so.
+
+        Raises:
+            ConfigError: for a key that does not exist, or a value it cannot have.
+        """
+        own, parts = self.sorted(given)
+        for place, changes in parts.values():
+            rom.read_component(place, changes, trust=self.trust)
+        return rom.read_mechanism(self.file, own, trust=self.trust)
+
+
+@cache
+def components(file: str) -> dict[str, Path]:
+    """Component files by body, of those that become bodies with interfaces."""
+    bodies = rom.read_mechanism(file).values["bodies"]
+    files = {name: values["file"] for name, values in bodies.items() if "file" in values}
+    return {
+        name: place for name, place in files.items()
+        if place.suffix == ".toml" and rom.read_component(place).kinds
+    }  # fmt: skip
+
+
+@cache
+def body_of(place: str, changes: tuple[Any, ...], folder: str, trust: bool) -> str:
+    """File of the reduced body of a component, made by one process for all that ask for it."""
+    path = Path(folder) / f"{_digest(repr((place, sorted(changes))))}.rom.npz"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        if not path.exists() and TURNS.take(path) and path.exists():
+            return str(path)
+        if not path.exists():
+            _make(place, dict(changes), path, trust)
+    finally:
+        TURNS.end(path)
+    return str(path)
+
+
+def _make(place: str, changes: Changes, path: Path, trust: bool) -> None:
+    """Mesh and reduce; where this process is one of several, by one that is alone."""
+    if ranks()[1] == 1:
+        rom.save(rom.read_component(place, changes, trust=trust).body(), path)
+        return
+    given = json.dumps([place, list(changes.items()), str(path), trust])
+    ended = run(python("rom.components.studies.described", given))
+    if ended.code:
+        kind, _, text = ended.out.partition("\n")
+        raise getattr(rom.errors, kind, rom.SolverError)(text.strip() or ended.last)
 
 
 def key_path(text: str) -> tuple[str, ...]:
@@ -68,37 +157,49 @@ def value_of(text: str, solution: Any) -> Any:
     if call is None:
         return _column(text.strip(), solution)
     function, inner = call[1], call[2]
-    check_known(function, ("abs", *FUNCTIONS), f"there is no function {function!r}; there are")
+    if function not in ("abs", *FUNCTIONS):
+        raise Unmeasurable(f"there is no function {function!r}.", hint=WRITE)
     x = value_of(inner, solution)
     if function == "abs":
         return np.abs(x) if np.ndim(x) < 2 else np.linalg.norm(x, axis=1)
     if np.ndim(x) != 1:
-        raise ConfigError(f"{function}({inner}) is of no single column over time.", hint=WRITE)
+        raise Unmeasurable(f"{function}({inner}) is of no single column over time.", hint=WRITE)
     return FUNCTIONS[function](x)
 
 
 def _column(name: str, solution: Any) -> Array:
-    """(n_t,) or (n_t, c) values of a quantity."""
-    for channel in asked(solution, ["_"] if not name else [_without_axis(name)]):
+    """(n_t,) or (n_t, c) values of a quantity; t is the time."""
+    if name == "t":
+        return np.asarray(solution.t)
+    try:
+        channels = asked(solution, [_without_axis(name)])
+    except ConfigError as error:
+        raise Unmeasurable(error.message, hint=error.hint) from error
+    for channel in channels:
         values = channel.values.reshape(len(solution.t), -1)
         if name in channel.names:
             return np.asarray(values[:, channel.names.index(name)])
         if " ".join(channel.path[1:]).replace(" markers ", " ") == name:
             return values if values.shape[1] > 1 else values[:, 0]
-    raise ConfigError(f"the motion has no quantity {name!r}.", hint=WRITE)
+    raise Unmeasurable(f"the motion has no quantity {name!r}.", hint=WRITE)
 
 
 def _without_axis(name: str) -> str:
     return re.sub(r" (x|y|z|p[0-3]|q\d+)$", "", name)
 
 
-def reduced(file: "rom.config.mechanism.MechanismFile", folder: Path) -> dict[str, str]:
-    """{body: file} of the bodies that component files describe, meshed and reduced once."""
-    found = dict[str, str]()
-    for name, values in file.values["bodies"].items():
-        place = values.get("file")
-        if place is not None and place.suffix == ".toml":
-            path = folder / f"body{len(found)}.rom.npz"
-            rom.save(rom.read_component(place, **file.meshing).body(), path)
-            found[name] = str(path)
-    return found
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()[:24]
+
+
+def _content(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+if __name__ == "__main__":
+    place, changes, path, trust = json.loads(sys.argv[1])
+    try:
+        _make(place, {tuple(key): value for key, value in changes}, Path(path), trust)
+    except rom.RomError as error:
+        sys.stdout.write(f"{type(error).__name__}\n{error}")
+        sys.exit(1)

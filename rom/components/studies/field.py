@@ -1,5 +1,8 @@
-"""What studies have for the command line."""
+"""What studies have for files and the command line."""
 
 from rom.fields import Field
 
-FIELD = Field(verbs={"study": "rom.components.studies.verb"})
+FIELD = Field(
+    sections={"study": "rom.components.studies.keys:STUDY"},
+    verbs={"study": "rom.components.studies.verb"},
+)

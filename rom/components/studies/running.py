@@ -9,9 +9,17 @@ import multiprocessing  # noqa: TID251  of which the pool of the standard is mad
 import os
 from collections import deque
 from collections.abc import Callable, Iterator
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    CancelledError,
+    Executor,
+    Future,
+    wait,
+)
 from concurrent.futures.process import ProcessPoolExecutor
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from hashlib import sha256
 from typing import Any
 
@@ -79,48 +87,87 @@ def processes(workers: int) -> Iterator[Processes]:
             os.environ.pop(name) if value is None else os.environ.update({name: value})
 
 
+@dataclass
+class Handing:
+    """Samples that wait, that run, and those one of which has ended its process."""
+
+    executor: Executor | Processes
+    payload: bytes
+    limits: Limits
+    waiting: deque[Given]
+    suspects: deque[Given] = field(default_factory=deque)
+    running: dict["Future[Any]", Given] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.key = sha256(self.payload).hexdigest()
+        known = getattr(self.executor, "workers", getattr(self.executor, "_max_workers", None))
+        self.most = PER_WORKER * known if isinstance(known, int) else AT_ONCE
+
+    def begin(self, sample: Given, sent: bytes | None = None) -> bool:
+        """Whether it could be handed over, which a pool of our own that broke cannot take."""
+        submit, task = self.executor.submit, (self.key, sent, sample[1], *self.limits)
+        try:
+            self.running[submit(worker.measured, *task)] = sample
+        except Exception as error:  # of whatever kind executors raise that have ended
+            if isinstance(self.executor, Processes) and isinstance(error, BrokenExecutor):
+                return False
+            raise _broke(error) from error
+        return True
+
+    def fill(self) -> None:
+        """Hand over what there is room for, suspects one by one."""
+        source, most = (self.suspects, 1) if self.suspects else (self.waiting, self.most)
+        while source and len(self.running) < most and self.begin(source[0]):
+            source.popleft()
+
+    def taken(self, future: "Future[Any]") -> Answer | str | None:
+        """What came of a sample; None where its pool broke."""
+        try:
+            answer: Answer | str = future.result()
+        except (BrokenExecutor, CancelledError, OSError) as error:
+            if not isinstance(self.executor, Processes):
+                raise _broke(error) from error
+            return None
+        except Exception as error:  # of an executor that gives a worker up, as Dask's
+            return ("failed", type(error).__name__, str(error), 0.0)
+        return answer
+
+    def repeat(self, lost: list[Given], pool: Processes) -> Iterator[tuple[int, Answer]]:
+        """Begin with a new pool; a sample that was alone in the one that broke has failed."""
+        lost += self.running.values()
+        self.running.clear()
+        pool.replace()
+        if len(lost) == 1:
+            yield lost[0][0], ("failed", "Killed", KILLED, 0.0)
+        else:
+            self.suspects.extend(lost)
+
+
 def answers(
     executor: Executor | Processes, payload: bytes, samples: list[Given], limits: Limits
 ) -> Iterator[tuple[int, Answer]]:
     """What the workers say of each sample, as it comes."""
-    key, known = sha256(payload).hexdigest(), getattr(executor, "workers", None)
-    known = known or getattr(executor, "_max_workers", None)
-    most = PER_WORKER * known if isinstance(known, int) else AT_ONCE
-    waiting, suspects, running = deque(samples), deque[Given](), dict["Future[Any]", Given]()
-
-    def begin(sample: Given, sent: bytes | None = None) -> None:
-        future = executor.submit(worker.measured, key, sent, sample[1], *limits)
-        running[future] = sample
-
-    while waiting or suspects or running:
-        source, at_once = (suspects, 1) if suspects else (waiting, most)
-        while source and len(running) < at_once:
-            begin(source.popleft())
+    hand = Handing(executor, payload, limits, deque(samples))
+    while hand.waiting or hand.suspects or hand.running:
+        hand.fill()
+        if isinstance(executor, Processes) and not hand.running:
+            executor.replace()  # it broke while it had nothing to do
         lost = list[Given]()
-        for future in wait(running, return_when=FIRST_COMPLETED).done:
-            sample = running.pop(future)
-            try:
-                answer = future.result()
-            except BrokenExecutor as error:
-                if not isinstance(executor, Processes):
-                    text = f"the executor broke: {error}."
-                    raise ResourceError(text, hint="Go on with resume=True.") from error
+        for future in wait(hand.running, return_when=FIRST_COMPLETED).done:
+            sample, answer = hand.running.pop(future), hand.taken(future)
+            if answer is None:
                 lost.append(sample)
-            except Exception as error:  # of an executor that gives a worker up, as Dask's
-                yield sample[0], ("failed", type(error).__name__, str(error), 0.0)
-            else:
-                if isinstance(answer, str):
-                    begin(sample, payload)
-                else:
-                    yield sample[0], answer
-        if lost and isinstance(executor, Processes):
-            lost += running.values()
-            running.clear()
-            executor.replace()
-            if len(lost) == 1:
-                yield lost[0][0], ("failed", "Killed", KILLED, 0.0)
-            else:
-                suspects.extend(lost)
+            elif not isinstance(answer, str):
+                yield sample[0], answer
+            elif not hand.begin(sample, payload):
+                hand.waiting.append(sample)
+        if isinstance(executor, Processes) and lost:
+            yield from hand.repeat(lost, executor)
+
+
+def _broke(error: Exception) -> ResourceError:
+    text = f"the executor broke: {type(error).__name__}: {error}".rstrip(": ")
+    return ResourceError(f"{text}.", hint="Go on with resume=True.")
 
 
 def here(

@@ -1,6 +1,7 @@
 """Tables of parameters: grids, designs that fill a box, draws from distributions."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from typing import Annotated, Any
 
 import numpy as np
@@ -77,6 +78,16 @@ def indices_design(
     A, B = U[:, :k], U[:, k:]
     mixed = [np.where(np.arange(k) == j, B, A) for j in range(k)]
     return _scaled(np.vstack([A, B, *mixed]), ranges, log)
+
+
+def range_of(text: str) -> tuple[float, float, bool]:
+    """Ends of a range as it is written, LOW:HIGH or LOW:HIGH:log, and whether it has a scale so."""
+    low, _, rest = text.partition(":")
+    high, _, scale = rest.partition(":")
+    with suppress(ValueError):
+        if scale in ("", "log"):
+            return float(low), float(high), bool(scale)
+    raise ConfigError(f"the range {text!r} must be LOW:HIGH or LOW:HIGH:log.")
 
 
 def _generator(rng: np.random.Generator | None) -> np.random.Generator:

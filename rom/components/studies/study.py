@@ -8,7 +8,7 @@ from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from scipy.stats import binom
@@ -16,16 +16,19 @@ from scipy.stats import binom
 import rom
 from rom.arguments import Count, NotNegative, typed
 from rom.components.studies.journal import Journal, Row, packed, read, unpacked
-from rom.components.studies.running import answers, here, processes
-from rom.components.studies.worker import Answer
-from rom.errors import ConfigError, warn
+from rom.components.studies.running import Limits, answers, here, processes
+from rom.components.studies.worker import SEND, Answer
+from rom.errors import ConfigError, InterruptedRun, warn
 from rom.model import Array, Index
 from rom.names import check_known
+from rom.process.child import scratch
 from rom.process.progress import Progress, looked_for
+
+if TYPE_CHECKING:
+    from rom.components.studies.described import MotionOf
 
 BYTES_PER_GIGABYTE = 2**30
 MOST_TOLD = 3  # failures that a report names
-SEND = "Define it with def in a file that can be imported, without what cannot be pickled."
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +38,7 @@ class Study:
     parameters: dict[str, Array]  # {parameter: (n,) values}
     values: dict[str, Array]  # {what was measured: (n, ...)}
     failed: dict[int, str]  # {sample: class of the error, and its text}
+    warned: dict[int, list[str]]  # {sample: what was warned of}
     seconds: Array  # (n,) that each sample took
 
     def __repr__(self) -> str:
@@ -60,24 +64,35 @@ class Study:
         return pd.DataFrame(columns).rename_axis("sample")
 
     def to_xarray(self, clock: str = "t") -> Any:
-        """All of it as a Dataset by sample, and by the values of a clock that all samples share.
+        """All of it as a Dataset by sample, histories by a clock that all samples share.
 
         Raises:
             ModuleNotFoundError: without xarray.
         """
         import xarray as xr
 
-        times = self.values.get(clock, np.zeros(0))
-        shared = times.ndim == 2 and bool((times[self.good] == times[self.good][:1]).all())
         found: dict[str, Any] = {name: ("sample", x) for name, x in self.parameters.items()}
         coordinates: dict[str, Any] = {"sample": np.arange(len(self.seconds))}
-        if shared:
-            coordinates[clock] = times[self.good][0]
+        times = self._clock(clock)
+        if times is not None:
+            coordinates[clock] = times
         for name, x in self.values.items():
-            of = [clock if shared and m == times.shape[1] else f"{name}_{k}"
-                  for k, m in enumerate(x.shape[1:])]  # fmt: skip
-            found |= {} if shared and name == clock else {name: (("sample", *of), x)}
+            own = (f"{name}_{k}" for k in range(x.ndim - 1))
+            dims = [clock if times is not None and m == times.size else d
+                    for m, d in zip(x.shape[1:], own, strict=True)]  # fmt: skip
+            found |= {name: (("sample", *dims), x)} if name not in coordinates else {}
         return xr.Dataset(found, coordinates)
+
+    def on_clock(self, name: str, clock: str = "t") -> Array:
+        """Times (n_t,) at which the histories of a value were taken in all samples alike."""
+        x, times = self._value(name), self._clock(clock)
+        if times is None or x.shape[1:] != times.shape:
+            raise ConfigError(f"{name!r} is no history by times {clock!r} that all samples share.")
+        return times
+
+    def _clock(self, clock: str) -> Array | None:
+        times = self.values[clock][self.good] if clock in self.values else np.zeros(0)
+        return times[0] if times.ndim == 2 and (times == times[:1]).all() else None
 
     def quantiles(
         self, name: str, shares: Sequence[float] = (0.05, 0.5, 0.95), level: float = 0.95
@@ -169,15 +184,17 @@ def _indices(f: Array) -> tuple[Array, Array]:
 
 @typed
 def study(  # noqa: PLR0913  what runs, where, within which limits, and what is kept
-    measure: Callable[..., Any],
+    measure: Callable[..., Any] | str | Path,
     samples: Mapping[str, Any],
     *,
+    keep: str | Sequence[str] = (),
     executor: Any = None,
     workers: Annotated[int, Count(0)] | None = None,
     into: str | Path | None = None,
     resume: bool = False,
     time_limit: Annotated[float, NotNegative("s")] = 0.0,
     memory_limit: Annotated[float, NotNegative("1")] = 0.0,
+    trust: bool = False,
     progress: bool = True,
 ) -> Study:
     """Measure something at many samples of its parameters, on many processes.
@@ -190,33 +207,66 @@ def study(  # noqa: PLR0913  what runs, where, within which limits, and what is 
         measure: function of named parameters that returns named numbers or arrays, always the same
             names and shapes. It goes to other processes, so it stands in a file that can be
             imported, or in the script that runs, whose call of `study` then stands under
-            ``if __name__ == "__main__"``.
+            ``if __name__ == "__main__"``. Or a mechanism file, whose keys are the parameters, as
+            "bodies.slider.mass", "bodies.rod.damping.ratio" or "bodies.rod.mesh.lc".
         samples: {parameter: (n,) values}, numbers or texts, or a DataFrame; see
             `rom.components.studies.design`.
+        keep: of the motion of a file, as "max(abs(crank pin force))"; "t" is the time.
         executor: of the standard's kind: `concurrent.futures`, ``mpi4py.futures``,
             ``dask.distributed.Client().get_executor()``; None for processes of this machine.
         workers: processes of this machine, None for one on each core, 0 for this process itself.
-        into: file, ending in ``.study``, to which each answer is added as it comes.
+        into: file to which each answer is added as it comes.
         resume: go on with that file, and repeat nothing of it.
         time_limit: of a sample, by the clock [s]; 0 for none.
         memory_limit: of a worker [GiB]; 0 for none.
+        trust: run what a mechanism file has in Python.
         progress: show how many are done, how fast, and the time that is left.
 
     Raises:
-        ConfigError: for a measure that cannot be sent, samples of different lengths, or a file of
-            another study.
+        ConfigError: for a measure that cannot be sent, keys that do not exist, samples of different
+            lengths, or a file of another study.
         ResourceError: for a full disk, a file that another study writes, or a broken executor;
             what was measured is kept.
+        InterruptedRun: after Ctrl-C, with a file, that goes on.
     """
     columns = _columns(samples)
+    if (workers == 0 and executor is None) and (time_limit or memory_limit):
+        raise ConfigError("limits are of processes of their own; leave out workers=0.")
+    limits = time_limit, int(memory_limit * BYTES_PER_GIGABYTE)
+    if not isinstance(measure, str | Path):
+        if keep:
+            raise ConfigError("keep= is of a mechanism file; a function returns what it measures.")
+        return _studied(measure, columns, executor, workers, into, resume, limits, progress)
+    with scratch("study") as folder:
+        moved = _motion(Path(measure), keep, folder, trust)
+        moved.check({name: x[0] for name, x in columns.items()})
+        return _studied(moved, columns, executor, workers, into, resume, limits, progress)
+
+
+def _motion(file: Path, keep: str | Sequence[str], folder: Path, trust: bool) -> "MotionOf":
+    from rom.components.studies.described import MotionOf
+
+    kept = (keep,) if isinstance(keep, str) else tuple(keep)
+    if not kept:
+        raise ConfigError('say what to keep, as keep="max(abs(crank pin force))".')
+    return MotionOf(str(file.resolve()), kept, str(folder), trust)
+
+
+def _studied(  # noqa: PLR0913
+    measure: Callable[..., Any],
+    columns: dict[str, list[Any]],
+    executor: Executor | None,
+    workers: int | None,
+    into: str | Path | None,
+    resume: bool,
+    limits: Limits,
+    progress: bool,
+) -> Study:
     n = len(next(iter(columns.values())))
     payload = b"" if executor is None and workers == 0 else _pickled(measure)
     head = {"measure": _name(measure), "parameters": columns, "made with": {
         "rom": rom.__version__, "python": platform.python_version(), "numpy": np.__version__,
     }}  # fmt: skip
-    limits = time_limit, int(memory_limit * BYTES_PER_GIGABYTE)
-    if executor is None and workers == 0 and any(limits):
-        raise ConfigError("limits are of processes of their own; leave out workers=0.")
     with Journal(Path(into), head, resume=resume) if into else nullcontext() as journal:
         rows = {row["sample"]: row for row in journal.rows} if journal else {}
         shapes = _shapes(rows.values())
@@ -230,14 +280,21 @@ def study(  # noqa: PLR0913  what runs, where, within which limits, and what is 
                 if ready is None
                 else answers(ready, payload, todo, limits)
             )
-            for number, answer in found:
-                row = _row(number, answer, shapes)
-                rows[number] = row
-                if journal:
-                    journal.add(row)
-                tell("failed" in row)
+            try:
+                for number, answer in found:
+                    row = _row(number, answer, shapes)
+                    rows[number] = row
+                    if journal:
+                        journal.add(row)
+                    tell("failed" in row)
+            except KeyboardInterrupt:
+                if not journal:
+                    raise
+                said = f"interrupted; {len(rows)} of {n} samples are in {into}."
+                raise InterruptedRun(said, hint="Go on with resume=True, or --resume.") from None
     made = _study(columns, rows)
-    warn(_failures(made))
+    for sentence in (_said("failed", made.failed, n), _said("warned", made.warned, n)):
+        warn(sentence)
     return made
 
 
@@ -327,17 +384,18 @@ def _shapes(rows: Any) -> dict[str, tuple[int, ...]]:
 
 def _row(number: int, answer: Answer, shapes: dict[str, tuple[int, ...]]) -> Row:
     """The row of an answer; one of other names or shapes than the first failed."""
-    kind, found, text, seconds = answer
-    if kind == "lost":
-        raise ConfigError(f"the measure cannot be loaded by workers: {found}: {text}.", hint=SEND)
+    kind, found, said, seconds = answer
+    if kind == "refused":
+        raise ConfigError(said)
     if kind == "values":
         own = {name: x.shape for name, x in found.items()}
         shapes.update({} if shapes else own)
         if own == shapes:
             values = {name: packed(x) for name, x in found.items()}
-            return {"sample": number, "seconds": seconds, "values": values}
-        found, text = "ConfigError", f"it returned {own}, others {shapes}"
-    return {"sample": number, "seconds": seconds, "failed": f"{found}: {text}"}
+            more = {"warned": said} if said else {}
+            return {"sample": number, "seconds": seconds, "values": values} | more
+        found, said = "ConfigError", f"it returned {own}, others {shapes}"
+    return {"sample": number, "seconds": seconds, "failed": f"{found}: {said}"}
 
 
 def _study(columns: Mapping[str, list[Any]], rows: Mapping[int, Row]) -> Study:
@@ -345,7 +403,7 @@ def _study(columns: Mapping[str, list[Any]], rows: Mapping[int, Row]) -> Study:
     first = min((k for k, row in rows.items() if "values" in row), default=None)
     shapes = {} if first is None else _shapes([rows[first]])
     values = {name: np.full((n, *shape), np.nan) for name, shape in shapes.items()}
-    seconds, failed = np.zeros(n), dict[int, str]()
+    seconds, failed, warned = np.zeros(n), dict[int, str](), dict[int, list[str]]()
     for k in range(n):
         row = rows.get(k, {"failed": "it was not reached", "seconds": 0.0})
         seconds[k] = row["seconds"]
@@ -353,15 +411,15 @@ def _study(columns: Mapping[str, list[Any]], rows: Mapping[int, Row]) -> Study:
             values[name][k] = unpacked(value)
         if "failed" in row:
             failed[k] = row["failed"]
-    return Study({name: np.array(x) for name, x in columns.items()}, values, failed, seconds)
+        if "warned" in row:
+            warned[k] = row["warned"]
+    parameters = {name: np.array(x) for name, x in columns.items()}
+    return Study(parameters, values, failed, warned, seconds)
 
 
-def _failures(made: Study) -> str:
-    """A sentence on the samples that failed, if any did."""
-    if not made.failed:
+def _said(what: str, told: Mapping[int, object], n: int) -> str:
+    """A sentence on the samples that failed or warned, if any did."""
+    if not told:
         return ""
-    n = len(made.seconds)
-    some = "; ".join(
-        f"sample {k}: {text:.100}" for k, text in list(made.failed.items())[:MOST_TOLD]
-    )
-    return f"{len(made.failed)} of {n} samples failed ({len(made.failed) / n:.0%}): {some}."
+    some = "; ".join(f"sample {k}: {text!s:.100}" for k, text in list(told.items())[:MOST_TOLD])
+    return f"{len(told)} of {n} samples {what} ({len(told) / n:.0%}): {some}."

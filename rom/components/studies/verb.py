@@ -5,29 +5,31 @@ ended goes on and repeats none. A sample that fails is a row with its error.
 """
 
 import argparse
-import tempfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 import rom
 from rom.cli.answer import Answer, table
-from rom.cli.options import add_meshing, assignment, count, meshing, option, typed_number, unique
-from rom.cli.output import usual
+from rom.cli.options import assignment, count, option, unique
+from rom.cli.output import add_force, checked, usual
 from rom.cli.schemas import FILE, OUTPUT, by_name, each, number, record, text, whole
-from rom.components.studies.described import MotionOf, key_path, reduced
-from rom.components.studies.samples import KINDS, design
+from rom.components.studies.pictures import scatter_matrix
+from rom.components.studies.samples import KINDS, design, range_of
 from rom.components.studies.study import study
 from rom.io.files import check_writable
+from rom.names import check_ending
 from rom.process.launcher import ranks
 
 SUMMARY = "move a mechanism at many samples of its keys"
 SHARES = (0.05, 0.5, 0.95)
+USUAL = {"vary": {}, "keep": (), "samples": 16, "design": KINDS[0], "seed": 1}
 EXAMPLES = """\
   rom study demos/slider_crank.toml --vary bodies.slider.mass=0.2:0.4 -n 20 \\
       --keep "max(abs(crank pin force))"
-  rom study arm.toml --vary joints.\\"main bearing\\".damping=0.01:1:log -n 64 -j 4 \\
-      --keep "range(tip position z)" --keep "last(arm omega z)" -o arm.study
+  rom study demos/slider_crank.toml --vary bodies.rod.mesh.web_width=0.008:0.012 -n 64 -j 2 \\
+      --vary bodies.rod.damping.ratio=0.001:0.05:log --keep "max(abs(crank pin force))" -o rod.study
   rom study arm.toml ... -o arm.study --resume   # after anything that ended it
 """
 SCHEMA = record(
@@ -42,40 +44,44 @@ SCHEMA = record(
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of the verb."""
-    parser.add_argument("file", type=Path, help="mechanism, .toml")
+    parser.add_argument("file", type=Path, help="mechanism, .toml; its table [study] says the same")
     about = "a key of the file and its range; may be repeated"
     option(parser, "--vary KEY=LOW:HIGH[:log]", about, assignment)
     about = 'of each motion, as "max(abs(crank pin force))"; may be repeated'
-    option(parser, "--keep EXPRESSION", about, str, action="append")
-    option(parser, "-n --samples", "number of them; of a grid, for each key", count, default=16)
-    option(parser, "--design", "of the samples", str, choices=KINDS, default=KINDS[0])
-    option(parser, "--seed", "of the samples, default 1", count, default=1)
+    option(parser, "--keep EXPRESSION", about, str, action="append", default=[])
+    option(parser, "-n --samples", "number of them; of a grid, for each key", count)
+    option(parser, "--design", "of the samples", str, choices=KINDS)
+    option(parser, "--seed", "of the samples, default 1", count)
     option(parser, "-j --workers", "processes (default: one on each core)", count)
+    option(parser, "--picture", "of what was kept over what varies, .png", Path)
+    add_force(parser)
     option(parser, "-o --output", "file of the study (default: FILE.study)", Path)
     option(parser, "--resume", "go on with that file")
-    add_meshing(parser)
+    option(parser, "--trust", "run .py files; read them first")
 
 
 def run(args: argparse.Namespace) -> Answer:
     """Sample, move, keep."""
     if ranks()[1] > 1:
         raise rom.ConfigError("a study starts its own processes; leave out mpirun.")
-    if not args.vary or not args.keep:
-        raise rom.ConfigError("--vary and --keep are needed.", hint="See rom study --help.")
+    how = _asked(args)
+    if args.picture:
+        checked(args, check_ending(args.picture, "a picture", ".png"))
     path = check_writable(usual(args, ".study"))
-    trust = bool(meshing(args).get("trust"))
-    ranges = {key: _range(words) for key, words in unique(args.vary, "--vary").items()}
-    log = [key for key, (*_, scale) in ranges.items() if scale]
-    rng = np.random.default_rng(args.seed)
-    samples = design({key: ends[:2] for key, ends in ranges.items()}, args.samples, args.design,
-                     log=log, rng=rng)  # fmt: skip
-    first = {key_path(key): x[0] for key, x in samples.items()}
-    file = rom.read_mechanism(args.file, first, **meshing(args))
-    with tempfile.TemporaryDirectory() as folder:
-        measure = MotionOf(str(args.file), tuple(args.keep), reduced(file, Path(folder)), trust)
-        found = study(measure, samples, workers=args.workers, into=path, resume=args.resume,
-                      progress=not args.quiet)  # fmt: skip
-    numbers = {name: x for name, x in found.values.items() if x.ndim == 1}
+    samples = design(
+        {key: ends[:2] for key, ends in how["vary"].items()},
+        how["samples"],
+        how["design"],
+        log=[key for key, ends in how["vary"].items() if ends[2]],
+        rng=np.random.default_rng(how["seed"]),
+    )
+    asked = {"keep": how["keep"], "trust": args.trust, "workers": args.workers}
+    found = study(
+        args.file, samples, **asked, into=path, resume=args.resume, progress=not args.quiet
+    )
+    if args.picture and found.good.size:
+        scatter_matrix(found, args.picture)
+    numbers = {name: x for name, x in found.values.items() if x.ndim == 1 and found.good.size}
     quantiles = {name: found.quantiles(name, SHARES)[0].tolist() for name in numbers}
     rows = [(name, *(f"{x:.6g}" for x in row)) for name, row in quantiles.items()]
     data = {
@@ -89,9 +95,12 @@ def run(args: argparse.Namespace) -> Answer:
     return Answer(data, f"{head}\n{table(('', '5 %', '50 %', '95 %'), rows)}")
 
 
-def _range(words: str) -> tuple[float, float, bool]:
-    low, _, rest = words.partition(":")
-    high, _, scale = rest.partition(":")
-    if scale not in ("", "log"):
-        raise rom.ConfigError(f"--vary {words!r} must be LOW:HIGH or LOW:HIGH:log.")
-    return typed_number("--vary", low), typed_number("--vary", high), bool(scale)
+def _asked(args: argparse.Namespace) -> dict[str, Any]:
+    """What the file and, in place of that, options say."""
+    given = {name: getattr(args, name) for name in ("samples", "design", "seed", "keep")}
+    given["vary"] = {key: range_of(text) for key, text in unique(args.vary, "--vary").items()}
+    read = rom.read_mechanism(args.file, trust=args.trust).values.get("study", USUAL)
+    how = read | {name: value for name, value in given.items() if value not in (None, [], {})}
+    if not how["vary"] or not how["keep"]:
+        raise rom.ConfigError("--vary and --keep are needed.", hint="See rom study --help.")
+    return how

@@ -10,21 +10,31 @@ import pickle
 import resource
 import signal
 import sys
+import threading
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from time import perf_counter
 from types import FrameType
 from typing import Any
 
+from rom.errors import RANKS, ConfigError, RomWarning
+
 PR_SET_PDEATHSIG = 1
 GRACE = 1.2  # of the limit of time, from where on a worker that does not listen is ended
 UNKNOWN = "unknown measure"
-Answer = tuple[str, Any, Any, float]  # "values", them, None; or "failed", class, text; and seconds
+SEND = "Define it with def in a file that can be imported, without what cannot be pickled."
+# "values", them, warnings; "failed", class, text; "refused", class, text; and seconds
+Answer = tuple[str, Any, Any, float]
 _measures: dict[str, Callable[..., Any]] = {}
 
 
 class Overtime(Exception):
     """A sample took longer than it may."""
+
+
+class Unmeasurable(ConfigError):
+    """What is asked for is in no sample."""
 
 
 def begin(parent: int) -> None:
@@ -42,16 +52,13 @@ def ready() -> bool:
 
 
 def know(key: str, measure: Callable[..., Any]) -> None:
-    """Have a measure under a key."""
+    """Have a measure under a key; a worker writes and warns by itself, also as one of MPI."""
+    os.environ.update(dict.fromkeys(set(RANKS) & os.environ.keys(), "0"))
     _measures[key] = measure
 
 
 def measured(
-    key: str,
-    payload: bytes | None,
-    given: Mapping[str, Any],
-    seconds: float,
-    memory: int,
+    key: str, payload: bytes | None, given: Mapping[str, Any], seconds: float, memory: int
 ) -> Answer | str:
     """What the measure of a key says of a sample; `UNKNOWN` where it has not come here yet.
 
@@ -63,22 +70,25 @@ def measured(
         try:
             know(key, pickle.loads(payload))
         except Exception as error:  # of whatever the modules of the measure raise
-            return ("lost", type(error).__name__, str(error), 0.0)
-    clock = perf_counter()
+            text = f"the measure cannot be loaded by workers: {error}. {SEND}"
+            return ("refused", type(error).__name__, text, 0.0)
+    clock, kind, told = perf_counter(), "failed", ""
     try:
-        with _limited(seconds, memory):
+        with _limited(seconds, memory), warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always", RomWarning)
             values = _plain(_measures[key](**given))
-    except MemoryError:
-        return ("failed", "MemoryError", "it needs more memory than it may take", _since(clock))
-    except Overtime:
-        return ("failed", "Overtime", f"it takes longer than {seconds:g} s", _since(clock))
+    except MemoryError as error:
+        name, told = type(error).__name__, "it needs more memory than it may take"
+    except Overtime as error:
+        name, told = type(error).__name__, f"it takes longer than {seconds:g} s"
+    except Unmeasurable as error:
+        kind, name, told = "refused", type(error).__name__, str(error)
     except Exception as error:  # a row of the table, whatever it is
-        return ("failed", type(error).__name__, str(error), _since(clock))
-    return ("values", values, None, _since(clock))
-
-
-def _since(clock: float) -> float:
-    return perf_counter() - clock
+        name, told = type(error).__name__, str(error)
+    else:
+        own = (str(one.message) for one in caught if issubclass(one.category, RomWarning))
+        return ("values", values, list(dict.fromkeys(own)), perf_counter() - clock)
+    return (kind, name, told, perf_counter() - clock)
 
 
 def _plain(values: Any) -> dict[str, Any]:
@@ -104,6 +114,8 @@ def _limited(seconds: float, memory: int) -> Iterator[None]:
     if not seconds:
         yield
         return
+    if threading.current_thread() is not threading.main_thread():
+        raise Unmeasurable("these workers run samples in threads, whose time cannot be limited.")
 
     def over(number: int, frame: FrameType | None) -> None:
         raise Overtime

@@ -1,0 +1,76 @@
+"""Pictures of studies: what was measured over what varied, who decides, bands over time."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rom import view
+from rom.components.studies.study import Indices, Study
+from rom.errors import ConfigError
+from rom.model import Array
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+LARGEST = 6  # rows and columns of diagrams on a sheet
+BAND = (0.05, 0.5, 0.95)
+
+
+def scatter_matrix(study: Study, path: str | Path | None = None) -> "Figure":
+    """Draw each number that was measured (rows) over each parameter (columns); the figure."""
+    numbers = {name: x for name, x in study.values.items() if x.ndim == 1}
+    varied = {name: x for name, x in study.parameters.items() if x.dtype.kind != "U"}
+    if not numbers or not varied or not study.good.size:
+        raise ConfigError("there is no number over a parameter to draw.")
+    rows = [
+        [
+            view.Panel(
+                "",
+                name[-30:],
+                value[-36:] if k == 0 else "",
+                points={"_": (x[study.good], y[study.good])},
+            )
+            for k, (name, x) in enumerate(list(varied.items())[:LARGEST])
+        ]
+        for j, (value, y) in enumerate(list(numbers.items())[:LARGEST])
+    ]
+    caption = (
+        f"Each point is one of {study.good.size} samples: a number that was measured (row) over a "
+        "parameter that was varied (column), in SI units; all of them varied at the same time."
+    )
+    return view.panels(rows, path, title="What was measured over what was varied", caption=caption)
+
+
+def tornado(
+    indices: Indices, path: str | Path | None = None, *, of: str = "the result"
+) -> "Figure":
+    """Draw Sobol indices as bars, the parameter that decides most on top; the figure."""
+    order = np.argsort(-indices.total)
+    bars = {
+        f"{indices.parameters[k]}": (-float(indices.first[k]), float(indices.total[k]))
+        for k in order
+    }
+    caption = (
+        f"Shares of the variance of {of}: to the left what a parameter explains alone (first "
+        "order), to the right with all that it does together with others (total). Shares of 95 % "
+        "intervals are at most "
+        f"{float(np.abs(np.diff(indices.total_ends)).max() / 2):.2f} to either side."
+    )
+    panel = view.Panel("", "share of the variance [1]", bars=bars, ends=("alone", "in all"))
+    return view.panels([[panel]], path, title="Which parameter decides", caption=caption)
+
+
+def bands(
+    study: Study, name: str, path: str | Path | None = None, *, clock: str = "t", unit: str = ""
+) -> "Figure":
+    """Draw where 90 % of the histories of a value lie over time, and their median; the figure."""
+    times, n = study.on_clock(name, clock), study.good.size
+    quantiles, _ = study.quantiles(name, BAND)
+    curves: dict[str, tuple[Array, Array]] = {
+        f"{share:.0%} of the samples below": (times, x)
+        for share, x in zip(BAND, quantiles, strict=True)
+    }
+    caption = f"At each time, {n} samples ordered by size; a curve is no sample, but a limit."
+    panel = view.Panel("", "time [s]", f"{name} {unit}".strip(), curves=curves)
+    return view.panels([[panel]], path, title=f"Bands of {name}", caption=caption)
