@@ -37,6 +37,10 @@ TASKS: dict[str, tuple[str, str]] = {
         updating.parameter_tracker updating.ParameterTracker updating.Drift updating.compare
         updating.Comparison updating.JointSpring""",
     ),
+    "Fit": (
+        "Parameters of a mechanism from measured histories.",
+        """fit Fitted""",
+    ),
     "Check": (
         "How far a model, a body, a motion or a law can be trusted.",
         """check Report audit check_law eigen.mac eigen.residual_errors io.check_sid""",

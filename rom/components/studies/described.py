@@ -177,8 +177,9 @@ def _column(name: str, solution: Any) -> Array:
         raise Unmeasurable(error.message, hint=error.hint) from error
     for channel in channels:
         values = channel.values.reshape(len(solution.t), -1)
-        if name in channel.names:
-            return np.asarray(values[:, channel.names.index(name)])
+        names = [words.replace(" markers ", " ") for words in channel.names]
+        if name in names:
+            return np.asarray(values[:, names.index(name)])
         if " ".join(channel.path[1:]).replace(" markers ", " ") == name:
             return values if values.shape[1] > 1 else values[:, 0]
     raise Unmeasurable(f"the motion has no quantity {name!r}.", hint=WRITE)

@@ -22,7 +22,7 @@ from rom.components.studies.described import value_of
 from rom.components.studies.samples import check_ranges, design
 from rom.components.studies.study import Study, study
 from rom.components.updating.models import MAX_FALSE_REFUSAL, chi_row
-from rom.components.updating.verdict import UNSEEN_RTOL, unseen_directions
+from rom.components.updating.verdict import unseen_directions
 from rom.errors import ConfigError, MaterialError, MeshError, ModelError, RomWarning, SolverError
 from rom.mbs.analysis.sensitivity import by_name
 from rom.mbs.mechanism import Mechanism
@@ -36,6 +36,7 @@ DIFFERENCE_STEP = 1e-4  # of a range: round-off of a motion below it, curvature 
 MAX_TRIALS = 200  # of one search; ten are usual
 LAST_GAIN = 1e-4  # of chi-square over its expectation, with which a search ends
 SAME_GAIN = 0.1  # likewise, within which two searches ended alike
+OF_RANGE = 12.0  # information of a uniform distribution over a range of one
 BOUND_RTOL = 1e-4  # of a range, from its end
 WHOLE_ERROR = 4 / 3  # of second order, over what halving the step takes away
 MAX_SHIFT = 0.5  # of a parameter by the step of time, in its deviations
@@ -171,7 +172,8 @@ class Fitted:
 
     Attributes:
         values: {parameter: value}.
-        covariance: (p, p) of these values, in their units, in directions that are determined.
+        covariance: (p, p) of these values, in their units; no direction is less known than by a
+            uniform distribution over the ranges.
         undetermined: directions, {parameter: share of its range [1]}, along which parameters may
             change together without a sign of it in the histories.
         verdict: whether noise alone explains what is left, and where it does not.
@@ -192,28 +194,22 @@ class Fitted:
 
     @property
     def deviations(self) -> dict[str, float]:
-        """Standard deviation of each value, in its unit; infinite where it is not determined."""
-        unseen = {name for direction in self.undetermined for name in direction}
-        found = zip(self.values, np.sqrt(np.diag(self.covariance)).tolist(), strict=True)
-        return {name: np.inf if name in unseen else d for name, d in found}
+        """Standard deviation of each value, in its unit."""
+        return dict(zip(self.values, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
 
     @property
     def correlations(self) -> Array:
-        """(p, p) correlation of the values [1]; NaN of one that changes nothing."""
+        """(p, p) correlation of the values [1]."""
         d = np.sqrt(np.diag(self.covariance))
-        with np.errstate(invalid="ignore"):
-            return self.covariance / np.outer(d, d)
+        return self.covariance / np.outer(d, d)
 
     def __str__(self) -> str:
-        found, (good, ends) = self.deviations, (self.searches.good, self.searches.values)
-        lines = [
-            f"  {name} = {x:.6g}"
-            + (f" +- {d:.2g}" if (d := found[name]) < np.inf else ", not told")
-            for name, x in self.values.items()
-        ]
+        good, ends = self.searches.good, self.searches.values
+        known = zip(self.values.items(), self.deviations.values(), strict=True)
+        lines = [f"  {name} = {x:.6g} +- {d:.2g}" for (name, x), d in known]
         for direction in self.undetermined:
-            shares = ", ".join(f"{name} {share:+.2f}" for name, share in direction.items())
-            lines.append(f"  may change together, in shares of ranges: {shares}")
+            shares = ", ".join(f"{share:+.2f} {name}" for name, share in direction.items())
+            lines.append(f"  not told by the data, in shares of ranges: {shares}")
         squares, n = np.sort(ends["chi-square"][good]), ends["residuals"].shape[1]
         other = squares[squares > squares[0] + SAME_GAIN * max(1.0, squares[0] / n)]
         same = f"{squares.size - other.size} of {len(self.searches.seconds)} searches end here"
@@ -310,14 +306,13 @@ def _fitted(search: Search, found: Study) -> Fitted:
     (low, high), values = search.ends, search.values(theta)
     width = high - low
     lam, V = np.linalg.eigh(J.T @ J * np.outer(width, width))
-    seen = lam >= UNSEEN_RTOL**-2.0
-    root = width[:, None] * V[:, seen] / np.sqrt(lam[seen])
+    root = width[:, None] * V / np.sqrt(np.maximum(lam, OF_RANGE))
     near = np.minimum(theta - low, high - theta) <= BOUND_RTOL * width
     at_bound = tuple(np.array(search.names)[near].tolist())
     cuts = np.cumsum([record.values.size for record in search.records])[:-1]
     parts = zip(search.records, np.split(r, cuts), strict=True)
     left = {record.name: x.reshape(record.values.shape) for record, x in parts}
-    rows = noise_rows(left, r.size - np.count_nonzero(seen))
+    rows = noise_rows(left, r.size - np.count_nonzero(lam >= OF_RANGE))
     if "dt" in search.options:
         rows.append(_step_row(search, theta, r, root @ root.T, J))
     if not found.values["ended"][best]:
@@ -368,7 +363,6 @@ def _step_row(search: Search, theta: Array, r: Array, C: Array, J: Array) -> Row
     change = np.full(r.size, np.nan)
     with suppress(*UNMOVED):
         change = search.residuals(theta, dt=search.options["dt"] / 2) - r
-    d = np.sqrt(np.diag(C))
-    shift = np.abs(C @ (J.T @ change))[d > 0] / d[d > 0]
+    shift = np.abs(C @ (J.T @ change)) / np.sqrt(np.diag(C))
     text = "shift of a parameter by the step of time [deviations]"
-    return row(text, WHOLE_ERROR * shift.max(initial=0.0), MAX_SHIFT)
+    return row(text, WHOLE_ERROR * float(shift.max()), MAX_SHIFT)
