@@ -16,7 +16,6 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import least_squares
 from scipy.stats import chi2, norm
 
-import rom
 from rom.arguments import Count, Number, Positive, ascending, between, finite, shortened, typed
 from rom.components.studies.described import value_of
 from rom.components.studies.samples import check_ranges, design
@@ -25,6 +24,7 @@ from rom.components.updating.models import MAX_FALSE_REFUSAL, chi_row
 from rom.components.updating.verdict import unseen_directions
 from rom.errors import ConfigError, MaterialError, MeshError, ModelError, RomWarning, SolverError
 from rom.mbs.analysis.sensitivity import by_name
+from rom.mbs.integrate.simulation import simulate
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.results.solution import Solution
 from rom.model import Array, Mask, Report, Row
@@ -107,7 +107,7 @@ class Search:
         if isinstance(made, Mechanism):
             if "dt" not in self.options:
                 raise ConfigError("dt is missing: the step with which the mechanism moves [s].")
-            made = rom.simulate(made, **self.options | changed)
+            made = simulate(made, **self.options | changed)
         elif not isinstance(made, Solution):
             raise ConfigError(f"build returned {shortened(made)}; return a rom.Mechanism.")
         elif self.options:

@@ -7,7 +7,7 @@ from scipy import stats
 from scipy.optimize import curve_fit
 
 import rom
-from cases.fitted import crank, free, oscillator, place, rubbed, weak
+from cases.components.fitted import crank, free, oscillator, place, rubbed, weak
 from cases.long import few
 from cases.refusals import refused, refuses
 from rom.components.studies.described import value_of
@@ -138,7 +138,7 @@ def test_the_shift_by_steps_that_are_too_long_is_told_as_large_as_it_is():
 
 
 def test_many_starts_find_the_best_of_several_minima_on_any_number_of_workers():
-    options = {"dt": 0.02, "log": ("stiffness",), "starts": 4}
+    options = {"dt": 0.02, "log": ("stiffness",), "starts": 3}
     found = [
         rom.fit(oscillator, {"stiffness": (20.0, 2000.0)}, of_mass(X), workers=n,
                 rng=np.random.default_rng(3), **options)
@@ -146,8 +146,8 @@ def test_many_starts_find_the_best_of_several_minima_on_any_number_of_workers():
     ]  # fmt: skip
     squares = np.sort(found[0].searches.values["chi-square"])
     alike = np.count_nonzero(squares < squares[0] + 0.1)
-    assert squares[-1] > 1e5 and 1 <= alike < 4
-    assert f"{alike} of 4 searches end here, others at chi-square {squares[alike]:.4g}" in str(
+    assert squares[-1] > 1e5 and 1 <= alike < 3
+    assert f"{alike} of 3 searches end here, others at chi-square {squares[alike]:.4g}" in str(
         found[0]
     )
     assert found[0].values["stiffness"] == pytest.approx(200.0, rel=0.02)
