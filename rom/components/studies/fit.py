@@ -6,7 +6,7 @@ Source:
 """
 
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Annotated, Any
@@ -14,13 +14,12 @@ from typing import Annotated, Any
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.optimize import least_squares
-from scipy.stats import chi2, norm
 
 from rom.arguments import Count, Number, Positive, ascending, between, finite, shortened, typed
 from rom.components.studies.described import value_of
+from rom.components.studies.fitted import Fitted, noise_rows
 from rom.components.studies.samples import check_ranges, design
 from rom.components.studies.study import Study, study
-from rom.components.updating.models import MAX_FALSE_REFUSAL, chi_row
 from rom.components.updating.verdict import unseen_directions
 from rom.errors import ConfigError, MaterialError, MeshError, ModelError, RomWarning, SolverError
 from rom.mbs.analysis.sensitivity import by_name
@@ -35,11 +34,11 @@ UNMOVED = (MaterialError, MeshError, ModelError, SolverError, ArithmeticError)
 DIFFERENCE_STEP = 1e-4  # of a range: round-off of a motion below it, curvature above
 MAX_TRIALS = 200  # of one search; ten are usual
 LAST_GAIN = 1e-4  # of chi-square over its expectation, with which a search ends
-SAME_GAIN = 0.1  # likewise, within which two searches ended alike
 OF_RANGE = 12.0  # information of a uniform distribution over a range of one
 BOUND_RTOL = 1e-4  # of a range, from its end
 WHOLE_ERROR = 4 / 3  # of second order, over what halving the step takes away
 MAX_SHIFT = 0.5  # of a parameter by the step of time, in its deviations
+TIME_RTOL = 1e-9  # of a motion, beyond its end
 FORM = "Write {'slider position x': (times, values, deviation), ...}."
 
 
@@ -74,7 +73,7 @@ class Record:
         if x.shape[:1] != t.shape or x.shape[1:] != self.values.shape[1:]:
             text = f"{self.name!r} was measured as {self.values.shape}, one row for each time"
             raise ConfigError(f"{text}; of a motion of {t.size} instants it is {x.shape}.")
-        if self.t[0] < t[0] or self.t[-1] > t[-1]:
+        if self.t[0] < t[0] or self.t[-1] > t[-1] + TIME_RTOL * (t[-1] - t[0]):
             text = f"{self.name!r} was measured from {self.t[0]:g} s to {self.t[-1]:g} s"
             raise ConfigError(f"{text}; the motion is from {t[0]:g} s to {t[-1]:g} s.")
         return np.ravel((CubicSpline(t, x)(self.t) - self.values) / self.deviation)
@@ -133,7 +132,7 @@ class Search:
             return np.stack([self._slope(residuals, theta, k) for k in range(theta.size)], axis=1)
 
         n = sum(record.values.size for record in self.records)
-        theta, low, high = unknowns(start, self.log), *self.ends
+        theta, low, high = unknowns(start.values(), self.log), *self.ends
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RomWarning)  # of motions on the way
             found = least_squares(residuals, theta, slopes, (low, high), x_scale=high - low,
@@ -160,65 +159,10 @@ class Search:
         return np.asarray((r[1] - r[0]) / (at[1] - at[0]))
 
 
-def unknowns(values: Mapping[str, float], log: Mask) -> Array:
-    """(p,) values, or their logarithms."""
-    x = np.array(list(values.values()), dtype=float)
+def unknowns(values: Iterable[Any], log: Mask) -> Array:
+    """(..., p) values of p parameters, or their logarithms."""
+    x = np.array(list(values), dtype=float).T
     return np.asarray(np.log(x, out=x.copy(), where=log))
-
-
-@dataclass(frozen=True, eq=False)
-class Fitted:
-    """What measured histories say about parameters of a mechanism.
-
-    Attributes:
-        values: {parameter: value}.
-        covariance: (p, p) of these values, in their units; no direction is less known than by a
-            uniform distribution over the ranges.
-        undetermined: directions, {parameter: share of its range [1]}, along which parameters may
-            change together without a sign of it in the histories.
-        verdict: whether noise alone explains what is left, and where it does not.
-        predicted: {record: (n,) or (n, c) as measured}, of the mechanism fitted.
-        residuals: {record: likewise}, predicted less measured, over the deviation [1].
-        at_bound: names of parameters that lie at an end of their range.
-        searches: starts and ends of all searches; a start that cannot be moved is a failed row.
-    """
-
-    values: dict[str, float]
-    covariance: Array
-    undetermined: tuple[dict[str, float], ...]
-    verdict: Report
-    predicted: dict[str, Array]
-    residuals: dict[str, Array]
-    at_bound: tuple[str, ...]
-    searches: Study
-
-    @property
-    def deviations(self) -> dict[str, float]:
-        """Standard deviation of each value, in its unit."""
-        return dict(zip(self.values, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
-
-    @property
-    def correlations(self) -> Array:
-        """(p, p) correlation of the values [1]."""
-        d = np.sqrt(np.diag(self.covariance))
-        return self.covariance / np.outer(d, d)
-
-    def __str__(self) -> str:
-        good, ends = self.searches.good, self.searches.values
-        known = zip(self.values.items(), self.deviations.values(), strict=True)
-        lines = [f"  {name} = {x:.6g} +- {d:.2g}" for (name, x), d in known]
-        for direction in self.undetermined:
-            shares = ", ".join(f"{share:+.2f} {name}" for name, share in direction.items())
-            lines.append(f"  not told by the data, in shares of ranges: {shares}")
-        squares, n = np.sort(ends["chi-square"][good]), ends["residuals"].shape[1]
-        other = squares[squares > squares[0] + SAME_GAIN * max(1.0, squares[0] / n)]
-        same = f"{squares.size - other.size} of {len(self.searches.seconds)} searches end here"
-        lines.append(f"  {same}" + (f", others at chi-square {other[0]:.4g}" if other.size else ""))
-        moved, failed = (int(ends[name][good].sum()) for name in ("motions", "failed motions"))
-        lines += [f"  {failed} of {moved} motions failed; steps there were taken back"] * bool(
-            failed
-        )
-        return "\n".join(["fitted parameters", *lines, str(self.verdict)])
 
 
 @typed
@@ -280,15 +224,14 @@ def fit(  # noqa: PLR0913  what is sought, from where, and what runs
     if dt is not None:
         last = max(record.t[-1] for record in records)
         options |= {"dt": dt, "t_end": last if t_end is None else t_end}
-    lows, highs = zip(*parameters.values(), strict=True)
-    ends = np.array([unknowns(dict(zip(names, x, strict=True)), scale) for x in (lows, highs)])
+    ends = unknowns(parameters.values(), scale)
     search = Search(build, names, scale, ends, records, options)
     first = search.values(ends.mean(axis=0))
     check_all_known(start or {}, names, "start= names no parameter")
     for name, x in (start or {}).items():
         first[name] = between(f"start of {name!r}", x, *parameters[name])
     with suppress(*UNMOVED):  # another start may move
-        search.residuals(unknowns(first, scale))
+        search.residuals(unknowns(first.values(), scale))
     more = design(parameters, starts - 1, log=log, rng=rng) if starts > 1 else {}
     samples = {name: np.r_[x, more.get(name, [])] for name, x in first.items()}
     where = 0 if starts == 1 else workers
@@ -329,30 +272,6 @@ def _fitted(search: Search, found: Study) -> Fitted:
         at_bound=at_bound,
         searches=found,
     )
-
-
-def noise_rows(left: Mapping[str, Array], freedom: int) -> list[Row]:
-    """Whether residuals of records are noise: of the size that was said, and without memory.
-
-    Memory is the first serial correlation times the root of the number of pairs, normal for noise.
-
-    Source:
-        Box, Jenkins and Reinsel, Time series analysis (1994), 8.2.
-    """
-    total, text = sum(float(np.sum(x**2)) for x in left.values()), "chi-square of the records"
-    least = chi2.ppf(MAX_FALSE_REFUSAL, freedom) / freedom
-    pairs = {name: x[1:] * x[:-1] for name, x in left.items()}
-    memory = {name: float(y.sum() / np.sqrt(max(y.size, 1)) / (np.mean(left[name] ** 2) or 1.0))
-              for name, y in pairs.items()}  # fmt: skip
-    off = {name: float(np.sum(x**2 - 1) / np.sqrt(2 * x.size)) for name, x in left.items()}
-    worst, alike = (max(found, key=found.__getitem__) for found in (off, memory))
-    x, most = left[worst], float(norm.isf(MAX_FALSE_REFUSAL / len(left)))
-    return [
-        chi_row(text, total, freedom, 1),
-        row(f"{text}, no less than noise leaves", total / freedom, least, above=True),
-        chi_row(f"worst record, {worst}", float(np.sum(x**2)), x.size, len(left)),
-        row(f"memory of residuals, {alike} [deviations]", memory[alike], most),
-    ]
 
 
 def _step_row(search: Search, theta: Array, r: Array, C: Array, J: Array) -> Row:
