@@ -1,8 +1,9 @@
 """Histories of a motion: a table (CSV, pandas), a tree of arrays (HDF5), a data set (xarray)."""
 
 import io
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cache, cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -20,14 +21,24 @@ DIMENSION_NAMES = {AXIS_LETTERS: "axis", QUATERNION_PARTS: "quaternion"}  # of d
 ENERGIES = ("kinetic", "strain", "potential", "drives", "forces", "damping", "total")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Channel:
     """One quantity over time."""
 
     path: tuple[str, ...]  # outermost first, e.g. ("bodies", "rod", "position")
     unit: str  # a comma separates those of columns that differ
     columns: tuple[str, ...]  # their names
-    values: Array  # (n_t, c)
+    take: Callable[[], Array]  # its values, which cost as much as some steps of the motion
+
+    @cached_property
+    def values(self) -> Array:
+        """(n_t, c), or (n_t,) of a single column."""
+        return self.take()
+
+    @property
+    def said(self) -> str:
+        """What it is, in words."""
+        return " ".join(self.path[1:]).replace(" markers ", " ")
 
     @property
     def names(self) -> list[str]:
@@ -65,10 +76,7 @@ def _every(solution: Any, every: int) -> tuple[Array, tuple[Channel, ...]]:
     whole("every", every, 1)
     rows = slice(None, None, every)
     t = solution.t[rows]
-    return t, tuple(
-        Channel(c.path, c.unit, c.columns, c.values[rows].reshape(len(t), -1))
-        for c in channels(solution)
-    )
+    return t, tuple(replace(c, take=partial(_thinned, c, rows, len(t))) for c in channels(solution))
 
 
 def data_frame(solution: Any, *, every: int = 1) -> Any:
@@ -102,34 +110,52 @@ def channels(solution: Any) -> Iterator[Channel]:
     for name, part in solution.mechanism.parts.items():
         yield from _of_body(solution, name, part)
     for joint in sorted(set(solution.packed.row_owner)):
-        place, loads = ("joints", joint), solution.reaction(joint)
-        yield Channel((*place, "force"), "N", AXIS_LETTERS, loads[:, :3])
-        yield Channel((*place, "moment"), "N m", AXIS_LETTERS, loads[:, 3:])
+        place, loads = ("joints", joint), cache(partial(solution.reaction, joint))
+        yield Channel((*place, "force"), "N", AXIS_LETTERS, partial(_cut, loads, slice(3)))
+        yield Channel((*place, "moment"), "N m", AXIS_LETTERS, partial(_cut, loads, slice(3, None)))
         known = solution.mechanism.joints.get(joint)
         if known is None or known.coordinate is None:
             continue
-        motion = solution.joint(joint)
+        motion = cache(partial(solution.joint, joint))
         angle, way = ("angle", known.turn, "rad"), ("displacement", known.displacement, "m")
         for what, row, unit in (angle, way):
             if row is not None:
-                yield Channel((*place, what), unit, ("",), getattr(motion, what))
-                rate = getattr(motion, f"{what}_rate")
-                yield Channel((*place, f"{what} rate"), f"{unit}/s", ("",), rate)
+                for told, per in ((what, ""), (f"{what} rate", "/s")):
+                    take = partial(_told, motion, told.replace(" ", "_"))
+                    yield Channel((*place, told), f"{unit}{per}", ("",), take)
     for element in solution.elements:
         place, found = ("elements", element), solution.element(element)
         if found.on_joint:
-            yield Channel((*place, "along"), found.along_unit, ("",), found.along)
+            yield Channel(
+                (*place, "along"), found.along_unit, ("",), partial(np.asarray, found.along)
+            )
             continue
-        yield Channel((*place, "force"), "N", AXIS_LETTERS, found.force[:, -1])
-        yield Channel((*place, "moment"), "N m", AXIS_LETTERS, found.moment[:, -1])
+        yield Channel((*place, "force"), "N", AXIS_LETTERS, partial(np.asarray, found.force[:, -1]))
+        yield Channel(
+            (*place, "moment"), "N m", AXIS_LETTERS, partial(np.asarray, found.moment[:, -1])
+        )
     for name in ENERGIES:
-        yield Channel(("energy", name), "J", ("",), getattr(solution.energy, name))
+        energy = partial(getattr, solution, "energy")
+        yield Channel(("energy", name), "J", ("",), partial(_told, energy, name))
+
+
+def _cut(take: Callable[[], Array], columns: slice) -> Array:
+    return take()[:, columns]
+
+
+def _thinned(channel: Channel, rows: slice, n: int) -> Array:
+    return channel.values[rows].reshape(n, -1)
+
+
+def _told(of: Callable[[], Any], name: str) -> Array:
+    values: Array = getattr(of(), name)
+    return values
 
 
 def asked(solution: Any, names: Sequence[str]) -> list[Channel]:
     """The quantities of a motion that names ask for, as "slider", "crank pin" or "pivot angle"."""
     known, chosen = list(channels(solution)), list[Channel]()
-    words = [" ".join(c.path[1:]).replace(" markers ", " ") for c in known]
+    words = [c.said for c in known]
     for name in names or [f"{body} position" for body in solution.mechanism.parts]:
         wanted = name.replace(".", " ")
         found = [c for c, said in zip(known, words, strict=True)
@@ -144,21 +170,20 @@ def asked(solution: Any, names: Sequence[str]) -> list[Channel]:
 
 
 def _of_body(solution: Any, name: str, part: Any) -> Iterator[Channel]:
-    place = ("bodies", name)
-    yield Channel((*place, "position"), "m", AXIS_LETTERS, solution.position(name))
-    quaternion = solution.orientation(name)
-    yield Channel((*place, "orientation"), "1", QUATERNION_PARTS, quaternion)
-    yield Channel((*place, "velocity"), "m/s", AXIS_LETTERS, solution.velocity(name))
-    yield Channel((*place, "omega"), "rad/s", AXIS_LETTERS, solution.omega(name))
+    place, of = ("bodies", name), solution
+    yield Channel((*place, "position"), "m", AXIS_LETTERS, partial(of.position, name))
+    yield Channel((*place, "orientation"), "1", QUATERNION_PARTS, partial(of.orientation, name))
+    yield Channel((*place, "velocity"), "m/s", AXIS_LETTERS, partial(of.velocity, name))
+    yield Channel((*place, "omega"), "rad/s", AXIS_LETTERS, partial(of.omega, name))
     if part.r:
         labels = tuple(f"q{k + 1}" for k in range(part.r))
         normalised = np.allclose(part.flexible.M, np.eye(part.r), rtol=0, atol=1e-6)
         unit = "m sqrt(kg)" if normalised else "per shape"
-        yield Channel((*place, "elastic"), unit, labels, solution.elastic(name))
+        yield Channel((*place, "elastic"), unit, labels, partial(of.elastic, name))
     for marker in part.names:
-        at = (*place, "markers", marker)
-        yield Channel((*at, "position"), "m", AXIS_LETTERS, solution.position(name, marker))
-        yield Channel((*at, "velocity"), "m/s", AXIS_LETTERS, solution.velocity(name, marker))
+        at, whose = (*place, "markers", marker), (name, marker)
+        yield Channel((*at, "position"), "m", AXIS_LETTERS, partial(of.position, *whose))
+        yield Channel((*at, "velocity"), "m/s", AXIS_LETTERS, partial(of.velocity, *whose))
 
 
 def _table(solution: Any, t: Array, found: tuple[Channel, ...]) -> bytes:

@@ -13,6 +13,7 @@ Source:
 """
 
 from collections.abc import Callable
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
 from typing import Annotated
@@ -24,6 +25,7 @@ from rom.arguments import shortened, typed
 from rom.arguments.quantities import Count, Positive
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.model import Array, Index
+from rom.process.spreading import spread
 
 # angles of equal shape (...) -> (...) true or false
 Assembles = Callable[[Array, Array], npt.ArrayLike]
@@ -117,6 +119,7 @@ def index_map(
     lengths: Lengths = (1.0, 1.0),
     n: Cells = 400,
     assembles: Assembles | None = None,
+    executor: Executor | None = None,
 ) -> Array:
     """(n, n) isotropy index on `angle_grid` [1], zero where the mechanism cannot be assembled.
 
@@ -130,6 +133,7 @@ def index_map(
         n: number of nodes along each coordinate.
         assembles: function of the same coordinates that says where there is an inertia; None:
             everywhere.
+        executor: of `concurrent.futures`, whose workers share the nodes; None for none.
 
     Raises:
         ConfigError, ModelError: for ranges that cannot be; if it can be assembled nowhere, or the
@@ -137,8 +141,14 @@ def index_map(
     """
     q1, q2 = angle_grid(n, ranges)
     there, index = _there(assembles, q1, q2, n), np.zeros((n, n))
-    index[there] = isotropy_index(inertia_at(inertia, q1[there], q2[there]), lengths=lengths)
+    parts = np.array_split(np.stack([q1[there], q2[there]]), 1 if executor is None else n, axis=1)
+    A = np.concatenate(spread(partial(_inertia_at, inertia), parts, executor))
+    index[there] = isotropy_index(A, lengths=lengths)
     return index
+
+
+def _inertia_at(inertia: Inertia, q: Array) -> Array:
+    return inertia_at(inertia, *q)
 
 
 def _there(assembles: Assembles | None, q1: Array, q2: Array, n: int) -> Array:

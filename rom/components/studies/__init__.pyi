@@ -1,5 +1,8 @@
 from rom.components.studies.fit import fit as fit
 from rom.components.studies.fitted import Fitted as Fitted
+from rom.components.studies.pictures import bands as bands
+from rom.components.studies.pictures import scatter_matrix as scatter_matrix
+from rom.components.studies.pictures import tornado as tornado
 from rom.components.studies.samples import design as design
 from rom.components.studies.samples import indices_design as indices_design
 from rom.components.studies.study import Indices as Indices

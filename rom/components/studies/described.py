@@ -24,7 +24,9 @@ from rom.process.launcher import ranks
 from rom.process.patience import Turns
 
 if TYPE_CHECKING:
+    from rom.body.flexible import FlexibleBody
     from rom.config.mechanism import MechanismFile
+    from rom.model import FEModel
 
 Changes = dict[tuple[str, ...], Any]
 KEY_WORDS = re.compile(r'"([^"]*)"|([^."]+)')  # of a key, joints."main bearing"
@@ -99,20 +101,20 @@ class MotionOf:
             ConfigError: for a key that does not exist, or a value it cannot have.
         """
         own, parts = self.sorted(given)
-        for place, changes in parts.values():
-            rom.read_component(place, changes, trust=self.trust)
-        return rom.read_mechanism(self.file, own, trust=self.trust)
+        file = rom.read_mechanism(self.file, own, trust=self.trust)
+        for name, (place, changes) in parts.items():
+            component = rom.read_component(place, changes, trust=self.trust)
+            if not (component.kinds or file.values["bodies"][name]["rigid"]):
+                component.body()  # says that it has no interface
+        return file
 
 
 @cache
 def components(file: str) -> dict[str, Path]:
-    """Component files by body, of those that become bodies with interfaces."""
+    """Component files by body."""
     bodies = rom.read_mechanism(file).values["bodies"]
     files = {name: values["file"] for name, values in bodies.items() if "file" in values}
-    return {
-        name: place for name, place in files.items()
-        if place.suffix == ".toml" and rom.read_component(place).kinds
-    }  # fmt: skip
+    return {name: place for name, place in files.items() if place.suffix == ".toml"}
 
 
 @cache
@@ -133,13 +135,20 @@ def body_of(place: str, changes: tuple[Any, ...], folder: str, trust: bool) -> s
 def _make(place: str, changes: Changes, path: Path, trust: bool) -> None:
     """Mesh and reduce; where this process is one of several, by one that is alone."""
     if ranks()[1] == 1:
-        rom.save(rom.read_component(place, changes, trust=trust).body(), path)
+        component = rom.read_component(place, changes, trust=trust)
+        rom.save(component.body() if component.kinds else _rigid(component.model()), path)
         return
     given = json.dumps([place, list(changes.items()), str(path), trust])
     ended = run(python("rom.components.studies.described", given))
     if ended.code:
         kind, _, text = ended.out.partition("\n")
         raise getattr(rom.errors, kind, rom.SolverError)(text.strip() or ended.last)
+
+
+def _rigid(model: "FEModel") -> "FlexibleBody":
+    """Mass and places of a component without kinds, in the file of a body that does not bend."""
+    kinds = dict.fromkeys(model.interfaces, "rbe3")
+    return rom.reduce(model, method=rom.CraigBampton(0), interfaces=kinds, certify=False)
 
 
 def key_path(text: str) -> tuple[str, ...]:
@@ -176,12 +185,10 @@ def _column(name: str, solution: Any) -> Array:
     except ConfigError as error:
         raise Unmeasurable(error.message, hint=error.hint) from error
     for channel in channels:
-        values = channel.values.reshape(len(solution.t), -1)
-        names = [words.replace(" markers ", " ") for words in channel.names]
-        if name in names:
-            return np.asarray(values[:, names.index(name)])
-        if " ".join(channel.path[1:]).replace(" markers ", " ") == name:
-            return values if values.shape[1] > 1 else values[:, 0]
+        words = [f"{channel.said} {x}".strip() for x in channel.columns]
+        if name in (channel.said, *words):
+            values = channel.values.reshape(len(solution.t), -1)
+            return values[:, words.index(name)] if name in words else values
     raise Unmeasurable(f"the motion has no quantity {name!r}.", hint=WRITE)
 
 

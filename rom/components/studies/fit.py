@@ -7,6 +7,7 @@ Source:
 
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import Executor
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Annotated, Any
@@ -177,7 +178,7 @@ def fit(  # noqa: PLR0913  what is sought, from where, and what runs
     start: Mapping[str, float] | None = None,
     starts: Annotated[int, Count(1)] = 1,
     rng: np.random.Generator | None = None,
-    executor: Any = None,
+    executor: Executor | None = None,
     workers: Annotated[int, Count(0)] | None = None,
     progress: bool = True,
     **options: Any,

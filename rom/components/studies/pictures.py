@@ -47,18 +47,19 @@ def tornado(
 ) -> "Figure":
     """Draw Sobol indices as bars, the parameter that decides most on top; the figure."""
     order = np.argsort(-indices.total)
-    bars = {
-        f"{indices.parameters[k]}": (-float(indices.first[k]), float(indices.total[k]))
-        for k in order
-    }
+    panels = [
+        view.Panel(title, "share of the variance [1]", bars={
+            indices.parameters[k]: (min(0.0, float(x[k])), max(0.0, float(x[k]))) for k in order
+        })
+        for title, x in (("Together with others", indices.total), ("Alone", indices.first))
+    ]  # fmt: skip
+    wide = float(np.abs(np.diff(indices.total_ends)).max() / 2)
     caption = (
-        f"Shares of the variance of {of}: to the left what a parameter explains alone (first "
-        "order), to the right with all that it does together with others (total). Shares of 95 % "
-        "intervals are at most "
-        f"{float(np.abs(np.diff(indices.total_ends)).max() / 2):.2f} to either side."
+        f"Shares of the variance of {of} that come from each parameter: with all that it does "
+        "together with others (total Sobol index), and alone (first order). The samples leave "
+        f"them uncertain by up to {wide:.2f}."
     )
-    panel = view.Panel("", "share of the variance [1]", bars=bars, ends=("alone", "in all"))
-    return view.panels([[panel]], path, title="Which parameter decides", caption=caption)
+    return view.panels([panels], path, title="Which parameter decides", caption=caption)
 
 
 def bands(

@@ -7,6 +7,7 @@ one by one, until the one that ends its process is found.
 
 import multiprocessing  # noqa: TID251  of which the pool of the standard is made
 import os
+import sys
 from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import (
@@ -21,7 +22,9 @@ from concurrent.futures.process import ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from hashlib import sha256
+from types import ModuleType
 from typing import Any
+from unittest.mock import patch
 
 from rom.components.studies import worker
 from rom.components.studies.worker import Answer
@@ -42,8 +45,8 @@ Limits = tuple[float, int]  # of a sample [s] and of a worker [bytes]; 0 for non
 class Processes:
     """A pool of processes, spawned, each with one thread of BLAS, that can be replaced."""
 
-    def __init__(self, workers: int):
-        self.workers = workers
+    def __init__(self, workers: int, *, script: bool):
+        self.workers, self.script = workers, script
         self.pool = self._started()
         try:
             self.pool.submit(worker.ready).result()
@@ -52,7 +55,13 @@ class Processes:
 
     def _started(self) -> ProcessPoolExecutor:
         context = multiprocessing.get_context("spawn")
-        return ProcessPoolExecutor(self.workers, context, worker.begin, (os.getpid(),))
+        pool = ProcessPoolExecutor(self.workers, context, worker.begin, (os.getpid(),))
+        # workers run the script that starts them again, unless there is none to be seen
+        hidden = {} if self.script else {"__main__": ModuleType("__main__")}
+        with patch.dict(sys.modules, hidden):
+            for _ in range(self.workers):  # each starts one
+                pool.submit(worker.ready)
+        return pool
 
     def submit(self, *task: Any) -> "Future[Any]":
         """As of an executor."""
@@ -71,13 +80,13 @@ class Processes:
 
 
 @contextmanager
-def processes(workers: int) -> Iterator[Processes]:
-    """So many processes, ended behind it."""
+def processes(workers: int, *, script: bool) -> Iterator[Processes]:
+    """So many processes, ended behind it; with what the script that runs defines, if need be."""
     before = {name: os.environ.get(name) for name in THREADS}
     os.environ.update(dict.fromkeys(THREADS, "1"))
     pool, whole = None, False
     try:
-        pool = Processes(workers)
+        pool = Processes(workers, script=script)
         yield pool
         whole = True
     finally:

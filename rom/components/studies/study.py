@@ -1,6 +1,5 @@
 """A study: a measure at many samples of its parameters, and what that tells."""
 
-import pickle
 import platform
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
@@ -17,12 +16,13 @@ import rom
 from rom.arguments import Count, NotNegative, typed
 from rom.components.studies.journal import Journal, Row, packed, read, unpacked
 from rom.components.studies.running import Limits, answers, here, processes
-from rom.components.studies.worker import SEND, Answer
+from rom.components.studies.worker import Answer
 from rom.errors import ConfigError, InterruptedRun, warn
 from rom.model import Array, Index
 from rom.names import check_known
 from rom.process.child import scratch
 from rom.process.progress import Progress, looked_for
+from rom.process.spreading import sent
 
 if TYPE_CHECKING:
     from rom.components.studies.described import MotionOf
@@ -188,7 +188,7 @@ def study(  # noqa: PLR0913  what runs, where, within which limits, and what is 
     samples: Mapping[str, Any],
     *,
     keep: str | Sequence[str] = (),
-    executor: Any = None,
+    executor: Executor | None = None,
     workers: Annotated[int, Count(0)] | None = None,
     into: str | Path | None = None,
     resume: bool = False,
@@ -263,7 +263,7 @@ def _studied(  # noqa: PLR0913
     progress: bool,
 ) -> Study:
     n = len(next(iter(columns.values())))
-    payload = b"" if executor is None and workers == 0 else _pickled(measure)
+    payload = b"" if executor is None and workers == 0 else sent(measure, _name(measure))
     head = {"measure": _name(measure), "parameters": columns, "made with": {
         "rom": rom.__version__, "python": platform.python_version(), "numpy": np.__version__,
     }}  # fmt: skip
@@ -272,7 +272,7 @@ def _studied(  # noqa: PLR0913
         shapes = _shapes(rows.values())
         todo = [(k, {name: x[k] for name, x in columns.items()}) for k in range(n) if k not in rows]
         with (
-            _executor(executor, workers, len(todo)) as ready,
+            _executor(executor, workers, len(todo), b"__main__" in payload) as ready,
             _told(progress, n, len(rows)) as tell,
         ):
             found = (
@@ -330,28 +330,22 @@ def _columns(samples: Mapping[str, Any]) -> dict[str, list[Any]]:
     return {name: x.tolist() for name, x in found.items()}
 
 
-def _pickled(measure: Callable[..., Any]) -> bytes:
-    try:
-        return pickle.dumps(measure)
-    except Exception as error:  # of whatever kind what it holds raises
-        text = f"the measure {_name(measure)!r} cannot be sent to another process: {error}."
-        raise ConfigError(text, hint=SEND) from error
-
-
 def _name(measure: Callable[..., Any]) -> str:
     kind = measure if hasattr(measure, "__qualname__") else type(measure)
     return str(getattr(measure, "name", kind.__qualname__))
 
 
 @contextmanager
-def _executor(executor: Executor | None, workers: int | None, n: int) -> Iterator[Any]:
+def _executor(
+    executor: Executor | None, workers: int | None, n: int, script: bool
+) -> Iterator[Any]:
     """What measures, None for this process."""
     if executor is not None or workers == 0 or not n:
         yield executor
         return
     import os
 
-    with processes(min(workers or len(os.sched_getaffinity(0)), n)) as pool:
+    with processes(min(workers or len(os.sched_getaffinity(0)), n), script=script) as pool:
         yield pool
 
 

@@ -19,11 +19,11 @@ from types import FrameType
 from typing import Any
 
 from rom.errors import RANKS, ConfigError, RomWarning
+from rom.process.spreading import SEND
 
 PR_SET_PDEATHSIG = 1
 GRACE = 1.2  # of the limit of time, from where on a worker that does not listen is ended
 UNKNOWN = "unknown measure"
-SEND = "Define it with def in a file that can be imported, without what cannot be pickled."
 # "values", them, warnings; "failed", class, text; "refused", class, text; and seconds
 Answer = tuple[str, Any, Any, float]
 _measures: dict[str, Callable[..., Any]] = {}

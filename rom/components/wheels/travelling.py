@@ -4,7 +4,9 @@ Over the speed they are followed by their shapes and not by their order.
 """
 
 from collections.abc import Iterator
+from concurrent.futures import Executor
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +22,7 @@ from rom.eigen.scipy import negative_count
 from rom.eigen.verbs import count_shift
 from rom.errors import ConfigError, ModelError, ModesMissedError
 from rom.model import Array, Modes
+from rom.process.spreading import spread
 
 GROWTH_RATE_RTOL = 1e-4  # growth rate of an unstable motion, of the largest frequency found
 RIGID_RTOL = 0.01  # of the speed: distance of a rigid motion's frequency from zero or the speed
@@ -233,7 +236,12 @@ class WheelCampbell(Waves):
 
 @typed
 def wheel_campbell(
-    sector: CyclicSector, diameter: int, n: int, *, speeds: npt.ArrayLike
+    sector: CyclicSector,
+    diameter: int,
+    n: int,
+    *,
+    speeds: npt.ArrayLike,
+    executor: Executor | None = None,
 ) -> WheelCampbell:
     """Follow the lowest waves of the first speed through all others by their shapes.
 
@@ -246,6 +254,7 @@ def wheel_campbell(
         diameter: number of nodal diameters.
         n: number of waves, counting both directions.
         speeds: (s,) angular speeds [rad/s], not negative; the first may be zero.
+        executor: of `concurrent.futures`, whose workers share the speeds; None for none.
 
     Raises:
         ConfigError: if a speed is negative, or the wheel has not so many waves.
@@ -260,7 +269,7 @@ def wheel_campbell(
     omega, direction, shapes = _waves(sector, diameter, n, Omega[0])
     omega, direction, shapes = omega[:n], direction[:n], shapes[:, :n]
     found, likeness = [omega], [np.ones(n)]
-    for w, sides, U in _followed(sector, diameter, n, Omega[1:]):
+    for w, sides, U in _followed(sector, diameter, n, Omega[1:], executor):
         mac = np.abs(shapes.conj().T @ (sector.M @ U)) ** 2
         mac[direction[:, None] != sides] = -1.0
         kept = linear_sum_assignment(-mac)[1]
@@ -271,14 +280,16 @@ def wheel_campbell(
 
 
 def _followed(
-    sector: CyclicSector, diameter: int, n: int, speeds: Array
+    sector: CyclicSector, diameter: int, n: int, speeds: Array, executor: Executor | None
 ) -> Iterator[tuple[Array, Array, Complex]]:
     """The waves at one speed after the other; ranks share a few speeds at a time."""
     for first in range(0, speeds.size, SPEEDS_AT_ONCE):
         some = speeds[first : first + SPEEDS_AT_ONCE].tolist()
-        yield from sector.workers.each(
-            lambda speed: _waves(sector, diameter, n, speed), some, [1.0] * len(some)
-        )
+        at = partial(_waves, sector, diameter, n)
+        if executor is not None:
+            yield from spread(at, some, executor)
+        else:
+            yield from sector.workers.each(at, some, [1.0] * len(some))
 
 
 def _waves(

@@ -11,6 +11,7 @@ Source:
 
 import math
 from collections.abc import Callable
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
 
@@ -24,6 +25,7 @@ from rom.components.wind.blading import ROTOR_RADIUS, Blading, RotorLoad, bladin
 from rom.components.wind.wind_turbine import GEAR_RATIO, N_BLADES, RATED_SPEED
 from rom.errors import ConfigError
 from rom.model import Array
+from rom.process.spreading import spread
 
 CUT_IN_WIND, CUT_OUT_WIND = 3.0, 25.0  # m/s
 # of the generator [rad/s]: torque from the first on, square law from the second on; the third ends
@@ -201,10 +203,12 @@ def power_curve(
     *,
     tower: bool = False,
     held: Held | None = None,
+    executor: Executor | None = None,
 ) -> dict[str, Array]:
     """The turbine over steady winds.
 
-    Winds (k,) are speeds [m/s]; other arguments are as of `steady`.
+    Winds (k,) are speeds [m/s], which the workers of an executor of `concurrent.futures` share if
+    one is given; other arguments are as of `steady`.
 
     Returns:
         {name: (k,)} of ``wind`` [m/s], ``speed`` of the rotor [rad/s], ``pitch`` [rad], ``power``
@@ -215,7 +219,8 @@ def power_curve(
         ConfigError: for winds that are no list, or as of `steady`.
     """
     winds = vector("winds", winds)
-    points = [steady(float(wind), blades, tower=tower, held=held) for wind in winds]
+    point = partial(steady, blades=blades, tower=tower, held=held)
+    points = spread(point, winds.tolist(), executor)
     names = "wind speed pitch thrust torque power_coefficient thrust_coefficient".split()
     found = {name: np.array([getattr(p, name) for p in points]) for name in names}
     return found | {"power": GENERATOR_EFFICIENCY * np.array([p.power for p in points])}

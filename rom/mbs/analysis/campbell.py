@@ -1,10 +1,11 @@
 """Natural frequencies over the speed of rotation, each mode followed by its shape."""
 
 from collections.abc import Callable
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +20,7 @@ from rom.mbs.analysis.rotors.blades import Blades
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.results.state import State
 from rom.model import Array, Index
+from rom.process.spreading import spread
 
 N_SPARE = 6  # modes computed beyond twice those followed
 SPEED_RTOL = 1e-3  # by which the body nearest to a speed may miss it
@@ -72,7 +74,7 @@ class Campbell:
 
 
 @typed
-def campbell(
+def campbell(  # noqa: PLR0913
     mechanism: Turned,
     speeds: Annotated[npt.ArrayLike, Ascending("rad/s")],
     *,
@@ -81,6 +83,7 @@ def campbell(
     about: npt.ArrayLike = (0.0, 0.0, 0.0),
     frame: object = "body",
     blades: object = None,
+    executor: Executor | None = None,
 ) -> Campbell:
     """Follow the natural frequencies over the speed of rotation.
 
@@ -98,6 +101,7 @@ def campbell(
         frame: axes for small motions, see `linearize`: "world" for rotors in bearings.
         blades: names of the bodies of each blade of a rotor on a support, see `linearize`; the
             function then returns a state, too, from ``rom.equilibrium(..., spin={joint: speed})``.
+        executor: of `concurrent.futures`, whose workers share the speeds; None for none.
 
     Raises:
         ConfigError: for wrong speeds or a wrong mechanism.
@@ -109,7 +113,10 @@ def campbell(
     speeds = np.asarray(speeds, dtype=float)
     axis = unit_vector("axis", axis)
     counted = partial(linearize, frame=frame, blades=blades)
-    found = [_at(mechanism, speed, axis, about, n, counted) for speed in speeds]
+    at = partial(
+        _at, mechanism=mechanism, axis=axis, about=about, n=n, counted=counted, blades=blades
+    )
+    found = spread(at, speeds.tolist(), executor)
     orders: list[Index] = [np.arange(found[0].eigenvalues.size)]
     likeness = []
     for one, two in pairwise(found):
@@ -121,8 +128,17 @@ def campbell(
     kept = np.flatnonzero(np.abs(values).max(axis=0) > 0)[:n]
     waves = None
     if blades is not None:
-        waves = np.array([_waves(x, blades)[order][kept] for x, order in ordered])
+        waves = np.array([x.waves[order][kept] for x, order in ordered if x.waves is not None])
     return Campbell(speeds, values[:, kept], np.array(likeness)[:, kept], waves)
+
+
+class Modes(NamedTuple):
+    """Of one speed, as far as a diagram needs them."""
+
+    eigenvalues: Array  # (f,) [rad/s]
+    shapes: Array  # (n, f)
+    scale: Array  # (n,), see `Linearization`
+    waves: Array | None  # (f, 3) how the blades take part
 
 
 def _waves(found: Linearization, blades: object) -> Array:
@@ -132,13 +148,14 @@ def _waves(found: Linearization, blades: object) -> Array:
 
 
 def _at(
-    mechanism: Turned,
     speed: float,
+    mechanism: Turned,
     axis: Array,
     about: npt.ArrayLike,
     n: int | None,
     counted: Callable[..., Linearization],
-) -> Linearization:
+    blades: object,
+) -> Modes:
     """Modes at one speed; of large mechanisms some more than n, so that they can be followed."""
     made: Mechanism | tuple[Mechanism, State]
     if isinstance(mechanism, Mechanism):
@@ -156,10 +173,11 @@ def _at(
             f"no body turns at the speed {speed:.4g} rad/s of the diagram, the fastest at "
             f"{rates.max():.4g} rad/s: its frequencies are those of another speed."
         )
-    return found
+    waves = None if blades is None else _waves(found, blades)
+    return Modes(found.eigenvalues, found.shapes, found.scale, waves)
 
 
-def _follow(one: Linearization, two: Linearization, order: Index) -> tuple[Index, Array]:
+def _follow(one: Modes, two: Modes, order: Index) -> tuple[Index, Array]:
     """Modes of ``two`` that continue those of ``one`` in this order, and their likeness."""
     if one.eigenvalues.size != two.eigenvalues.size:
         numbers = (

@@ -12,8 +12,9 @@ frequency band, whatever the mesh. Modes of a wheel whose blades are all a littl
 basis; they show how shapes change with a blade, so that errors are of second order in delta.
 """
 
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Annotated
 
 import numpy as np
@@ -28,6 +29,7 @@ from rom.errors import ConfigError, ModelError
 from rom.model import Array, Index, Modes, Report, Row
 from rom.names import check_known
 from rom.plausible import check_damping_ratio
+from rom.process.spreading import spread
 
 STIFFER_BLADES = 0.05  # of all blades: the wheel stays cyclic, so that its truth is one sector
 STIFFNESS_CHANGE = 0.1  # of all blades, relative, that enriches the basis
@@ -146,12 +148,14 @@ class MistunedWheel:
         omega: npt.ArrayLike,
         damping: Damping,
         at: npt.ArrayLike,
+        executor: Executor | None = None,
     ) -> Array:
         """(s,) largest amplitudes of any blade of mistuned wheels, over that of the tuned one [1].
 
         Deviations (s, N) have one row per wheel; in the sweep omega (w,) over the resonances
         [rad/s] the tuned peak is found too; the amplitude of a blade is the norm of the
-        displacements ``at``. Otherwise arguments are as of `response`.
+        displacements ``at``. Workers of an executor of `concurrent.futures` share the wheels, if
+        one is given. Otherwise arguments are as of `response`.
 
         Raises:
             ConfigError: as `response`, or if the force does not move the tuned wheel there.
@@ -163,8 +167,9 @@ class MistunedWheel:
         if not tuned > 0.0:
             raise ConfigError("the force does not move the tuned wheel at the dofs wanted.")
         batch = max(1, AT_ONCE // (sweep.size * N * max(rows.shape[0], self.omega.size // N + 1)))
-        batches = (many[first : first + batch] for first in range(0, len(many), batch))
-        peaks = [self._peaks(some, drive, sweep, damping, rows) for some in batches]
+        batches = [many[first : first + batch] for first in range(0, len(many), batch)]
+        peak = partial(self._peaks, drive=drive, sweep=sweep, zeta=damping, rows=rows)
+        peaks = spread(peak, batches, executor)
         return np.concatenate(peaks) / tuned
 
     def _drive(self, force: npt.ArrayLike | Complex, engine_order: int) -> Complex:
