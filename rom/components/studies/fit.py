@@ -245,7 +245,9 @@ def fit(  # noqa: PLR0913  what is sought, from where, and what runs
 
 def _fitted(search: Search, found: Study) -> Fitted:
     """The record of the best search."""
-    best = found.good[found.values["chi-square"][found.good].argmin()]
+    squares, n = found.values["chi-square"][found.good], found.values["residuals"].shape[1]
+    least = squares.min() + LAST_GAIN * max(1.0, squares.min() / n)
+    best = found.good[np.flatnonzero(squares <= least)[0]]  # whatever the round-off of equal ones
     theta, r, J = (found.values[name][best] for name in ("unknowns", "residuals", "slopes"))
     (low, high), values = search.ends, search.values(theta)
     width = high - low
