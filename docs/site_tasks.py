@@ -41,6 +41,10 @@ TASKS: dict[str, tuple[str, str]] = {
         "The same at many samples of its parameters, on all cores or a cluster.",
         """study Study""",
     ),
+    "Fit": (
+        "Parameters of a mechanism from measured histories.",
+        """fit Fitted""",
+    ),
     "Check": (
         "How far a model, a body, a motion or a law can be trusted.",
         """check Report audit check_law eigen.mac eigen.residual_errors io.check_sid""",

@@ -41,6 +41,8 @@ from rom.components.families.reduce import reduce_parametric as reduce_parametri
 from rom.components.orbits.equilibria import continuation as continuation
 from rom.components.orbits.motion import periodic_motion as periodic_motion
 from rom.components.orbits.path import periodic_path as periodic_path
+from rom.components.studies.fit import fit as fit
+from rom.components.studies.fitted import Fitted as Fitted
 from rom.components.studies.study import Study as Study
 from rom.components.studies.study import study as study
 from rom.components.updating.estimate import update as update

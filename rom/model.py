@@ -356,6 +356,13 @@ FAILURE_COSTS = {
     "with more modes.",
     "inside its range": "The range ends before the best value: widen it, or something else is "
     "wrong.",
+    "chi-square of the records, over": "The mechanism is not the one that was measured, the search "
+    "began too far away, or there is more noise: deviations, of noise alone, do not hold.",
+    "no less than noise leaves": "There is less noise than was said: deviations are too large, and "
+    "a wrong mechanism may pass.",
+    "memory of residuals": "What is left is no noise from value to value: deviations are too "
+    "small. Something is missing in the mechanism, or values are too close in time.",
+    "by the step of time": f"Parameters make up for errors of the motion. {SMALLER_STEPS}",
     "Newton corrections": f"Steps are hard to solve: something is stiff. {SMALLER_STEPS}",
 }
 RELATIONS = {"<=": operator.le, ">": operator.gt, "==": operator.eq}  # of a value to its limit

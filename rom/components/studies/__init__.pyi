@@ -1,3 +1,5 @@
+from rom.components.studies.fit import fit as fit
+from rom.components.studies.fitted import Fitted as Fitted
 from rom.components.studies.pictures import bands as bands
 from rom.components.studies.pictures import scatter_matrix as scatter_matrix
 from rom.components.studies.pictures import tornado as tornado

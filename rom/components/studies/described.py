@@ -12,9 +12,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-import rom
+from rom import errors
 from rom.components.studies.worker import Unmeasurable
+from rom.config.component import read_component
 from rom.config.component_keys import TABLE
+from rom.config.mechanism import read_mechanism
 from rom.errors import ConfigError
 from rom.io.history import asked
 from rom.model import Array
@@ -67,7 +69,7 @@ class MotionOf:
             )
             for name, (place, changes) in parts.items()
         }
-        solution = rom.read_mechanism(self.file, own, trust=self.trust).simulate()
+        solution = read_mechanism(self.file, own, trust=self.trust).simulate()
         return {text: value_of(text, solution) for text in self.kept}
 
     @property
@@ -101,9 +103,9 @@ class MotionOf:
             ConfigError: for a key that does not exist, or a value it cannot have.
         """
         own, parts = self.sorted(given)
-        file = rom.read_mechanism(self.file, own, trust=self.trust)
+        file = read_mechanism(self.file, own, trust=self.trust)
         for name, (place, changes) in parts.items():
-            component = rom.read_component(place, changes, trust=self.trust)
+            component = read_component(place, changes, trust=self.trust)
             if not (component.kinds or file.values["bodies"][name]["rigid"]):
                 component.body()  # says that it has no interface
         return file
@@ -112,7 +114,7 @@ class MotionOf:
 @cache
 def components(file: str) -> dict[str, Path]:
     """Component files by body."""
-    bodies = rom.read_mechanism(file).values["bodies"]
+    bodies = read_mechanism(file).values["bodies"]
     files = {name: values["file"] for name, values in bodies.items() if "file" in values}
     return {name: place for name, place in files.items() if place.suffix == ".toml"}
 
@@ -135,20 +137,25 @@ def body_of(place: str, changes: tuple[Any, ...], folder: str, trust: bool) -> s
 def _make(place: str, changes: Changes, path: Path, trust: bool) -> None:
     """Mesh and reduce; where this process is one of several, by one that is alone."""
     if ranks()[1] == 1:
-        component = rom.read_component(place, changes, trust=trust)
-        rom.save(component.body() if component.kinds else _rigid(component.model()), path)
+        from rom.io.native import save
+
+        component = read_component(place, changes, trust=trust)
+        save(component.body() if component.kinds else _rigid(component.model()), path)
         return
     given = json.dumps([place, list(changes.items()), str(path), trust])
     ended = run(python("rom.components.studies.described", given))
     if ended.code:
         kind, _, text = ended.out.partition("\n")
-        raise getattr(rom.errors, kind, rom.SolverError)(text.strip() or ended.last)
+        raise getattr(errors, kind, errors.SolverError)(text.strip() or ended.last)
 
 
 def _rigid(model: "FEModel") -> "FlexibleBody":
     """Mass and places of a component without kinds, in the file of a body that does not bend."""
+    from rom.reduction.bases.method import CraigBampton
+    from rom.workflow import reduce
+
     kinds = dict.fromkeys(model.interfaces, "rbe3")
-    return rom.reduce(model, method=rom.CraigBampton(0), interfaces=kinds, certify=False)
+    return reduce(model, method=CraigBampton(0), interfaces=kinds, certify=False)
 
 
 def key_path(text: str) -> tuple[str, ...]:
@@ -208,6 +215,6 @@ if __name__ == "__main__":
     place, changes, path, trust = json.loads(sys.argv[1])
     try:
         _make(place, {tuple(key): value for key, value in changes}, Path(path), trust)
-    except rom.RomError as error:
+    except errors.RomError as error:
         sys.stdout.write(f"{type(error).__name__}\n{error}")
         sys.exit(1)

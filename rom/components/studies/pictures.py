@@ -1,7 +1,7 @@
 """Pictures of studies: what was measured over what varied, who decides, bands over time."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
@@ -10,14 +10,11 @@ from rom.components.studies.study import Indices, Study
 from rom.errors import ConfigError
 from rom.model import Array
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 LARGEST = 6  # rows and columns of diagrams on a sheet
 BAND = (0.05, 0.5, 0.95)
 
 
-def scatter_matrix(study: Study, path: str | Path | None = None) -> "Figure":
+def scatter_matrix(study: Study, path: str | Path | None = None) -> Any:
     """Draw each number that was measured (rows) over each parameter (columns); the figure."""
     numbers = {name: x for name, x in study.values.items() if x.ndim == 1}
     varied = {name: x for name, x in study.parameters.items() if x.dtype.kind != "U"}
@@ -42,9 +39,7 @@ def scatter_matrix(study: Study, path: str | Path | None = None) -> "Figure":
     return view.panels(rows, path, title="What was measured over what was varied", caption=caption)
 
 
-def tornado(
-    indices: Indices, path: str | Path | None = None, *, of: str = "the result"
-) -> "Figure":
+def tornado(indices: Indices, path: str | Path | None = None, *, of: str = "the result") -> Any:
     """Draw Sobol indices as bars, the parameter that decides most on top; the figure."""
     order = np.argsort(-indices.total)
     panels = [
@@ -64,7 +59,7 @@ def tornado(
 
 def bands(
     study: Study, name: str, path: str | Path | None = None, *, clock: str = "t", unit: str = ""
-) -> "Figure":
+) -> Any:
     """Draw where 90 % of the histories of a value lie over time, and their median; the figure."""
     times, n = study.on_clock(name, clock), study.good.size
     quantiles, _ = study.quantiles(name, BAND)

@@ -42,7 +42,7 @@ def design(
         ConfigError: for a range upside down, or below zero on a scale of logarithms.
     """
     one_of("kind", kind, KINDS)
-    _check(ranges, log)
+    check_ranges(ranges, log)
     k = len(ranges)
     if kind == "grid":
         if drawn := [name for name, given in ranges.items() if hasattr(given, "ppf")]:
@@ -72,7 +72,7 @@ def indices_design(
     Source:
         Saltelli et al., Comput. Phys. Comm. 181 (2010) 259.
     """
-    _check(ranges, log)
+    check_ranges(ranges, log)
     k = len(ranges)
     U = qmc.Sobol(2 * k, seed=_generator(rng)).random(n)
     A, B = U[:, :k], U[:, k:]
@@ -96,7 +96,8 @@ def _generator(rng: np.random.Generator | None) -> np.random.Generator:
     return rng
 
 
-def _check(ranges: Mapping[str, Range], log: Sequence[str]) -> None:
+def check_ranges(ranges: Mapping[str, Range], log: Sequence[str]) -> None:
+    """Refuse ranges upside down, and logarithms of what they do not have."""
     if not ranges:
         raise ConfigError("there is no parameter to vary.")
     check_all_known(log, ranges, "log= names no parameter")

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 from scipy.stats import binom
 
-import rom
+from rom import __version__
 from rom.arguments import Count, NotNegative, typed
 from rom.components.studies.journal import Journal, Row, packed, read, unpacked
 from rom.components.studies.running import Limits, answers, here, processes
@@ -283,7 +283,7 @@ def _studied(  # noqa: PLR0913
     n = len(next(iter(columns.values())))
     payload = b"" if executor is None and workers == 0 else sent(measure, _name(measure))
     head = {"measure": _name(measure), "parameters": columns, "made with": {
-        "rom": rom.__version__, "python": platform.python_version(), "numpy": np.__version__,
+        "rom": __version__, "python": platform.python_version(), "numpy": np.__version__,
     }}  # fmt: skip
     with Journal(Path(into), head, resume=resume) if into else nullcontext() as journal:
         rows = {row["sample"]: row for row in journal.rows} if journal else {}
@@ -305,7 +305,7 @@ def _studied(  # noqa: PLR0913
                     if journal:
                         journal.add(row)
                     tell("failed" in row)
-            except KeyboardInterrupt:
+            except (KeyboardInterrupt, InterruptedRun):
                 if not journal:
                     raise
                 said = f"interrupted; {len(rows)} of {n} samples are in {into}."

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-import rom
 from rom.cli.answer import Answer, table
 from rom.cli.options import assignment, count, option, unique
 from rom.cli.output import add_force, checked, usual
@@ -18,6 +17,8 @@ from rom.cli.schemas import FILE, OUTPUT, by_name, each, number, record, text, w
 from rom.components.studies.pictures import scatter_matrix
 from rom.components.studies.samples import KINDS, design, range_of
 from rom.components.studies.study import study
+from rom.config.mechanism import read_mechanism
+from rom.errors import ConfigError
 from rom.io.files import check_writable
 from rom.names import check_ending
 from rom.process.launcher import ranks
@@ -63,7 +64,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> Answer:
     """Sample, move, keep."""
     if ranks()[1] > 1:
-        raise rom.ConfigError("a study starts its own processes; leave out mpirun.")
+        raise ConfigError("a study starts its own processes; leave out mpirun.")
     how = _asked(args)
     if args.picture:
         checked(args, check_ending(args.picture, "a picture", ".png"))
@@ -99,8 +100,8 @@ def _asked(args: argparse.Namespace) -> dict[str, Any]:
     """What the file and, in place of that, options say."""
     given = {name: getattr(args, name) for name in ("samples", "design", "seed", "keep")}
     given["vary"] = {key: range_of(text) for key, text in unique(args.vary, "--vary").items()}
-    read = rom.read_mechanism(args.file, trust=args.trust).values.get("study", USUAL)
+    read = read_mechanism(args.file, trust=args.trust).values.get("study", USUAL)
     how = read | {name: value for name, value in given.items() if value not in (None, [], {})}
     if not how["vary"] or not how["keep"]:
-        raise rom.ConfigError("--vary and --keep are needed.", hint="See rom study --help.")
+        raise ConfigError("--vary and --keep are needed.", hint="See rom study --help.")
     return how

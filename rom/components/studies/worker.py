@@ -18,7 +18,7 @@ from time import perf_counter
 from types import FrameType
 from typing import Any
 
-from rom.errors import RANKS, ConfigError, RomWarning
+from rom.errors import RANKS, ConfigError, InterruptedRun, RomWarning
 from rom.process.spreading import SEND
 
 PR_SET_PDEATHSIG = 1
@@ -77,6 +77,8 @@ def measured(
         with _limited(seconds, memory), warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", RomWarning)
             values = _plain(_measures[key](**given))
+    except InterruptedRun:  # of this process
+        raise
     except MemoryError as error:
         name, told = type(error).__name__, "it needs more memory than it may take"
     except Overtime as error:

@@ -78,7 +78,7 @@ def equilibrium_sensitivity(
         ConfigError: for wrong parameters, or mechanisms of different size.
         ModelError: if the equilibrium spins, or is not unique.
     """
-    values = _checked(parameters, "build", build)
+    values = by_name(parameters, "build", build)
     mechanism, state = _rest(build, values, options)
     value = np.asarray(output(mechanism, state))
     if value.dtype.kind not in "iufc":
@@ -116,7 +116,7 @@ def frequency_sensitivity(
         Murthy and Haftka, Derivatives of eigenvalues and eigenvectors of a general complex matrix,
         Int. J. Numer. Meth. Engng. 26 (1988) 293.
     """
-    values = _checked(parameters, "build", build)
+    values = by_name(parameters, "build", build)
     mechanism, state = _rest(build, values, options)
     now, linear = instant(mechanism, state.t), linearize(mechanism, state)
     here = _matrices(mechanism, now, state)
@@ -146,14 +146,14 @@ def motion_sensitivity(result: Result, parameters: Mapping[str, float]) -> Sensi
     Source:
         Ridders, Accurate computation of F'(x) and F'(x)F''(x), Adv. Eng. Software 4 (1982) 75.
     """
-    values = _checked(parameters, "result", result)
+    values = by_name(parameters, "result", result)
     found = [_ridders(result, values, name) for name in values]
     value = np.asarray(result(**values), dtype=float)
     whole = _collected(values, value, [slope for slope, _ in found])
     return replace(whole, error=np.array([error for _, error in found]))
 
 
-def _checked(
+def by_name(
     parameters: Mapping[str, float], name: str, called: Callable[..., object]
 ) -> dict[str, float]:
     """The parameters, if there are some and a function takes them by name."""
