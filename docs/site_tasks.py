@@ -7,7 +7,7 @@ TASKS: dict[str, tuple[str, str]] = {
         """Mechanism read_mechanism mbs.Part mbs.Marker mbs.Impact mbs.Pulley mbs.BallBearing
         mbs.JournalBearing mbs.Groove mbs.multilobe mbs.Oil mbs.iso_vg
         mbs.RollerBearing mbs.hertz_stiffness
-        surface_load mass_load SpreadLoad simulate release Keeping save_state load_state mbs.State
+        surface_load mass_load SpreadLoad simulate Stepper release Keeping save_state load_state mbs.State
         mbs.Instant mbs.Family mbs.Signal mbs.Elements mbs.Frames""",
     ),
     "From geometry to matrices": (

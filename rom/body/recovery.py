@@ -69,6 +69,18 @@ class StressRecovery:
         """
         return np.concatenate([a, alpha, [omega[i] * omega[j] for i, j in PRODUCTS], qdd])
 
+    def in_motion(self, q: Array, A: Array, omega: Array, a: Array, gravity: Array) -> Array:
+        """(p, 6) stress [Pa] with axes A (3, 3), and a (6 + r,) as of `rom.mbs.State`."""
+        if self.inertial is None:
+            return self.field(q)
+        return self.field(q, self.accelerations(A.T @ (a[:3] - gravity), a[3:6], omega, a[6:]))
+
+    def at(self, k: int) -> "StressRecovery":
+        """At one point alone."""
+        rows, A = slice(6 * k, 6 * k + 6), self.inertial
+        found = self.points[k : k + 1], self.operator[rows], None if A is None else A[rows]
+        return StressRecovery(*found)
+
     def moved(self, X: Array) -> "StressRecovery":
         """Seen from a frame that takes the rigid motion X (6, r) out of the shapes."""
         if self.inertial is None:
