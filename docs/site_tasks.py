@@ -134,8 +134,8 @@ FILE_NAMES = {name: f"{name}-function" for name in NAMES if name in CLASSES}
 SUBJECTS = {
     "Reduce a body": """beam assembly compressor_blade reference_conditions parameters large_mesh
     exchange""",
-    "Mechanisms": """slider_crank robot_arm satellite pendulum_chain hand rolling_wheel periodic
-    isotropy best_matching""",
+    "Mechanisms": """slider_crank robot_arm flexible_arm satellite pendulum_chain hand rolling_wheel
+    periodic isotropy best_matching""",
     "Large deflection and metal forming": """large_deflection flexure snap_through spin_up sheet
     forming""",
     "Rotating blades, wheels and rotors": """rotating_blade bladed_disk mistuning lost_tip

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rom.arguments import AnyMechanism, Positive, Share, finite, typed_record
-from rom.errors import ConfigError, SolverError
+from rom.errors import ConfigError, RomError, SolverError
 from rom.mbs.control.variables import Inputs, Outputs, View
 from rom.mbs.elements.family import apply_laws
 from rom.mbs.equations.equations import accelerate, evaluate, factorise_motion
@@ -25,9 +25,11 @@ from rom.mbs.integrate.step_memory import FACTOR_FIELDS, signals_at, state_of
 from rom.mbs.kernels import work as entry
 from rom.mbs.kernels.work import Step, workspace
 from rom.mbs.mechanism import Mechanism
+from rom.mbs.parts.foreign import KEPT_HINT
 from rom.mbs.parts.signals import Span, first_failure, padded, sampled
 from rom.mbs.results.state import State
 from rom.model import Array
+from rom.notebook import listed
 
 AHEAD = 256  # steps at once for which functions of time are asked
 NEVER = 2**62  # steps between two that are recorded
@@ -149,7 +151,7 @@ class Stepper:
         except (TypeError, ValueError):
             good = False
         if not good:
-            finite("values", values, self._held.shape)
+            finite(f"values {listed(self.input_names)}", values, self._held.shape)
         if self._state is None:
             self.reset()
         self.inputs.values[:] = given
@@ -251,7 +253,9 @@ class Stepper:
             if self._held.tobytes() != self.inputs.values.tobytes():
                 self._jump()
             self._go(n)
-        except BaseException:
+        except BaseException as raised:
+            if isinstance(raised, RomError):
+                raised.hint = raised.hint.replace(KEPT_HINT, "The stepper stands before the step.")
             for x, kept in (*self._mark, *self._factor):
                 x[:] = kept
             self._t, self._at, self._seen, self.inputs.past = t, at, False, past

@@ -1,5 +1,6 @@
 """Steps one by one: the bits of a run, states to come back to, what inputs and outputs mean."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -8,9 +9,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import rom
 from cases.beam import stiffened_beam
-from cases.mbs.mechanisms import random_body, simulate_quietly, slider_crank
+from cases.mbs.mechanisms import simulate_quietly, slider_crank
 from cases.mbs.motions import four_links, hub_and_panel, pendulum, sampled, swing
 from cases.mbs.parts import on_guide
+from cases.paths import ROOT
 from cases.refusals import refused
 from rom.body.recovery import StressRecovery
 
@@ -243,6 +245,22 @@ def test_a_function_of_time_fails_when_its_time_has_come_not_before():
     assert 0.03 < stepper.t < 0.055
 
 
+def test_the_environment_of_the_page_about_laws_is_one_by_the_checker_of_gymnasium():
+    pytest.importorskip("gymnasium", reason="gymnasium is not installed")
+    from gymnasium.utils.env_checker import check_env
+
+    page, space = (ROOT / "docs" / "laws.md").read_text(), {}
+    (text,) = (x for x in re.findall(r"```python\n(.*?)```", page, re.S) if "gymnasium" in x)
+    exec(text, space)
+    swing, seen = space["Swing"](arm()), []
+    check_env(swing, skip_render_check=True)
+    for _ in range(2):
+        first, _ = swing.reset(seed=3)
+        seen.append([first, *(swing.step(np.array([np.sin(k)]))[0] for k in range(5))])
+    assert_array_equal(*seen)
+    assert np.ptp(seen[0], axis=0).min() > 0
+
+
 def changed():
     mech = pendulum()
     stepper = rom.Stepper(mech, dt=1e-2)
@@ -281,12 +299,6 @@ test_wrong_calls_are_refused = refused(
     (stepped("four"), "values"),
     (changed, "the mechanism was changed since its stepper was made"),
     (ended, "event 'end' would end the motion"),
-    (lambda: rom.Stepper(pendulum(), dt=1e-2).reset(swing_state()), "their bodies differ"),
+    (lambda: rom.Stepper(pendulum(), dt=1e-2).reset(rom.equilibrium(arm())), "bodies differ"),
     error=rom.ConfigError,
 )
-
-
-def swing_state():
-    mech = rom.Mechanism()
-    mech.add_flexible("one", random_body(np.random.default_rng(3)))
-    return rom.simulate(mech, t_end=1e-2, dt=1e-2).final
