@@ -231,7 +231,10 @@ view.panels(
                 "Path of the tool, seen from above", "x [m]", "y [m]",
                 {name: (paths[name][:, 0], paths[name][:, 1]) for name in shown}
                 | {"_before": posture(PICK), "_after": posture(PLACE)},
-                notes={"start": tuple(p[-1] for p in posture(PICK)), "goal": (goal[0] - 0.3, goal[1] - 0.1)},
+                notes={
+                    "start": tuple(p[-1] for p in posture(PICK)),
+                    "goal": (goal[0] - 0.3, goal[1] - 0.1),
+                },
                 equal=True,
             ),
             view.Panel(

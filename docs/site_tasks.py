@@ -7,8 +7,8 @@ TASKS: dict[str, tuple[str, str]] = {
         """Mechanism read_mechanism mbs.Part mbs.Marker mbs.Impact mbs.Pulley mbs.BallBearing
         mbs.JournalBearing mbs.Groove mbs.multilobe mbs.Oil mbs.iso_vg
         mbs.RollerBearing mbs.hertz_stiffness
-        surface_load mass_load SpreadLoad simulate Stepper release Keeping save_state load_state mbs.State
-        mbs.Instant mbs.Family mbs.Signal mbs.Elements mbs.Frames""",
+        surface_load mass_load SpreadLoad simulate Stepper release Keeping save_state load_state
+        mbs.State mbs.Instant mbs.Family mbs.Signal mbs.Elements mbs.Frames""",
     ),
     "From geometry to matrices": (
         "A STEP file, a geometry or a mesh becomes stiffness and mass.",

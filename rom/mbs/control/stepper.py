@@ -9,7 +9,7 @@ from typing import Annotated
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import AnyMechanism, Positive, Share, finite, typed_record
+from rom.arguments import AnyMechanism, Positive, Share, finite, typed, typed_record
 from rom.errors import ConfigError, RomError, SolverError
 from rom.mbs.control.variables import Inputs, Outputs, View
 from rom.mbs.elements.family import apply_laws
@@ -148,7 +148,7 @@ class Stepper:
         try:
             given = np.asarray(values, dtype=float)
             good = given.shape == self._held.shape and all(map(isfinite, given.tolist()))
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             good = False
         if not good:
             finite(f"values {listed(self.input_names)}", values, self._held.shape)
@@ -158,6 +158,7 @@ class Stepper:
         self.advance(self.count, self.dt)
         return self.read()
 
+    @typed
     def reset(self, state: State | None = None) -> Array:
         """Go back to the start, or to a state; returns the outputs (m,) there.
 
@@ -192,7 +193,7 @@ class Stepper:
         found = self._whole_state()
         c, watched = self._W.x.size, self._packed.places.watched
         extra = slice(c - watched, c)
-        base = None if found.base is None else np.delete(found.base, extra)
+        base = np.delete(self._W.base, extra)
         if found.memory is None:
             return replace(found, base=base)
         arrays = found.memory.arrays | {HELD_KEY: self._held.copy()}
@@ -219,6 +220,13 @@ class Stepper:
     def recall(self, state: State) -> None:
         """Stand at a state, of this stepper or another motion of the mechanism."""
         kept = {} if state.memory is None else state.memory.arrays
+        watched = self._packed.places.watched
+        if state.base is not None:
+            extra = kept.get(WATCHED_KEY, np.zeros(0))
+            extra = extra if extra.size == watched else np.zeros(watched)
+            needed = min(self._W.x.size - watched, np.size(state.base))
+            state = replace(state, base=np.insert(state.base, [needed] * watched, extra))
+        check_fit(state, self._packed, self.mechanism)
         sizes = [np.size(kept.get(key, ())) for key in (HELD_KEY, PAST_KEY)]
         if HELD_KEY in kept and sizes == [self._held.size, 3 * len(self.inputs.past)]:
             self.inputs.values[:] = self._held[:] = kept[HELD_KEY]
@@ -228,13 +236,6 @@ class Stepper:
             self.inputs.begin(state.t)
             if self._held.size:  # nobody knows from which values they jump
                 state = replace(state, memory=None, algorithmic=None)
-        if state.base is not None:
-            watched = self._packed.places.watched
-            extra = kept.get(WATCHED_KEY, np.zeros(watched))
-            extra = extra if extra.size == watched else np.zeros(watched)
-            own = self._W.x.size - watched
-            state = replace(state, base=np.insert(state.base, [own] * watched, extra))
-        check_fit(state, self._packed, self.mechanism)
         self._stand(state)
 
     def read(self) -> Array:
@@ -284,11 +285,12 @@ class Stepper:
         packed = self._packed.of_rank(state.rank)
         if packed is not self._packed:
             self._take(packed)
-        own = {"q": state.q, "v": state.v, "vd": state.a, "lam": state.lam}
-        for name, x in own.items():
+        if state.base is None:
+            state = replace(state, base=np.r_[0.0 * self._W.x, packed.system.memory])
+        arrays = {"q": state.q, "v": state.v, "vd": state.a, "lam": state.lam}
+        for name, x in arrays.items():
             getattr(self._step, name)[:] = x
-        fresh = np.r_[0.0 * self._W.x, packed.system.memory]
-        self._W.base[:] = fresh if state.base is None else state.base
+        self._W.base[:] = state.base
         self._state = self._begun_from = state
         self._t, self._seen = state.t, False
 
@@ -301,7 +303,8 @@ class Stepper:
 
     def _begin(self, h: float) -> None:
         """Fill the step memory for a first step of length h."""
-        state, W, packed = self._whole_state(), self._W, self._packed
+        state = self._begun_from = self._whole_state()
+        W, packed = self._W, self._packed
         numbers = (1, self.rho_inf, NEWTON_RTOL, 1.0, 1.0, False)
         settings = Unending(state.t, state.t + h, h, *numbers).after(state)
         settings = replace(settings, save_every=NEVER)
@@ -413,7 +416,7 @@ def _copied(mechanism: Mechanism) -> Mechanism:
 
 def _contents(mechanism: Mechanism) -> list[object]:
     """What tells whether something was added, exchanged or removed."""
-    inside = [x.items() for x in vars(mechanism).values() if isinstance(x, dict)]
+    inside = [x.items() if isinstance(x, dict) else [("", x)] for x in vars(mechanism).values()]
     return [(name, id(one)) for items in inside for name, one in items]
 
 
