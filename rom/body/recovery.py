@@ -69,12 +69,6 @@ class StressRecovery:
         """
         return np.concatenate([a, alpha, [omega[i] * omega[j] for i, j in PRODUCTS], qdd])
 
-    def in_motion(self, q: Array, A: Array, omega: Array, a: Array, gravity: Array) -> Array:
-        """(p, 6) stress [Pa] with axes A (3, 3), and a (6 + r,) as of `rom.mbs.State`."""
-        if self.inertial is None:
-            return self.field(q)
-        return self.field(q, self.accelerations(A.T @ (a[:3] - gravity), a[3:6], omega, a[6:]))
-
     def at(self, k: int) -> "StressRecovery":
         """At one point alone."""
         rows, A = slice(6 * k, 6 * k + 6), self.inertial

@@ -19,6 +19,7 @@ from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import Marker, Part
 from rom.mbs.parts.joints import Joint, Row, Whole
 from rom.mbs.parts.signals import CLOCK, Signal, drive_signal
+from rom.mbs.results.recomputed import stress_in_motion
 from rom.model import OWN_FRAME, Array
 from rom.names import check_known, check_once
 from rom.rotation import quaternion
@@ -375,8 +376,9 @@ def _stresses(mechanism: Mechanism, wanted: str) -> dict[str, Reading]:
     """Components of the stress [Pa] at the point of the surface that a name asks for."""
     body, _, words = wanted.partition(" stress ")
     point, part = words.partition(" ")[0], mechanism.parts.get(body)
-    recovery = getattr(part.moving, "stress", None) if part and part.r else None
-    if recovery is None or not point.isdecimal() or int(point) >= len(recovery.points):
+    recovery: Any = getattr(part.moving, "stress", None) if part and part.r else None
+    good = hasattr(recovery, "at") and point.isdecimal()  # of a linear body
+    if not good or int(point) >= len(recovery.points):
         return {}
     of = "stress", (body, point)
     return {f"{body} stress {point} {x}": (*of, k) for k, x in enumerate(STRESS_PARTS)}
@@ -407,7 +409,8 @@ def _stress(view: View, body: str, point: str) -> Callable[[], Told]:
     step, q_at, v_at, r = view.step, bodies.q_at[b], bodies.v_at[b], bodies.r[b]
     recovery = view.parts[body].moving.stress.at(int(point))
     q, v, a = step.q[q_at + 7 :][:r], step.v[v_at:], step.vd[v_at:][: 6 + r]
-    return lambda: recovery.in_motion(q, view.W.A[b], v[3:6], a, bodies.gravity).ravel()
+    here = recovery, q, view.W.A[b], v[3:6], a, bodies.gravity
+    return lambda: stress_in_motion(*here).ravel()
 
 
 def _told(view: View, what: str, of: tuple[str, ...]) -> Told | Callable[[], Told]:

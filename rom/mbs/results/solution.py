@@ -204,7 +204,8 @@ class Solution(Whereabouts, Columns, metaclass=Open, kind="columns", bound=typed
         at = self.packed.system.bodies.v_at[self._number(body)]
         A, omega = matrix(self._places(body, 3, 7)[instant]), self._rates(body, 3, 6)[instant]
         a, gravity = self.a[instant, at : at + 6 + part.r], np.asarray(self.mechanism.gravity)
-        return recovery.in_motion(self.elastic(body)[instant], A, omega, a, gravity)
+        q = self.elastic(body)[instant]
+        return recomputed.stress_in_motion(recovery, q, A, omega, a, gravity)
 
     def reaction(self, name: str) -> Array:
         """(n_t, 6) force [N] and moment [N m] of a joint or drive on its second body, world.
