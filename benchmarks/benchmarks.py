@@ -406,6 +406,20 @@ def loops(**sizes: int) -> Iterator[Figure]:
         yield Figure("loops", case, quantity, value, unit, aim)
 
 
+def stepper(**sizes: int) -> Iterator[Figure]:
+    """A controller in Python that sees each step, beside one run and runs of one step.
+
+    Needs no FEniCSx: bodies are straight bars.
+
+    Args:
+        sizes: as `benchmarks.stepping.measured` takes them.
+    """
+    from benchmarks.stepping import measured
+
+    for case, quantity, value, unit, aim in measured(**sizes):
+        yield Figure("stepper", case, quantity, value, unit, aim)
+
+
 def start(**cases: tuple[str, ...]) -> Iterator[Figure]:
     """Processor time of first uses with nothing compiled, and of first motions after set-up.
 
@@ -476,6 +490,7 @@ BENCHMARKS: dict[str, Callable[[], Iterator[Figure]]] = {
     "peers": peers,
     "motion": motion,
     "rods": rods,
+    "stepper": stepper,
     "start": start,
     "studies": studies,
     "updating": updating,

@@ -7,8 +7,8 @@ TASKS: dict[str, tuple[str, str]] = {
         """Mechanism read_mechanism mbs.Part mbs.Marker mbs.Impact mbs.Pulley mbs.BallBearing
         mbs.JournalBearing mbs.Groove mbs.multilobe mbs.Oil mbs.iso_vg
         mbs.RollerBearing mbs.hertz_stiffness
-        surface_load mass_load SpreadLoad simulate release Keeping save_state load_state mbs.State
-        mbs.Instant mbs.Family mbs.Signal mbs.Elements mbs.Frames""",
+        surface_load mass_load SpreadLoad simulate Stepper release Keeping save_state load_state
+        mbs.State mbs.Instant mbs.Family mbs.Signal mbs.Elements mbs.Frames""",
     ),
     "From geometry to matrices": (
         "A STEP file, a geometry or a mesh becomes stiffness and mass.",
@@ -142,8 +142,8 @@ FILE_NAMES = {name: f"{name}-function" for name in NAMES if name in CLASSES}
 SUBJECTS = {
     "Reduce a body": """beam assembly compressor_blade reference_conditions parameters large_mesh
     exchange""",
-    "Mechanisms": """slider_crank robot_arm satellite pendulum_chain hand rolling_wheel periodic
-    isotropy best_matching study""",
+    "Mechanisms": """slider_crank robot_arm flexible_arm satellite pendulum_chain hand rolling_wheel
+    periodic isotropy best_matching study""",
     "Large deflection and metal forming": """large_deflection flexure snap_through spin_up sheet
     forming""",
     "Rotating blades, wheels and rotors": """rotating_blade bladed_disk mistuning lost_tip

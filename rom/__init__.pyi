@@ -119,6 +119,7 @@ from rom.mbs.analysis.sensitivity import frequency_sensitivity as frequency_sens
 from rom.mbs.analysis.sensitivity import motion_sensitivity as motion_sensitivity
 from rom.mbs.analysis.steady_motion import SteadyMotion as SteadyMotion
 from rom.mbs.analysis.steady_motion import steady_motion as steady_motion
+from rom.mbs.control.stepper import Stepper as Stepper
 from rom.mbs.integrate.keeping import Keeping as Keeping
 from rom.mbs.integrate.simulation import release as release
 from rom.mbs.integrate.simulation import simulate as simulate

@@ -69,6 +69,12 @@ class StressRecovery:
         """
         return np.concatenate([a, alpha, [omega[i] * omega[j] for i, j in PRODUCTS], qdd])
 
+    def at(self, k: int) -> "StressRecovery":
+        """At one point alone."""
+        rows, A = slice(6 * k, 6 * k + 6), self.inertial
+        found = self.points[k : k + 1], self.operator[rows], None if A is None else A[rows]
+        return StressRecovery(*found)
+
     def moved(self, X: Array) -> "StressRecovery":
         """Seen from a frame that takes the rigid motion X (6, r) out of the shapes."""
         if self.inertial is None:

@@ -11,9 +11,9 @@ from rom.config.mechanism import MechanismFile
 from rom.config.python_files import python_entries
 from rom.errors import ConfigError
 from rom.fmu.export import write_fmu
-from rom.fmu.variables import output_names
 from rom.io.files import check_readable
 from rom.io.native import save
+from rom.mbs.control.variables import output_names
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import Part
 from rom.names import file_name

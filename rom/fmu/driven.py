@@ -13,25 +13,16 @@ import struct
 import sys
 import warnings
 from collections.abc import Callable, Iterable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from rom.arguments import between, number, positive
-from rom.errors import ConfigError, RomError, RomWarning, SolverError
-from rom.fmu.variables import Inputs, Outputs
-from rom.fmu.variables import Kept as KeptInputs
+from rom.errors import ConfigError, RomError, RomWarning
 from rom.io.fmu.description import Variable
-from rom.mbs.elements.family import apply_laws
-from rom.mbs.equations.equations import evaluate
-from rom.mbs.equations.packing import Packed, pack
-from rom.mbs.integrate.consistent_start import initial_state, with_accelerations
-from rom.mbs.integrate.simulation import simulate
-from rom.mbs.kernels.work import Work, workspace
+from rom.mbs.control.stepper import Stepper
 from rom.mbs.mechanism import Mechanism
-from rom.mbs.parts.signals import sample_all
 from rom.mbs.results.state import State
 from rom.model import Array, Index
 from rom.names import named
@@ -41,19 +32,13 @@ SETTINGS_FILE, BUILD_FUNCTION = "fmu.json", "mechanism"
 OK, ERROR = 0, 3
 HEAD_LAYOUT = struct.Struct("=iii")
 NO_VALUES = np.zeros(0)
-Kept = tuple[State | None, bool, Array, KeptInputs]  # all that the next steps depend on
+Kept = tuple[State | None, bool, Array]  # state, whether steps were taken, inputs
 
 
 class Driven:
-    """A mechanism with inputs that are held over each step, and with outputs after it.
+    """A mechanism with inputs that are held over each communication step, and outputs after it.
 
-    Steps are those of `rom.simulate` with generalised-alpha and the same memory, so that inputs
-    that never change give the bits of one long run, if drives know their derivatives. Where an
-    input jumps, the accelerations, the acceleration-like variable of the method and the
-    multipliers jump by the difference that the equations of motion give at that instant; without
-    that the method would see every jump half a step late.
-
-    The mechanism is changed; other arguments are those of `rom.fmu.export.write_fmu`.
+    Arguments are those of `rom.fmu.export.write_fmu`.
     """
 
     def __init__(
@@ -65,15 +50,10 @@ class Driven:
         dt: float,
         rho_inf: float = 0.9,
     ):
-        self.mechanism = mechanism
         self.parameters = np.array([dt, rho_inf], dtype=float)
-        self.inputs, self.outputs = Inputs(mechanism, inputs), Outputs(mechanism, outputs)
-        self.state: State | None = None
-        self.stepped = False
-        self.packed: Packed = pack(mechanism)
-        self.W: Work = workspace(self.packed.system, len(self.packed.signals))
-        self.laws = self.packed.asked
-        self.held = self.inputs.values.copy()
+        self.stepper = Stepper(mechanism, dt=dt, inputs=inputs, outputs=outputs, rho_inf=rho_inf)
+        self.inputs, self.outputs = self.stepper.inputs, self.stepper.outputs
+        self.started = self.stepped = False
 
     @property
     def variables(self) -> list[Variable]:
@@ -119,76 +99,40 @@ class Driven:
 
     def start(self, t: float) -> None:
         """Take the positions and velocities nearest to those given that satisfy all joints."""
-        self.inputs.begin(t)
-        self.stepped = False
-        state = initial_state(self.packed, t, 0.05 * float(self.parameters[0]), placing=True)
-        if self.packed.by_blocks and state.rank < state.lam.size:
-            self.packed = self.packed.whole()
-            self.W = workspace(self.packed.system, len(self.packed.signals))
-        self.state, self.held = state, self.inputs.values.copy()
-        self.state = self._accelerated(state)
+        self.stepper.dt, self.stepper.rho_inf = self.parameters.tolist()
+        self.stepper.start(t, placing=True)
+        self.started, self.stepped = True, False
 
     def step(self, t: float, h: float) -> None:
         """Go on from t to t + h with steps of at most ``dt``; where that fails, stay there."""
-        if self.state is None or abs(t - self.state.t) > TIME_RTOL * max(h, 1e-3 * abs(t)):
-            where = "not started" if self.state is None else f"at t = {self.state.t:.9g} s"
+        now = self.stepper.t
+        if not self.started or abs(t - now) > TIME_RTOL * max(h, 1e-3 * abs(t)):
+            where = f"at t = {now:.9g} s" if self.started else "not started"
             raise ConfigError(f"a step from t = {t:.9g} s must start at the mechanism, {where}.")
         positive("the communication step", h)
         n = max(1, int(np.ceil(h / float(self.parameters[0]) - 1e-6)))
-        dt, begun = h / n, self._jumped(self.state)
-        if begun.memory is not None and abs(begun.memory.h - dt) < TIME_RTOL * dt:
-            dt = begun.memory.h  # callers subtract times; one step length needs one factorisation
-        t_end, rho_inf = begun.t + n * dt, float(self.parameters[1])
-        motion = simulate(
-            self.mechanism, t_end=t_end, dt=dt, state=begun, save_every=n, rho_inf=rho_inf
-        )
-        if abs(motion.final.t - begun.t - h) > 2 * TIME_RTOL * h:
-            raise SolverError(f"the mechanism ended its run: {motion.status}", solution=motion)
-        self.state, self.held, self.stepped = motion.final, self.inputs.values.copy(), True
-        self.inputs.follow(self.state.t)
+        # callers subtract times; one step length needs one factorisation
+        same = abs(self.stepper.h - h / n) < TIME_RTOL * h / n
+        self.stepper.advance(n, self.stepper.h if same else h / n)
+        self.stepped = True
 
     def keep(self) -> Kept:
         """All that the next steps depend on, to come back to."""
-        return self.state, self.stepped, self.held.copy(), self.inputs.kept()
+        state = self.stepper.state if self.started else None
+        return state, self.stepped, self.inputs.values.copy()
 
     def recall(self, kept: Kept) -> None:
         """Come back to what was kept."""
-        self.state, self.stepped, held, inputs = kept
-        self.held = held.copy()
-        self.inputs.recall(inputs)
-
-    def _evaluated(self, state: State) -> Work:
-        W, span = self.W, (state.t, np.inf)
-        spacing = 0.05 * float(self.parameters[0])
-        W.signal[:] = sample_all(self.packed.signals, np.array([state.t]), span, spacing)[0]
-        W.base[:] = np.r_[0 * W.x, self.packed.system.memory] if state.base is None else state.base
-        evaluate(self.packed.system, W, state.q, state.v)
-        return W
-
-    def _accelerated(self, state: State) -> State:
-        """The state with accelerations and multipliers of the inputs as they are."""
-        W = self._evaluated(state)
-        apply_laws(self.laws, W, state.t)
-        return with_accelerations(self.packed, W, state)
-
-    def _jumped(self, state: State) -> State:
-        """The state with what the change of inputs since the last step does to accelerations."""
-        if state.memory is None or np.array_equal(self.held, self.inputs.values):
-            return state
-        after, now = self._accelerated(state), self.inputs.values.copy()
-        self.inputs.values[:] = self.held
-        before = self._accelerated(state)
-        self.inputs.values[:] = now
-        a, lam = after.a - before.a, after.lam - before.lam
-        arrays = state.memory.arrays | {"before": state.memory.arrays["before"] + a}
-        memory, algorithmic = replace(state.memory, arrays=arrays), state.algorithmic + a
-        moved = replace(state, a=state.a + a, lam=state.lam + lam)
-        return replace(moved, algorithmic=algorithmic, memory=memory)
+        state, self.stepped, values = kept
+        self.started = state is not None
+        if state is not None:
+            self.stepper.recall(state)
+        self.inputs.values[:] = values
 
     def _outputs(self) -> Array:
-        if self.state is None:
+        if not self.started:
             raise ConfigError("the mechanism has no outputs yet: it must be initialised first.")
-        return self.outputs.values(self._evaluated(self.state), self.state.lam, self.packed)
+        return self.stepper.read()
 
 
 def driven(resources: Path) -> Driven:

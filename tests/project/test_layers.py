@@ -42,7 +42,8 @@ fe.operators: solver memory disk aij foreseen factor substructures spectrum iter
 fe.mesh: cell_types topology picks cad solid sources child curving quality repair validate cut read
   summary input_deck
 io: files archive native fields matrices sid programs fmu bodies history export ours
-mbs: compiler kernels parts connections elements mechanism equations results integrate analysis
+mbs: compiler kernels parts connections elements mechanism equations results integrate control
+  analysis
 mbs.analysis: local_equations rotors few_modes tangent equilibrium linearize campbell
   response steady_motion sensitivity inverse_dynamics law_check
 mbs.elements: field family law_calls joint_forces springs loads laws formulas motors contact

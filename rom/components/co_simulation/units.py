@@ -1,6 +1,6 @@
 """A controller in an FMU: what it is told of a motion once a sample, and what follows it."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Protocol
@@ -10,9 +10,9 @@ import numpy as np
 from rom.arguments import Positive, number
 from rom.components.co_simulation.running import Running, variables
 from rom.errors import ConfigError, SolverError
-from rom.io.history import AXIS_LETTERS, QUATERNION_PARTS
+from rom.mbs.control.variables import readings, targets
 from rom.mbs.elements.family import NEVER
-from rom.mbs.elements.loads import LOADS_FAMILY, at_marker
+from rom.mbs.elements.loads import at_marker
 from rom.mbs.elements.motors import MOTORS_FAMILY
 from rom.mbs.parts.foreign import KEPT_HINT, ask, numbers
 from rom.mbs.parts.joints import Row, Whole, coordinate_of
@@ -20,7 +20,6 @@ from rom.model import Array
 from rom.names import check_all_known, check_once
 
 SAME_TIME = 1e-6  # of a sample
-Reading = tuple[str, tuple[str, ...], int]  # what is asked, of what, which number of the answer
 
 
 class Seen(Protocol):
@@ -101,8 +100,8 @@ def fmu(
     name = Path(file).stem if name is None else name
     self.check_new(name)
     known = variables(file)
-    told = {key.replace(".", " "): x for key, x in _readings(self)}
-    targets = {key.replace(".", " "): x for key, x in _targets(self)}
+    told = {key.replace(".", " "): x for key, x in readings(self)}
+    able = {key.replace(".", " "): x for key, x in targets(self)}
     given = {**inputs, **{x: str(target) for x, target in outputs.items()}}
     words = {key: x.replace(".", " ") for key, x in given.items() if isinstance(x, str)}
     if not outputs:
@@ -112,13 +111,13 @@ def fmu(
         there = [x for x, causality in known.items() if causality in what.split()]
         check_all_known(some, there, f"FMU {name!r} has no {what.split()[0]}")
     check_all_known([words[x] for x in inputs if x in words], told, f"FMU {name!r} cannot be told")
-    check_all_known([words[x] for x in outputs], targets, f"FMU {name!r} can set no motor or load")
+    check_all_known([words[x] for x in outputs], able, f"FMU {name!r} can set no motor or load")
     parameters = {x: number(x, inputs[x]) for x in inputs if known[x] == "parameter"}
     asked = [x for x in inputs if x not in parameters]
     sources = {x: _source(x, told[words[x]] if x in words else inputs[x]) for x in asked}
     picked, values = dict[str, list[int]](), np.zeros(len(outputs) + 1)
     for k, variable in enumerate(outputs):
-        element, component = targets[words[variable]]
+        element, component = able[words[variable]]
         picked.setdefault(element, [len(outputs)] * 3)[component] = k
     for element, at in picked.items():
         family, one = self.elements.pop(element)
@@ -156,33 +155,3 @@ def _source(variable: str, given: object) -> Callable[[Seen], float]:
         return float(numbers(what, instant.t, answer, (), "a number"))
 
     return at
-
-
-def _readings(self: Whole) -> Iterator[tuple[str, Reading]]:
-    """What there is to tell, by the names of the columns of `rom.write_history`."""
-    moving = {"position": AXIS_LETTERS, "velocity": AXIS_LETTERS}
-    for body, part in self.parts.items():
-        elastic = tuple(f"q{k + 1}" for k in range(part.r))
-        own = {"orientation": QUATERNION_PARTS, "omega": AXIS_LETTERS, "elastic": elastic}
-        for of in ((body,), *((body, marker) for marker in part.names)):
-            for what, letters in (moving if len(of) > 1 else moving | own).items():
-                yield from (
-                    (" ".join((*of, what, x)), (what, of, k)) for k, x in enumerate(letters)
-                )
-    for name in (*self.joints, *self.drives):
-        for k, x in enumerate(f"{what} {x}" for what in ("force", "moment") for x in AXIS_LETTERS):
-            yield f"{name} {x}", ("reaction", (name,), k)
-    for name, joint in self.joints.items():
-        rows = {"angle": joint.turn, "displacement": joint.displacement}
-        for what in (what for what, row in rows.items() if row is not None):
-            for k, x in enumerate((what, f"{what} rate")):
-                yield f"{name} {x}", ("joint", (name, what), k)
-
-
-def _targets(self: Whole) -> Iterator[tuple[str, tuple[str, int]]]:
-    """What may follow an output: its words, its element and the component of that."""
-    for name, (family, _) in self.elements.items():
-        if family is LOADS_FAMILY:
-            yield from ((f"{name} {x}", (name, k)) for k, x in enumerate(AXIS_LETTERS))
-        elif family is MOTORS_FAMILY:
-            yield name, (name, 0)

@@ -140,6 +140,7 @@ class Places:
         signals: functions of time so far.
         coordinates: markers and row of each joint coordinate that something acts on.
         time: number of the one that tells the time, -1 for none.
+        watched: how many of the last coordinates are followed for outputs alone.
         remembered: {owner: (m,) numbers that it remembers, at the start, in their own units}.
         settling: {owner: (m,) numbers that an equilibrium starts from in their place}.
     """
@@ -152,6 +153,7 @@ class Places:
     signals: list[Signal] = field(default_factory=list)
     coordinates: list[tuple[tuple[Marker, Marker], Row]] = field(default_factory=list)
     time: int = -1
+    watched: int = 0
     remembered: dict[str, Array] = field(default_factory=dict)
     settling: dict[str, Array] = field(default_factory=dict)
 

@@ -23,7 +23,7 @@ class Motor:
 
     joint: str
     row: Row
-    law: Callable[[float, float, float], float]
+    law: Callable[[float, float, float], float] | None  # None if its force is set from outside
     compiled: Entry | None
     every: float | None = None  # from one sample to the next [s]
     laws: ClassVar[tuple[tuple[float, ...], ...]] = ((),)  # one, without numbers
@@ -118,7 +118,7 @@ def asked(motors: Mapping[str, Motor], packed: Motors, _followed: int) -> Sequen
     return [
         MotorLaw(name, motor.law, k, packed)
         for k, (name, motor) in enumerate(motors.items())
-        if motor.address == 0
+        if motor.address == 0 and motor.law
     ]
 
 

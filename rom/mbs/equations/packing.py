@@ -199,10 +199,17 @@ class Packed:
         return self.markers[marker]
 
 
-def pack(mechanism: Mechanism, *, whole: bool = False, sampled: bool = False) -> Packed:
+def pack(
+    mechanism: Mechanism,
+    *,
+    whole: bool = False,
+    sampled: bool = False,
+    watched: Sequence[tuple[str, Row]] = (),
+) -> Packed:
     """Write the mechanism into arrays; whole matrices if wanted, else blocks where they pay.
 
-    Laws that are ``sampled`` are refused where no samples are taken.
+    Laws that are ``sampled`` are refused where no samples are taken. ``watched`` are joints and
+    coordinates to be followed in any case.
     """
     parts = tuple(mechanism.parts.values())
     if not parts:
@@ -219,6 +226,10 @@ def pack(mechanism: Mechanism, *, whole: bool = False, sampled: bool = False) ->
     for one in (*mechanism.events.values(), *mechanism.fmus.values()):
         for joint, row in one.coordinates:
             places.coordinate(joint, row)
+    needed = len(places.coordinates)
+    for joint, row in watched:
+        places.coordinate(joint, row)
+    places.watched = len(places.coordinates) - needed
     asked = tuple(
         law
         for family, table in elements.items()

@@ -108,7 +108,7 @@ def _chunk(record: Record, W: Work, step: Step, forces: Laws, done: int, count: 
     mark = Mark(Step(*(x.copy() for _, x in step.items())), record.final, record.noted)
     try:
         try:
-            answer = _advance(record, W, step, forces, (t, table[:good], out))
+            answer = advance(record, W, step, forces, (t, table[:good], out))
         finally:
             taken = int(step.count[entry.STEPS] - before)
             _note(record, W, step, forces, t[:taken], out)
@@ -149,7 +149,7 @@ def _retrace(record: Record, W: Work, mark: Mark, forces: Laws, chunk: Chunk) ->
         recall(begin.memory, W, step)
     try:
         spare = tuple(np.empty_like(x) for x in out)
-        answer = _advance(record, W, step, forces, (times, table[:k], spare))
+        answer = advance(record, W, step, forces, (times, table[:k], spare))
     except (RomError, KeyboardInterrupt):
         return
     if answer == alpha.CONVERGED:
@@ -157,7 +157,7 @@ def _retrace(record: Record, W: Work, mark: Mark, forces: Laws, chunk: Chunk) ->
         record.reach(state_of(record, W, step), noted)
 
 
-def _advance(record: Record, W: Work, step: Step, forces: Laws, chunk: Chunk) -> int:
+def advance(record: Record, W: Work, step: Step, forces: Laws, chunk: Chunk) -> int:
     """Run a chunk, calling Python forces whenever they are asked for; says how it ended."""
     times, table, out = chunk
     settings, system = record.settings, record.packed.system

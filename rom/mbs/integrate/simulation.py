@@ -185,7 +185,7 @@ def _moved(record: Record, t_start: float) -> Solution:
     if record.given is None:
         record.given = initial_state(packed, t_start, settings.spacing, assemble=record.assemble)
     state = record.given
-    _check_fit(state, packed, record.mechanism)
+    check_fit(state, packed, record.mechanism)
     record.packed = packed = packed.of_rank(state.rank)
     if record.mechanism.events:
         instant = Instant(record.mechanism, packed)
@@ -252,7 +252,7 @@ def _rescued(error: BaseException, record: Record) -> Solution | None:
     return solution
 
 
-def _check_fit(state: State, packed: Packed, mechanism: Mechanism) -> None:
+def check_fit(state: State, packed: Packed, mechanism: Mechanism) -> None:
     """Compiled code does not look at the size of its arrays, so this is the place to do it."""
     check_state(state, packed)
     angles = packed.followed if state.base is None else np.size(state.base)

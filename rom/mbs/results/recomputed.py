@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -108,6 +108,16 @@ def at_instants(solution: AnySolution) -> Iterator[Work]:
         apply_laws(forces, W, float(t))
         residual(system, W, q, v, a, lam)
         yield W
+
+
+def stress_in_motion(
+    recovery: Any, q: Array, A: Array, omega: Array, a: Array, gravity: Array
+) -> Array:
+    """(p, 6) stress [Pa] of a body with axes A (3, 3), and a (6 + r,) as of `rom.mbs.State`."""
+    if recovery.inertial is None:
+        return recovery.field(q)
+    pull = A.T @ (a[:3] - gravity)
+    return recovery.field(q, recovery.accelerations(pull, a[3:6], omega, a[6:]))
 
 
 def axes_of(solution: AnySolution, body: str) -> Array:

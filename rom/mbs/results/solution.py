@@ -201,14 +201,11 @@ class Solution(Whereabouts, Columns, metaclass=Open, kind="columns", bound=typed
         if recovery is None:
             text = f"the stress of body {body!r} cannot be recovered"
             raise ConfigError(f"{text}; reduce it with stress=True.")
-        q, moving = self.elastic(body)[instant], None
-        if recovery.inertial is not None:
-            at = self.packed.system.bodies.v_at[self._number(body)]
-            A, omega = matrix(self._places(body, 3, 7)[instant]), self._rates(body, 3, 6)[instant]
-            a = self.a[instant, at : at + 6 + part.r]
-            a_minus_g = A.T @ (a[:3] - np.asarray(self.mechanism.gravity))
-            moving = recovery.accelerations(a_minus_g, a[3:6], omega, a[6:])
-        return recovery.field(q, moving)
+        at = self.packed.system.bodies.v_at[self._number(body)]
+        A, omega = matrix(self._places(body, 3, 7)[instant]), self._rates(body, 3, 6)[instant]
+        a, gravity = self.a[instant, at : at + 6 + part.r], np.asarray(self.mechanism.gravity)
+        q = self.elastic(body)[instant]
+        return recomputed.stress_in_motion(recovery, q, A, omega, a, gravity)
 
     def reaction(self, name: str) -> Array:
         """(n_t, 6) force [N] and moment [N m] of a joint or drive on its second body, world.

@@ -5,7 +5,7 @@ What components refuse beyond their annotations stands in tables of their own te
 
 import inspect
 import os
-from dataclasses import fields, replace
+from dataclasses import fields, is_dataclass, replace
 from functools import cache, partial
 from importlib.util import find_spec
 from pathlib import Path
@@ -37,8 +37,10 @@ ALSO = {
     "modes_figure": rom.report.modes,
     "motion_figure": rom.report.motion,
 }
-# of a public class, for `rom.simulate` alone, which fills the folder of a motion by them
+# of a public class, for `rom.simulate` alone, which fills the folder of a motion by them, and for
+# FMUs, whose communication steps have any length
 INNER = {"Keeping.begin", "Keeping.due", "Keeping.write"}
+INNER |= {"Stepper.advance", "Stepper.recall", "Stepper.start"}
 # (callable, argument) -> wrong values that would be legal and cost time
 SKIPPED = {
     ("equilibrium", "steps"): {"million"},
@@ -252,6 +254,8 @@ GIVEN = {  # callable -> legal values of its own
         "C": np.ones((1, 2)), "r": 1,
     },
     "simulate": lambda: {"t_end": 1e-3, "dt": 1e-3},
+    "Stepper": lambda: {"mechanism": driven(), "dt": 1e-3},
+    "Stepper.step": lambda: {"values": ()},
     "snapshot": lambda: {"state": rom.equilibrium(driven())},
     "surface_load": lambda: {"pressure": 1.0},
     "transmissibility": lambda: {"frequencies": [1.0], "drive": "shaker", "motion": marked()[1]},
@@ -314,6 +318,7 @@ OBJECTS = {  # class -> an object of it: legal arguments of the class, and owner
     "Snapshots": lambda: rom.Snapshots(np.eye(12), n=6),
     "SpreadLoad": lambda: rom.mass_load(body(), X),
     "SteadyMotion": lambda: rom.steady_motion(driven()),
+    "Stepper": lambda: rom.Stepper(driven(), dt=1e-3),
     "SurfaceMesh": lambda: model().surface,
     "WithLoads": lambda: rom.WithLoads(rom.Guyan()),
     "Mechanism": rom.Mechanism,
@@ -384,6 +389,8 @@ def of_function(label, function):
 
 
 def of_class(name, kind):
+    if not is_dataclass(kind):
+        return kind, given(name, kind)
     made = owner(name)
     known = {p.name for p in parameters(kind)}
     return kind, {f.name: getattr(made, f.name) for f in fields(kind) if f.name in known}
