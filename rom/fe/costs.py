@@ -19,6 +19,9 @@ LEAST_SHARED_DOFS = 30_000  # one, two and three processes of two cores; above, 
 PASSES_PER_SUPPORT = 9  # of a comparison of six modes with the full model, measured
 MODES_PER_SUPPORT = 12  # that the search for them makes orthogonal, with rigid ones
 LONG_COMPARISON = 60.0  # [s]; a shorter one is not weighed against the reduction
+SHARED_RATE_RATIO = 0.3  # of each rank in a factor of MUMPS over ranks, over PEAK_RATE
+SHARED_SOLUTION_SECONDS = 3e-3  # waits of ranks for each other in a solution of eight columns
+N_BORDER_SOLUTIONS = 18  # for 12 interface coordinates and 20 modes
 REST_SECONDS = 4e-6  # per dof: interfaces, energies, the body
 
 
@@ -77,6 +80,14 @@ def comparison_pays(
     """Whether full modes in all supports cost less than the reduction did, or little."""
     reduction = reduction_seconds(n, n_interface, n_modes, cost)
     return comparison_seconds(n, n_supports, cost) <= max(reduction, LONG_COMPARISON)
+
+
+def border_seconds(flops: float, entries: float, ranks: int = 1) -> float:
+    """Time of the border of substructures in a reduction: factored by so many ranks together."""
+    seconds = flops / PEAK_RATE + N_BORDER_SOLUTIONS * PASS_SECONDS * entries
+    if ranks == 1:
+        return seconds
+    return seconds / (SHARED_RATE_RATIO * ranks) + N_BORDER_SOLUTIONS * SHARED_SOLUTION_SECONDS
 
 
 def least_machines(n: float, memory: float) -> int:

@@ -66,9 +66,13 @@ def analysed(A: PETSc.Mat, solver: Solver = DIRECT_SOLVER) -> Foreseen:
 
 
 def entry_count(factor: PETSc.Mat) -> float:
-    """Entries of a factor, from its analysis; MUMPS counts large ones in millions, below zero."""
-    entries = factor.getMumpsInfog(3)
-    return float(entries if entries >= 0 else -1e6 * entries)
+    """Entries of a factor, from its analysis."""
+    return counted_entries(factor.getMumpsInfog(3))
+
+
+def counted_entries(number: int) -> float:
+    """INFOG(3) of MUMPS, which counts large numbers of entries in millions, below zero."""
+    return float(number if number >= 0 else -1e6 * number)
 
 
 def beside_factor(A: PETSc.Mat, n_columns: int, n_matrices: int) -> float:
