@@ -99,3 +99,11 @@ def test_without_the_library_mumps_shares_the_factor_as_petsc_calls_it(monkeypat
     for files in ([], ["/nowhere/libdmumps.so"]):
         monkeypatch.setattr(mumps, "mapped_files", lambda files=files: files)
         assert mumps.library(MPI.COMM_SELF) is None
+
+
+def test_eight_ranks_that_share_the_border_reduce_as_one_does(tmp_path):
+    """To 1e-9: frequencies, reduced K and M, mode shapes."""
+    one, eight = written_on_each((1, 8), tmp_path, RANKS / "border_under_mpi.py").values()
+    assert (one.pop("factors"), eight.pop("factors")) == (0, 2)
+    for name, expected in one.items():
+        assert_allclose(eight[name], expected, atol=1e-9 * np.abs(expected).max(), rtol=0)

@@ -128,7 +128,7 @@ class _Instance:
         self._id.sym, self._id.par, self._id.comm_fortran = DEFINITE_KIND, 1, comm.py2f()
         self._arrays: dict[str, Array | Index] = {}
         self._run(START_JOB)
-        self._ending = weakref.finalize(self, _end, self._call, self._id)
+        self._ending: Any = weakref.finalize(self, _end, self._call, self._id)
         for number, value in (*NO_WORDS, *options):
             self._set(number, value)
         self._id.n = n
@@ -268,9 +268,7 @@ class Border(_Instance):
 
     last = 0  # number of the last one, the same on all of its ranks
 
-    def __init__(
-        self, module: Any, K: csr_matrix, touched: Index, comm: MPI.Comm, block_size: int
-    ):
+    def __init__(self, module: Any, K: csr_matrix, touched: Index, comm: MPI.Comm, block_size: int):
         by_nodes, own_comm = (15, -block_size if block_size > 1 else 0), comm.Dup()
         super().__init__(module, K.shape[0], ENTRIES_ON_RANKS, by_nodes, comm=own_comm)
         self._ending.detach()

@@ -33,6 +33,7 @@ from rom.process.stopwatch import FACTORISATION_PIECE, FLOPS_NOTE, note, piece
 
 MAX_BORDER_RATIO = 1.0  # flops of the border, which every rank spends, over those of an inside
 MAX_CLIQUE_RATIO = 100.0  # pairs of nodes on a border over entries of the matrix: slow to order
+MOST_IN_MESSAGE = 2**31 - 1  # numbers that MPI sends at once
 N_BORDER_MATRICES = 4  # (m, m) on a rank at once: of MUMPS, its own, the sum, and that on its way
 
 
@@ -48,7 +49,9 @@ class SubstructuredFactor:
     definite factor.
     """
 
-    def __init__(self, A: PETSc.Mat, split: "Split", inside: Inside, border: "Border | WholeBorder"):
+    def __init__(
+        self, A: PETSc.Mat, split: "Split", inside: Inside, border: "Border | WholeBorder"
+    ):
         self.A, self.split, self.inside, self.border = A, split, inside, border
         comm = A.comm.tompi4py()
         with piece(FACTORISATION_PIECE):
@@ -180,6 +183,8 @@ def _border(module: Any, split: Split, comm: MPI.Comm, block_size: int) -> Borde
     whole = WholeBorder(split, comm)
     t = float(comm.allreduce(split.touched.size, op=MPI.MAX))
     alone = border_seconds(whole.flops, whole.entries)
+    if split.K_border.shape[0] ** 2 > MOST_IN_MESSAGE:
+        alone = np.inf
     if border_seconds(t**3 / 3, t**2 / 2, comm.size) >= alone:
         return whole
     shared = Border(module, split.K_border, split.touched, comm, block_size)
