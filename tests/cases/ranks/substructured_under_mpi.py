@@ -1,5 +1,5 @@
-"""Under mpirun: `substructured_under_mpi.py RESULT` writes as JSON how far the factor that ranks
-share is from dense solutions, and which matrices it refuses."""
+"""Under mpirun: `substructured_under_mpi.py main RESULT` writes as JSON how far the factor that
+ranks share is from dense solutions, and which matrices it refuses; `reduced RESULT` a body."""
 
 import json
 import sys
@@ -12,6 +12,8 @@ from mpi4py import MPI
 import numpy as np
 from scipy.sparse import csr_matrix, diags, identity, kron, random
 
+import rom
+from cases.solid import STEEL
 from rom.fe.operators.aij import aij
 from rom.fe.operators.solver import DIRECT_SOLVER, Solver
 from rom.fe.operators.substructures import shared
@@ -174,5 +176,26 @@ def main(path):
         Path(path).write_text(json.dumps(found))
 
 
+def reduced(path):
+    """A beam whose substructures share the factor of their border, and how often they did."""
+    made, shared.MAX_BORDER_RATIO = [], np.inf
+    sizes = {"L": 1.0, "b": 0.11, "h": 0.07, "lc": 0.07}
+    model = rom.fe.model("meshes/beam.geo", material=STEEL, parameters=sizes, solver="direct")
+    options = {"reference": "root", "certify": False}
+    with border("shared"):
+        shared.Border.factor = counted(shared.Border.factor, made)
+        kinds = {"root": "rbe2", "tip": "rbe3"}
+        body = rom.reduce(model, method=rom.CraigBampton(6), interfaces=kinds, **options)
+        held = rom.modes(model, 3, fixed=("root",))
+    out = {"K": body.K, "M": body.M, "omega": body.omega, "surface": body.surface.shape}
+    shapes = model.operators.rows(held.shapes, model.interfaces["tip"].dofs)
+    if COMM.rank == 0:
+        np.savez(path, factors=len(made), full=held.frequencies, modes=shapes, **out)
+
+
+def counted(factor, made):
+    return lambda *arguments: made.append(1) or factor(*arguments)
+
+
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    {"main": main, "reduced": reduced}[sys.argv[1]](sys.argv[2])

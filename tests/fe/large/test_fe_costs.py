@@ -69,7 +69,7 @@ def test_where_more_ranks_end():
         assert beyond.border_flops > beyond.inside_flops
         seconds = [shared_cost(n, ranks).seconds for ranks in (1, 2, 4, 8, 16, 32)]
         assert sorted(seconds, reverse=True) == seconds
-    assert costs.most_ranks(30_000) == 4  # the border grows slower than insides
+    assert costs.most_ranks(30_000) == 4  # each factors its border, to wait less
 
 
 def test_times_that_were_measured():

@@ -28,7 +28,7 @@ def library():
 @pytest.fixture(scope="module")
 def found(tmp_path_factory):
     folder = tmp_path_factory.mktemp("substructured")
-    return written_on_each(SHARED_BY, folder, SCRIPT, ending="json", timeout=300)
+    return written_on_each(SHARED_BY, folder, SCRIPT, "main", ending="json", timeout=300)
 
 
 LEFT_TO_MUMPS = ["on disk", "low rank", "full", "apart", "costly", "no room", "room runs out"]
@@ -103,7 +103,7 @@ def test_without_the_library_mumps_shares_the_factor_as_petsc_calls_it(monkeypat
 
 def test_eight_ranks_that_share_the_border_reduce_as_one_does(tmp_path):
     """To 1e-9: frequencies, reduced K and M, mode shapes."""
-    one, eight = written_on_each((1, 8), tmp_path, RANKS / "border_under_mpi.py").values()
+    one, eight = written_on_each((1, 8), tmp_path, SCRIPT, "reduced").values()
     assert (one.pop("factors"), eight.pop("factors")) == (0, 2)
     for name, expected in one.items():
         assert_allclose(eight[name], expected, atol=1e-9 * np.abs(expected).max(), rtol=0)
