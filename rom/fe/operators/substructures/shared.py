@@ -31,7 +31,7 @@ from rom.fe.operators.substructures.mumps import (
 from rom.model import Array, Index
 from rom.process.stopwatch import FACTORISATION_PIECE, FLOPS_NOTE, note, piece
 
-MAX_BORDER_RATIO = 1.0  # flops of the border, which every rank spends, over those of an inside
+MAX_BORDER_RATIO = 1.0  # flops of a rank for the border over those for the largest inside
 MAX_CLIQUE_RATIO = 100.0  # pairs of nodes on a border over entries of the matrix: slow to order
 MOST_IN_MESSAGE = 2**31 - 1  # numbers that MPI sends at once
 N_BORDER_MATRICES = 4  # (m, m) on a rank at once: of MUMPS, its own, the sum, and that on its way
@@ -134,8 +134,8 @@ class Split:
 def substructured(A: PETSc.Mat, solver: Solver) -> SubstructuredFactor | None:
     """The factor of a positive definite matrix; None where that of MUMPS over ranks is better.
 
-    It is where the factor is to be compressed or on disk, where the border is large, as between
-    many ranks, where a rank has no inside, and where MUMPS cannot be called directly.
+    It is where the factor is to be compressed or on disk, where a rank's share of the border is
+    larger than its inside, where a rank has no inside, and where MUMPS cannot be called directly.
     """
     comm = A.comm.tompi4py()
     if comm.size == 1 or solver.out_of_core or solver.low_rank:
@@ -151,6 +151,7 @@ def substructured(A: PETSc.Mat, solver: Solver) -> SubstructuredFactor | None:
             return None
         border = _border(module, split, comm, A.getBlockSize())
         if inside is None or not _pays(inside, border, comm):
+            border.release()
             return None
     factor = SubstructuredFactor(A, split, inside, border)
     if factor.code in MEMORY_ERRORS:
