@@ -26,7 +26,7 @@ from rom.fe.mesh.curving import without_middles
 from rom.fe.mesh.quality import layer_doubt
 from rom.fe.mesh.solid import Notes, SolidMesh
 from rom.fe.operators.aij import symmetric, without_zeros, wrapped
-from rom.fe.operators.foreseen import automatic
+from rom.fe.operators.foreseen import COUPLED_NODES, automatic, check_indices
 from rom.fe.operators.memory import give_back
 from rom.fe.operators.petsc import PETScOperators
 from rom.fe.operators.solver import DIRECT_SOLVER, parsed
@@ -83,7 +83,8 @@ def model(
             an unknown solver.
         UnsafeFileError: for a geometry that would do more than make a mesh, or is Python without
             ``trust``.
-        ResourceError: if meshing exceeds its limit of time or memory, or no way to solve would fit.
+        ResourceError: if meshing exceeds its limit of time or memory, no way to solve would fit, or
+            PETSc cannot count so many dofs.
         MaterialError: if a region has no material or a material no region.
         InterfaceError: if an interface is empty or an attachment hangs on none.
 
@@ -281,6 +282,7 @@ def assemble(
 
     Raises:
         ConfigError, MeshError, TagError, MaterialError, InterfaceError: see `model`.
+        ResourceError: if PETSc cannot count so many dofs or entries.
     """
     regions, facet_tags = dict(regions or {WHOLE_REGION: 0}), dict(facet_tags or {})
     shared = mesh.comm.size > 1
@@ -291,6 +293,9 @@ def assemble(
         tags = _cell_regions(mesh, cell_tags, regions)
     with compiling(mesh.comm):
         V = lagrange(mesh, degree)
+        nodes, coupled = V.dofmap.index_map, COUPLED_NODES[name][degree - 1]
+        n_most = mesh.comm.allreduce(nodes.size_local, op=MPI.MAX)
+        check_indices(3 * nodes.size_global, 9 * coupled * n_most)
         points = all_points(V)
         numbers = coefficients(mesh, tags, solids)
         stiffness, mass = forms(V, numbers, degree)

@@ -28,6 +28,7 @@ pytestmark = pytest.mark.fenicsx
 
 from mpi4py import MPI  # noqa: E402
 
+from rom.fe import elasticity  # noqa: E402
 from rom.fe.operators import disk, factor, foreseen, memory  # noqa: E402
 from rom.fe.operators.foreseen import automatic  # noqa: E402
 from rom.fe.operators.solver import DIRECT_SOLVER, parsed  # noqa: E402
@@ -115,6 +116,42 @@ def test_the_first_way_that_fits_is_taken(block, needs, monkeypatch):
     how, why = automatic(ops)
     assert how.iterative
     assert why.startswith(f"iterative, {needs['iterative'] / GIB:.2f} GiB: ")
+
+
+LARGEST = 2**31 - 1  # of the PETSc with 32-bit indices that Debian builds
+
+
+@pytest.mark.parametrize(
+    ("n_dofs", "n_entries", "words"),
+    [
+        (LARGEST + 1, 1, "2147483648 dofs are foreseen; 2147483647 is"),
+        (1, LARGEST + 1, "2147483648 entries of the stiffness on one rank"),
+        (LARGEST, LARGEST, ""),
+    ],
+)
+def test_more_than_petsc_can_count_is_refused(n_dofs, n_entries, words, monkeypatch):
+    monkeypatch.setattr(foreseen, "LARGEST_INDEX", LARGEST)
+    if words:
+        refuses(ResourceError, words, foreseen.check_indices, n_dofs, n_entries)
+    else:
+        foreseen.check_indices(n_dofs, n_entries)
+
+
+@pytest.mark.parametrize("hexahedra", [0, 1])
+def test_entries_are_foreseen_before_they_are_there(hexahedra, monkeypatch):
+    """Of a block: a fifth more than there are, as nodes on its surface have fewer neighbours."""
+    grid = {"hex": hexahedra, "nx": 9, "ny": 9, "nz": 9} | dict(L=1.0, b=1.0, h=1.0, lc=0.13)
+    asked = []
+    monkeypatch.setattr(elasticity, "check_indices", lambda *counts: asked.append(counts))
+    model = rom.fe.model("meshes/beam.geo", material=STEEL, parameters=grid)
+    ((n_dofs, n_entries),) = asked
+    assert n_dofs == model.n_dofs
+    assert 1.0 < n_entries / foreseen.stored_entries(model.operators.K) < 1.35
+    monkeypatch.undo()
+    monkeypatch.setattr(foreseen, "LARGEST_INDEX", n_dofs - 1)
+    with pytest.raises(ResourceError, match=f"{n_dofs} dofs") as caught:
+        rom.fe.model("meshes/beam.geo", material=STEEL, parameters=grid)
+    assert "64-bit" in caught.value.hint
 
 
 def test_what_fits_nowhere_is_refused_with_the_sizes(block, needs, monkeypatch):

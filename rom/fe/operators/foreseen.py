@@ -5,6 +5,8 @@ from typing import Any
 
 from petsc4py import PETSc
 
+import numpy as np
+
 from rom.errors import ResourceError
 from rom.fe.operators.disk import free_disk_bytes, scratch_folder
 from rom.fe.operators.memory import MAX_MEMORY_SHARE, allowed_bytes, factor_bytes, give_back
@@ -17,6 +19,9 @@ SEARCH_COLUMNS = 220  # measured for twenty modes: Lanczos space, its inertia, b
 N_MATRICES = 3  # K and M off the interfaces, and K - sigma M for the count
 MULTIGRID_RATIO = 4.0  # coarse matrices, prolongations and their making over K
 ANALYSIS_ONLY = 1  # MB of work space with which MUMPS stops after the analysis
+# nodes that share a cell with one inside a mesh, itself included, on average: by degree, from one
+COUPLED_NODES = {"tetrahedron": (15, 28, 46), "hexahedron": (27, 64, 125)}
+LARGEST_INDEX = int(np.iinfo(PETSc.IntType).max)  # of rows, and of entries on one rank
 TOTAL_MEMORY = {"plain": (17, 27), "low-rank": (37, 39)}  # INFOG of MUMPS, in core and out [MB]
 
 
@@ -66,9 +71,13 @@ def analysed(A: PETSc.Mat, solver: Solver = DIRECT_SOLVER) -> Foreseen:
 
 
 def entry_count(factor: PETSc.Mat) -> float:
-    """Entries of a factor, from its analysis; MUMPS counts large ones in millions, below zero."""
-    entries = factor.getMumpsInfog(3)
-    return float(entries if entries >= 0 else -1e6 * entries)
+    """Entries of a factor, from its analysis."""
+    return counted_entries(factor.getMumpsInfog(3))
+
+
+def counted_entries(number: int) -> float:
+    """INFOG(3) of MUMPS, which counts large numbers of entries in millions, below zero."""
+    return float(number if number >= 0 else -1e6 * number)
 
 
 def beside_factor(A: PETSc.Mat, n_columns: int, n_matrices: int) -> float:
@@ -80,6 +89,17 @@ def beside_factor(A: PETSc.Mat, n_columns: int, n_matrices: int) -> float:
 def multigrid_bytes(A: PETSc.Mat) -> float:
     """Memory of multigrid for A [bytes], on all ranks together."""
     return MULTIGRID_RATIO * ENTRY_BYTES * stored_entries(A)
+
+
+def check_indices(n_dofs: int, n_entries: int) -> None:
+    """Refuse more dofs, or entries of a matrix on one rank, than PETSc can count."""
+    for count, what in ((n_dofs, "dofs"), (n_entries, "entries of the stiffness on one rank")):
+        if count > LARGEST_INDEX:
+            raise ResourceError(
+                f"{count} {what} are foreseen; {LARGEST_INDEX} is the largest index of this PETSc.",
+                hint="Use a coarser mesh, more ranks where one has too many entries, or dolfinx on "
+                "a PETSc with 64-bit indices (Debian: python3-petsc4py-64-real).",
+            )
 
 
 def check_factor_memory(A: PETSc.Mat, n_columns: int, solver: Solver) -> None:

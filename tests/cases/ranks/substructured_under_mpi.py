@@ -1,8 +1,9 @@
-"""Under mpirun: `substructured_under_mpi.py RESULT` writes as JSON how far the factor that ranks
-share is from dense solutions, and which matrices it refuses."""
+"""Under mpirun: `substructured_under_mpi.py main RESULT` writes as JSON how far the factor that
+ranks share is from dense solutions, and which matrices it refuses; `reduced RESULT` a body."""
 
 import json
 import sys
+from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
 
@@ -11,12 +12,15 @@ from mpi4py import MPI
 import numpy as np
 from scipy.sparse import csr_matrix, diags, identity, kron, random
 
+import rom
+from cases.solid import STEEL
 from rom.fe.operators.aij import aij
 from rom.fe.operators.solver import DIRECT_SOLVER, Solver
 from rom.fe.operators.substructures import shared
 from rom.fe.operators.substructures.shared import divided, substructured
 
 COMM = MPI.COMM_WORLD
+BORDERS = {"whole": shared.WholeBorder, "shared": shared.Border}
 
 
 def chain(n, width, rng):
@@ -39,11 +43,11 @@ def distributed(K, block_size=3):
     return aij(csr_matrix(K)[first:end], ((local, n), (local, n)), COMM, block_size), first, end
 
 
-def error(K, A, first, end, rng):
+def error(K, A, first, end, rng, kind):
     """Of forty solutions, over the largest."""
     F = rng.standard_normal((K.shape[0], 40))
     factor = substructured(A, DIRECT_SOLVER)
-    if factor is None or not factor.ok:
+    if factor is None or not factor.ok or not isinstance(factor.border, kind):
         return None
     exact = np.linalg.solve(K.toarray(), F)
     X = factor.solve(np.asfortranarray(F[first:end]))
@@ -121,18 +125,25 @@ def refused(K):
     return not COMM.allreduce(np.abs(X).max(), op=MPI.MAX) < 1e10
 
 
+@contextmanager
+def border(kind):
+    """Whatever it costs, factored by every rank or by all together."""
+    kept, sign = shared.border_seconds, 1 if kind == "whole" else -1
+    shared.border_seconds = lambda flops, entries, ranks=1: sign * ranks
+    yield
+    shared.border_seconds = kept
+
+
 def main(path):
     rng = np.random.default_rng(3)
-    found = {"errors": [], "joined": []}
-    for block_size, width in ((3, 4), (3, 9), (1, 4), (1, 2)):
-        K = csr_matrix(chain(40, width, rng))
-        A, first, end = distributed(K, block_size)
-        found["errors"].append(error(K, A, first, end, rng))
+    found = {"errors": [], "joined": [], "definite": []}
+    cases = [(3, chain(40, 4, rng)), (3, chain(40, 9, rng)), (1, chain(40, 4, rng))]
+    for block_size, K in (*cases, (1, chain(40, 2, rng)), (3, one_way(60))):
+        A, first, end = distributed(csr_matrix(K), block_size)
         found["joined"].append(joined(A))
-    K = one_way(60)
-    A, first, end = distributed(K)
-    found["errors"].append(error(K, A, first, end, rng))
-    found["joined"].append(joined(A))
+        for kind in BORDERS:
+            with border(kind):
+                found["errors"].append(error(csr_matrix(K), A, first, end, rng, BORDERS[kind]))
     A, *_ = distributed(star([0] * COMM.size), 1)
     A, *_ = distributed(star(A.getOwnershipRanges()[:-1]), 1)
     found["border of stars"] = divided(A).K_border.shape[0]
@@ -155,14 +166,36 @@ def main(path):
     found["apart"] = substructured(distributed(apart)[0], DIRECT_SOLVER) is None
     loose = diags([-1.0, 2.0, -1.0], [-1, 0, 1], shape=(40, 40)).tolil()
     loose[0, 0] = loose[-1, -1] = 1.0  # free at both ends
-    found["loose"] = refused(kron(loose, np.eye(6)))
-    found["negative"] = refused(-K)
     empty = K.tolil()
     empty[7, :] = empty[:, 7] = 0.0
-    found["without stiffness"] = refused(empty)
+    for kind in BORDERS:
+        with border(kind):
+            for matrix in (kron(loose, np.eye(6)), -K, empty):  # neither is positive definite
+                found["definite"].append(not refused(matrix))
     if COMM.rank == 0:
         Path(path).write_text(json.dumps(found))
 
 
+def reduced(path):
+    """A beam whose substructures share the factor of their border, and how often they did."""
+    made, shared.MAX_BORDER_RATIO = [], np.inf
+    sizes = {"L": 1.0, "b": 0.11, "h": 0.07, "lc": 0.07}
+    model = rom.fe.model("meshes/beam.geo", material=STEEL, parameters=sizes, solver="direct")
+    options = {"reference": "root", "certify": False}
+    with border("shared"):
+        shared.Border.factor = counted(shared.Border.factor, made)
+        kinds = {"root": "rbe2", "tip": "rbe3"}
+        body = rom.reduce(model, method=rom.CraigBampton(6), interfaces=kinds, **options)
+        held = rom.modes(model, 3, fixed=("root",))
+    out = {"K": body.K, "M": body.M, "omega": body.omega, "surface": body.surface.shape}
+    shapes = model.operators.rows(held.shapes, model.interfaces["tip"].dofs)
+    if COMM.rank == 0:
+        np.savez(path, factors=len(made), full=held.frequencies, modes=shapes, **out)
+
+
+def counted(factor, made):
+    return lambda *arguments: made.append(1) or factor(*arguments)
+
+
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    {"main": main, "reduced": reduced}[sys.argv[1]](sys.argv[2])

@@ -5,13 +5,26 @@ import pytest
 import rom
 from cases.solid import STEEL
 from rom.fe import costs
-from rom.fe.costs import factor_cost, least_machines, reduction_seconds
+from rom.fe.costs import factor_cost, least_machines, reduction_seconds, shared_cost
 
 # dofs, flops, entries, of beams of quadratic tetrahedra, by the analysis of MUMPS
 COUNTED = [(11_256, 4.870e8, 2.157e6), (29_286, 4.173e9, 9.269e6), (100_995, 6.606e10, 6.061e7)]
 NOT_FITTED = (1_067_634, 7.88e12, 1.756e9, 17.8e9)  # the same and the memory taken
 # dofs, seconds of the factorisation, of 18 solutions for eight columns, of the whole: one thread
 TIMED = [(29_286, 0.39, 0.43, 1.05), (100_995, 2.9, 2.4, 6.4), (299_967, 16.8, 10.3, 31.8)]
+
+# ranks, dofs, and of a bar 1 m x 0.2 m x 0.1 m: dofs of the border, flops of the largest inside,
+# and of the border by each rank alone or by all; as dolfinx divides it up to 16, by METIS at 256
+ON_RANKS = [
+    (2, 54_468, 621, 1.039e10, 7.98e7), (3, 54_468, 1395, 1.293e10, 9.05e8),
+    (4, 54_468, 2058, 9.89e9, 2.905e9), (8, 54_468, 4785, 3.97e9, 5.01e9 / 8),
+    (16, 54_468, 7398, 2.13e9, 6.43e9 / 16), (2, 208_683, 1665, 1.525e11, 1.54e9),
+    (3, 208_683, 3606, 1.892e11, 1.563e10), (4, 208_683, 5343, 1.412e11, 2.558e10 / 4),
+    (8, 208_683, 11_931, 6.79e10, 1.301e11 / 8), (256, 208_683, 82_464, 2.91e8, 3.77e11 / 256),
+]  # fmt: skip
+# ranks, dofs, bytes of both factors on the busiest rank, by their analysis
+TAKEN = [(2, 54_468, 1.51e8), (8, 54_468, 2.10e8), (16, 54_468, 2.35e8), (2, 208_683, 9.66e8),
+         (4, 208_683, 1.135e9), (8, 208_683, 1.172e9)]  # fmt: skip
 
 
 def test_sizes_of_the_fit_and_one_it_was_not_fitted_to():
@@ -25,6 +38,38 @@ def test_sizes_of_the_fit_and_one_it_was_not_fitted_to():
     assert 1.0 < cost.flops / flops < 1.2
     assert 1.0 < cost.entries / entries < 1.1
     assert cost.memory == pytest.approx(memory, rel=0.1)
+
+
+@pytest.mark.parametrize(("ranks", "n", "border", "inside", "own"), ON_RANKS)
+def test_what_was_counted_on_ranks(ranks, n, border, inside, own):
+    cost = shared_cost(n, ranks)
+    assert cost.border == pytest.approx(border, rel=0.15)
+    assert cost.inside_flops == pytest.approx(inside, rel=0.15)
+    assert cost.border_flops == pytest.approx(own, rel=0.35)
+
+
+def test_memory_and_messages_of_ranks():
+    """By a shim between MUMPS and MPI, the busiest of eight ranks sent 110 MB."""
+    for ranks, n, taken in TAKEN:
+        assert shared_cost(n, ranks).memory == pytest.approx(taken, rel=0.3)
+    assert shared_cost(54_468, 8).sent == pytest.approx(1.10e8, rel=0.15)
+    assert shared_cost(1e6, 1).sent == 0.0
+
+
+def test_where_more_ranks_end():
+    """One rank is what it was, two share no border, and a border outweighs insides at last."""
+    for n in (54_468, 208_683, 1e6):
+        assert shared_cost(n, 1).inside_flops == factor_cost(n).flops
+        m = shared_cost(n, 2).border
+        assert costs.border_seconds(m**3 / 3, m**2 / 2) < costs.border_seconds(
+            m**3 / 3, m**2 / 2, 2
+        )
+        assert costs.most_ranks(n) == 32
+        beyond = shared_cost(n, 64)
+        assert beyond.border_flops > beyond.inside_flops
+        seconds = [shared_cost(n, ranks).seconds for ranks in (1, 2, 4, 8, 16, 32)]
+        assert sorted(seconds, reverse=True) == seconds
+    assert costs.most_ranks(30_000) == 4  # each factors its border, to wait less
 
 
 def test_times_that_were_measured():

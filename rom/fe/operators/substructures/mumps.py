@@ -14,9 +14,10 @@ from typing import Any
 from mpi4py import MPI
 
 import numpy as np
-from scipy.sparse import coo_matrix, csr_matrix, triu
+from scipy.sparse import coo_matrix, csr_matrix, tril, triu
 
 from rom.fe.jit import compiling, usable_cache
+from rom.fe.operators.foreseen import counted_entries
 from rom.fe.parallel import on_root
 from rom.model import Array, Index
 from rom.process.memory import mapped_files
@@ -26,11 +27,11 @@ typedef int... MUMPS_INT;
 typedef int... MUMPS_INT8;
 typedef struct {
     MUMPS_INT sym, par, job, comm_fortran, n, nrhs, lrhs, lredrhs, size_schur;
-    MUMPS_INT8 nnz;
+    MUMPS_INT8 nnz, nnz_loc;
     MUMPS_INT icntl[...], infog[...];
-    MUMPS_INT *irn, *jcn, *perm_in, *sym_perm, *listvar_schur;
+    MUMPS_INT *irn, *jcn, *irn_loc, *jcn_loc, *perm_in, *sym_perm, *listvar_schur;
     double rinfog[...];
-    double *a, *rhs, *redrhs, *schur;
+    double *a, *a_loc, *rhs, *redrhs, *schur;
     char version_number[...];
     ...;
 } DMUMPS_STRUC_C;
@@ -46,7 +47,7 @@ SOURCE_FILE = Path(__file__).with_name("rerooted.c")
 START_JOB, END_JOB, ANALYSIS_JOB, FACTOR_JOB, SOLUTION_JOB = -1, -2, 1, 2, 3
 DEFINITE_KIND = 1  # SYM: positive definite, no pivoting
 NO_WORDS = ((1, -1), (2, -1), (3, -1), (4, 0))  # ICNTL: no words
-ORDER_GIVEN, COMPLEMENT_WHOLE = (7, 1), (19, 1)  # ICNTL
+ORDER_GIVEN, COMPLEMENT_WHOLE, ENTRIES_ON_RANKS = (7, 1), (19, 1), (18, 3)  # ICNTL
 FIRST_HALF, SECOND_HALF = 1, 2  # ICNTL(26): the halves of a solution
 
 
@@ -112,26 +113,35 @@ def _fits(module: Any) -> bool:
 
 
 class _Instance:
-    """One triangle K (n, n) of a positive definite matrix in MUMPS, on this rank alone.
+    """One triangle of a positive definite matrix (n, n) in MUMPS, by one rank or by those of comm.
 
     With the module of `library` and (number, value) of ICNTL. ``code`` is INFOG(1) of the last
-    step, negative where that failed; ``release`` gives the memory back.
+    step, negative where that failed.
     """
 
-    def __init__(self, module: Any, K: coo_matrix, *options: tuple[int, int]):
-        self.ffi, self._call, self.n = module.ffi, module.lib.dmumps_c, K.shape[0]
+    def __init__(
+        self, module: Any, n: int, *options: tuple[int, int], comm: MPI.Comm = MPI.COMM_SELF
+    ):
+        self.ffi, self._call, self.n = module.ffi, module.lib.dmumps_c, n
         self.integer = np.dtype(f"i{self.ffi.sizeof('MUMPS_INT')}")
         self._id = self.ffi.new("DMUMPS_STRUC_C *")
-        self._id.sym, self._id.par, self._id.comm_fortran = DEFINITE_KIND, 1, MPI.COMM_SELF.py2f()
+        self._id.sym, self._id.par, self._id.comm_fortran = DEFINITE_KIND, 1, comm.py2f()
         self._arrays: dict[str, Array | Index] = {}
         self._run(START_JOB)
-        self.release = weakref.finalize(self, _end, self._call, self._id)
+        self._ending: Any = weakref.finalize(self, _end, self._call, self._id)
         for number, value in (*NO_WORDS, *options):
             self._set(number, value)
-        self._id.n, self._id.nnz = self.n, K.nnz
-        self._give_numbers("irn", K.row)
-        self._give_numbers("jcn", K.col)
-        self._give("a", K.data, "double *")
+        self._id.n = n
+
+    def release(self) -> None:
+        """Give the memory back."""
+        self._ending()
+
+    def give_entries(self, row: Index, column: Index, here: str = "") -> None:
+        """Let MUMPS use where entries are, of the whole matrix or ("_loc") those of this rank."""
+        setattr(self._id, f"nnz{here}", row.size)
+        self._give_numbers(f"irn{here}", row)
+        self._give_numbers(f"jcn{here}", column)
 
     def _set(self, number: int, value: int) -> None:
         self._id.icntl[number - 1] = value
@@ -153,6 +163,12 @@ class _Instance:
         size = self.n * self.ffi.sizeof("MUMPS_INT")
         numbers = np.frombuffer(self.ffi.buffer(self._id.sym_perm, size), dtype=self.integer)
         return numbers.astype(np.int64) - 1
+
+    def _foresee(self) -> None:
+        """What the factorisation will take, by the analysis: of all ranks, and of the largest."""
+        self._run(ANALYSIS_JOB)
+        self.flops, self.entries = self._id.rinfog[0], counted_entries(self._id.infog[2])
+        self.bytes = 1e6 * self._id.infog[15]
 
     def _run(self, job: int) -> None:
         self._id.job = job
@@ -178,7 +194,9 @@ def elimination_order(module: Any, pattern: csr_matrix, n_last: int) -> Index | 
     end = np.arange(n - n_last, n)
     clique = [np.tile(end, n_last), np.repeat(end, n_last)]
     whole = pattern + coo_matrix((np.ones(n_last**2), clique), shape=(n, n))
-    graph = _Instance(module, triu(whole, format="coo"))
+    upper = triu(whole, format="coo")
+    graph = _Instance(module, n)
+    graph.give_entries(upper.row, upper.col)
     found = graph.order()
     graph.release()
     if found is None:
@@ -202,12 +220,13 @@ class Inside(_Instance):
     """
 
     def __init__(self, module: Any, K: coo_matrix, m: int, places: Index):
-        super().__init__(module, K, ORDER_GIVEN, COMPLEMENT_WHOLE)
+        super().__init__(module, K.shape[0], ORDER_GIVEN, COMPLEMENT_WHOLE)
+        self.give_entries(K.row, K.col)
+        self._give("a", K.data, "double *")
         self.m, self._id.size_schur = m, m
         self._give_numbers("listvar_schur", np.arange(self.n - m, self.n))
         self._give_numbers("perm_in", places)
-        self._run(ANALYSIS_JOB)
-        self.flops, self.bytes = self._id.rinfog[0], 1e6 * self._id.infog[16]
+        self._foresee()
 
     def factor(self) -> Array:
         """Factor; (m, m) lower triangle of the Schur complement -K_bi K_ii^-1 K_ib."""
@@ -238,3 +257,65 @@ class Inside(_Instance):
         self._give("rhs", X, "double *")
         self._give("redrhs", R, "double *")
         self._run(SOLUTION_JOB)
+
+
+class Border(_Instance):
+    """Factor of the Schur complement (m, m) of all insides, over the ranks.
+
+    Each rank gives the lower triangle of what its inside adds at the places ``touched`` (t,), and
+    of its rows ``K`` (m, m) of the border itself; equal entries are summed. Analysed are nodes.
+    """
+
+    last = 0  # number of the last one, the same on all of its ranks
+
+    def __init__(self, module: Any, K: csr_matrix, touched: Index, comm: MPI.Comm, block_size: int):
+        by_nodes, own_comm = (15, -block_size if block_size > 1 else 0), comm.Dup()
+        super().__init__(module, K.shape[0], ENTRIES_ON_RANKS, by_nodes, comm=own_comm)
+        self._ending.detach()
+        Border.last = comm.allreduce(Border.last, op=MPI.MAX) + 1
+        kept = (own_comm, self._call, self._id)
+        self._ending = weakref.finalize(self, _let_go.__setitem__, Border.last, kept)
+        self.comm, own = comm, tril(K, format="coo")
+        self._own, (row, column) = own.data, np.tril_indices(touched.size)
+        rows, columns = (touched[row], own.row), (touched[column], own.col)
+        self.give_entries(np.concatenate(rows), np.concatenate(columns), "_loc")
+        self._foresee()
+        self.bytes += 24.0 * touched.size**2  # complement, triangle and where its entries are
+
+    def factor(self, complement: Array) -> bool:
+        """Factor, with (t, t) of which the lower triangle is read; whether it is definite."""
+        values = np.concatenate([complement[np.tril_indices(len(complement))], self._own])
+        self._give("a_loc", values, "double *")
+        self._run(FACTOR_JOB)
+        for name in ("irn_loc", "jcn_loc", "a_loc"):
+            setattr(self._id, name, self.ffi.NULL)
+            del self._arrays[name]
+        return self.code >= 0 and self._id.infog[11] == 0
+
+    def solve(self, loads: Array) -> Array:
+        """(m, k) solution for the sum of the loads (m, k) of all ranks, which are spent."""
+        X = np.asfortranarray(loads)
+        self.comm.Allreduce(MPI.IN_PLACE, X)
+        self._id.nrhs, self._id.lrhs = X.shape[1], self.n
+        self._set(27, X.shape[1])
+        self._give("rhs", X, "double *")
+        self._run(SOLUTION_JOB)
+        self.comm.Bcast(X)
+        return X
+
+    def release(self) -> None:
+        """Give the memory back, on all ranks together."""
+        self._ending()
+        end_together(self.comm)
+
+
+_let_go: dict[int, tuple[MPI.Comm, Any, Any]] = {}  # by number, what is not yet ended
+
+
+def end_together(comm: MPI.Comm) -> None:
+    """End what each of these ranks has let go, some earlier than others: MUMPS waits for all."""
+    mine = {number for number, kept in _let_go.items() if kept[0].size == comm.size}
+    for number in sorted(set.intersection(*comm.allgather(mine))):
+        own, call, data = _let_go.pop(number)
+        _end(call, data)
+        own.Free()

@@ -17,15 +17,25 @@ import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from scipy.sparse import coo_matrix, csr_matrix
 
+from rom.fe.costs import border_seconds
 from rom.fe.operators.factor import MEMORY_ERRORS, in_blocks
 from rom.fe.operators.memory import allowed_bytes, give_back
 from rom.fe.operators.solver import Solver
-from rom.fe.operators.substructures.mumps import Inside, elimination_order, library
+from rom.fe.operators.substructures.mumps import (
+    Border,
+    Inside,
+    elimination_order,
+    end_together,
+    library,
+)
 from rom.model import Array, Index
 from rom.process.stopwatch import FACTORISATION_PIECE, FLOPS_NOTE, note, piece
 
-MAX_BORDER_RATIO = 1.0  # flops of the border, which every rank spends, over those of an inside
-MAX_CLIQUE_RATIO = 10.0  # pairs of nodes on a border over entries of the matrix: slow to order
+MAX_BORDER_RATIO = 1.0  # flops of a rank for the border over those for the largest inside
+# pairs of nodes on a border over entries of the matrix, beyond which, as in a block, MUMPS finds
+# better cuts than the division of the mesh and takes two thirds of the memory
+MAX_CLIQUE_RATIO = 10.0
+MOST_IN_MESSAGE = 2**31 - 1  # numbers that MPI sends at once
 N_BORDER_MATRICES = 4  # (m, m) on a rank at once: of MUMPS, its own, the sum, and that on its way
 
 
@@ -41,26 +51,17 @@ class SubstructuredFactor:
     definite factor.
     """
 
-    def __init__(self, A: PETSc.Mat, split: "Split", inside: Inside):
-        self.A, self.comm = A, A.comm.tompi4py()
-        self.split, self.inside = split, inside
+    def __init__(
+        self, A: PETSc.Mat, split: "Split", inside: Inside, border: "Border | WholeBorder"
+    ):
+        self.A, self.split, self.inside, self.border = A, split, inside, border
+        comm = A.comm.tompi4py()
         with piece(FACTORISATION_PIECE):
             complement = inside.factor()
-            self.code = self.comm.allreduce(inside.code, op=MPI.MIN)
-            self.ok = self.code >= 0 and self._factor_border(complement)
+            self.code = comm.allreduce(inside.code, op=MPI.MIN)
+            self.ok = self.code >= 0 and border.factor(complement)
+            self.code = min(self.code, border.code)
         note(FLOPS_NOTE, inside.flops)
-
-    def _factor_border(self, complement: Array) -> bool:
-        """Factor S; whether it is positive definite."""
-        split = self.split
-        S = split.K_border.toarray()
-        S[np.ix_(split.touched, split.touched)] += complement
-        self.comm.Allreduce(MPI.IN_PLACE, S)
-        try:
-            self.S = cho_factor(S, lower=True, overwrite_a=True)
-        except (LinAlgError, ValueError):  # the second where numbers are not finite
-            return False
-        return True
 
     def solve(self, F: Array) -> Array:
         """A^-1 F for (n_local, k) right-hand sides, in blocks."""
@@ -72,8 +73,7 @@ class SubstructuredFactor:
         loads = np.zeros((split.K_border.shape[0], F.shape[1]))
         half, loads[split.touched] = self.inside.reduced(F[split.inside])
         loads[split.place] += F[split.mine]
-        self.comm.Allreduce(MPI.IN_PLACE, loads)
-        U = cho_solve(self.S, loads, check_finite=False)
+        U = self.border.solve(loads)
         X[split.inside] = self.inside.expanded(half, U[split.touched])
         X[split.mine] = U[split.place]
 
@@ -84,8 +84,39 @@ class SubstructuredFactor:
     def release(self) -> None:
         """Give the memory back now."""
         self.inside.release()
-        self.S = None
+        self.border.release()
         give_back()
+
+
+class WholeBorder:
+    """The Schur complement S (m, m), dense and factored by every rank."""
+
+    code = 0  # no error of MUMPS
+
+    def __init__(self, split: "Split", comm: MPI.Comm):
+        self.split, self.comm, m = split, comm, split.K_border.shape[0]
+        self.flops, self.entries, self.bytes = m**3 / 3, m**2 / 2, 8.0 * N_BORDER_MATRICES * m**2
+
+    def factor(self, complement: Array) -> bool:
+        """Factor, with what the inside of this rank adds; whether S is positive definite."""
+        split = self.split
+        S = split.K_border.toarray()
+        S[np.ix_(split.touched, split.touched)] += complement
+        self.comm.Allreduce(MPI.IN_PLACE, S)
+        try:
+            self.S = cho_factor(S, lower=True, overwrite_a=True)
+        except (LinAlgError, ValueError):  # the second where numbers are not finite
+            return False
+        return True
+
+    def solve(self, loads: Array) -> Array:
+        """(m, k) S^-1 times the sum of the loads of all ranks, which are spent."""
+        self.comm.Allreduce(MPI.IN_PLACE, loads)
+        return np.asarray(cho_solve(self.S, loads, check_finite=False))
+
+    def release(self) -> None:
+        """Give the memory back."""
+        self.S = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,8 +136,8 @@ class Split:
 def substructured(A: PETSc.Mat, solver: Solver) -> SubstructuredFactor | None:
     """The factor of a positive definite matrix; None where that of MUMPS over ranks is better.
 
-    It is where the factor is to be compressed or on disk, where the border is large, as between
-    many ranks, where a rank has no inside, and where MUMPS cannot be called directly.
+    It is where the factor is to be compressed or on disk, where a rank's share of the border is
+    larger than its inside, where a rank has no inside, and where MUMPS cannot be called directly.
     """
     comm = A.comm.tompi4py()
     if comm.size == 1 or solver.out_of_core or solver.low_rank:
@@ -114,12 +145,17 @@ def substructured(A: PETSc.Mat, solver: Solver) -> SubstructuredFactor | None:
     module = library(comm)
     if module is None:
         return None
+    end_together(comm)
     with piece(FACTORISATION_PIECE):
         split = divided(A)
         inside = None if split is None else _analysed(module, split, A.getBlockSize())
-        if split is None or not _pays(split, inside, comm) or inside is None:
+        if split is None or not comm.allreduce(inside is not None, op=MPI.LAND):
             return None
-    factor = SubstructuredFactor(A, split, inside)
+        border = _border(module, split, comm, A.getBlockSize())
+        if inside is None or not _pays(inside, border, comm):
+            border.release()
+            return None
+    factor = SubstructuredFactor(A, split, inside, border)
     if factor.code in MEMORY_ERRORS:
         factor.release()
         return None
@@ -141,14 +177,32 @@ def _analysed(module: Any, split: Split, block_size: int) -> Inside | None:
     return Inside(module, K, m, _whole(places, block_size))
 
 
-def _pays(split: Split, inside: Inside | None, comm: MPI.Comm) -> bool:
+def _border(module: Any, split: Split, comm: MPI.Comm, block_size: int) -> Border | WholeBorder:
+    """The way to factor the border that takes less time, by the law of cost.
+
+    Analysed is a border only if it could be the better one to share: what its largest inside
+    touches becomes a dense block in any case.
+    """
+    whole = WholeBorder(split, comm)
+    t = float(comm.allreduce(split.touched.size, op=MPI.MAX))
+    alone = border_seconds(whole.flops, whole.entries)
+    if split.K_border.shape[0] ** 2 > MOST_IN_MESSAGE:
+        alone = np.inf
+    if border_seconds(t**3 / 3, t**2 / 2, comm.size) >= alone:
+        return whole
+    shared = Border(module, split.K_border, split.touched, comm, block_size)
+    if shared.code < 0 or border_seconds(shared.flops, shared.entries, comm.size) >= alone:
+        shared.release()
+        return whole
+    return shared
+
+
+def _pays(inside: Inside, border: Border | WholeBorder, comm: MPI.Comm) -> bool:
     """Whether the border is cheap and all of it fits, by the analysis."""
-    m, allowed = split.K_border.shape[0], allowed_bytes(comm)
-    flops, need = 0.0, np.inf
-    if inside is not None and inside.code >= 0:
-        flops, need = inside.flops, inside.bytes + 8.0 * N_BORDER_MATRICES * m**2
-    cheap = m**3 / 3 <= MAX_BORDER_RATIO * comm.allreduce(flops, op=MPI.MAX)
-    return bool(comm.allreduce(cheap and need <= allowed, op=MPI.LAND))
+    share = border.flops / (comm.size if isinstance(border, Border) else 1)
+    cheap = share <= MAX_BORDER_RATIO * comm.allreduce(inside.flops, op=MPI.MAX)
+    fits = inside.code >= 0 and inside.bytes + border.bytes <= allowed_bytes(comm)
+    return bool(comm.allreduce(cheap and fits, op=MPI.LAND))
 
 
 def divided(A: PETSc.Mat) -> Split | None:
