@@ -251,13 +251,10 @@ def test_modes_left_alone_are_looked_at_once_more(problem, monkeypatch):
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory):
     """By both solvers on one rank, by the iterative one on several."""
-    folder = tmp_path_factory.mktemp("iterative")
+    folder, script = tmp_path_factory.mktemp("iterative"), RANKS / "iterative_under_mpi.py"
     asked = {1: SOLVERS} | dict.fromkeys(SHARED_BY, SOLVERS[1:])
-    script, files = str(RANKS / "iterative_under_mpi.py"), {n: folder / f"{n}.npz" for n in asked}
-    return {
-        n: written_on(n, files[n], script, *solvers, files[n], timeout=300)
-        for n, solvers in asked.items()
-    }
+    words = {n: (script, *solvers, folder / f"{n}.npz") for n, solvers in asked.items()}
+    return {n: written_on(n, given[-1], *given, timeout=300) for n, given in words.items()}
 
 
 @pytest.mark.mpi
