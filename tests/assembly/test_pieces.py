@@ -55,7 +55,7 @@ def tip_at(mech, tip, steps):
 
 def test_a_cantilever_of_pieces_follows_the_elastica_to_ten():
     assert_allclose(elastica(5.0), [1.215368, 1 - 0.387628, 0.713792], atol=1e-6)
-    pieces = made(beam(4, 40), (0, 0, 10 * EI, 0, 0, 0), n_modes=4)
+    pieces = made(beam(4, 40), (0, 0, 10 * EI, 0, 0, 0), n_modes=4, n_steps=2)
     for load in (2.0, 10.0):
         mech, tip = clamped(pieces)
         mech.force("load", tip, (0, 0, load * EI))
@@ -68,7 +68,7 @@ def test_a_cantilever_of_pieces_follows_the_elastica_to_ten():
 def test_a_moment_bends_pieces_to_a_circle_that_closes(n, cells, turns):
     """The moment turns with the section: pieces are made for pairs of forces that do, too."""
     angle = 2 * np.pi * turns
-    pieces = made(beam(n, cells), (0, 0, 0, 0, angle * EI, 0))
+    pieces = made(beam(n, cells), (0, 0, 0, 0, angle * EI, 0), n_steps=2)
     mech, tip = clamped(pieces)
     mech.torque("load", tip, (0, -angle * EI, 0))
     slope, x, z = tip_at(mech, tip, 24)
@@ -133,7 +133,7 @@ def test_pieces_that_repeat_each_other_are_reduced_once_for_the_largest_of_their
     """Frames set off from rest as the parts of one body that turns: momentum is that of the bar."""
     models, loads = beam(3, 6), {"tip": (0, 0, EI, 0, 0, 0)}
     how = {"reference": "root", "method": rom.Guyan(), "certify": False,
-           "nonlinear": rom.Geometric(loads=loads, n_modes=0, n_shapes=6)}  # fmt: skip
+           "nonlinear": rom.Geometric(loads=loads, n_modes=0, n_shapes=6, n_steps=1)}  # fmt: skip
     pieces = rom.reduce_pieces(models, **how)
     assert len({id(body.quartic) for body in pieces.bodies.values()}) == 1
     assert list(pieces.bodies["2"].markers) == ["cut 1", "cut 2"]
@@ -157,7 +157,7 @@ def test_pieces_that_repeat_each_other_are_reduced_once_for_the_largest_of_their
 @pytest.fixture(scope="module")
 def halves():
     how = {"reference": "root", "method": rom.CraigBampton(n_modes=4), "certify": False}
-    loads = rom.Geometric(loads={"tip": (0, 0, 2 * EI, 0, 0, 0)}, n_modes=2)
+    loads = rom.Geometric(loads={"tip": (0, 0, 2 * EI, 0, 0, 0)}, n_modes=2, n_steps=2)
     return beam(2, 8, nu=0.3), loads, how
 
 

@@ -83,9 +83,9 @@ def test_a_column_buckles_at_eulers_load():
 
 @pytest.mark.parametrize("nu, rtol", few(1, [(0.3, 3e-3), (0.0, 5e-3)]))
 def test_a_cantilever_bends_in_space_as_finite_elements_do(nu, rtol):
-    model, EI = slender(50, 12, nu)
+    model, EI = slender(50, 8, nu)
     loads = np.array([0.2, 1.0, 0.6, 0.3, 0, 0]) * EI
-    body = reduced(model, loads, n_modes=10, active=2)
+    body = reduced(model, loads, n_modes=10, active=2, n_steps=2)
     (q,) = body.equilibria({"tip": loads * [-1, 1, -1, 1, 0, 0]})
     full = Full(model).under(loads * [-1, 1, -1, 1, 0, 0])[6:]
     found = body.marker("tip").translation @ q
@@ -242,7 +242,7 @@ def test_frames_that_are_no_interface_are_refused(beam):
 
 
 @pytest.mark.parametrize("size", [30.0, pytest.param(1e3, marks=pytest.mark.long), 1e5])
-@pytest.mark.parametrize("component", range(6))
+@pytest.mark.parametrize("component", few(4, [0, 1, 3, 5, 2, 4]))  # the section is square
 def test_a_load_beyond_what_one_body_carries_is_refused_or_fails_its_certificate(component, size):
     model, EI = slender(20, 4)
     load = np.zeros(6)

@@ -192,7 +192,7 @@ def test_a_part_alone_is_told_its_faces_and_the_next_command_works(tmp_path):
     """A face that is drawn, the command that is proposed, a report that turns at the end."""
     pytest.importorskip("pyvista", reason="pictures need pyvista")
     step_plate(tmp_path / "plate.step")
-    asked = ("swing", "plate.step", "-p", "lc=0.006", "--unite", "--json", "-q")
+    asked = ("swing", "plate.step", "-p", "lc=0.012", "--unite", "--json", "-q")
     found = json.loads(run_rom(*asked, cwd=tmp_path).stdout)
     assert len(found["faces"]) == 9 and (tmp_path / found["files"][0]).stat().st_size > 20_000
     (command,) = found["next"]

@@ -1,5 +1,6 @@
 """Pictures of a vibration test: where its points are on the body, and along which directions."""
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +12,6 @@ from rom.components.updating.family_model import Family, Parts
 from rom.components.updating.measured import Channels, Responses
 from rom.model import Array, Index
 from rom.names import check_ending
-
-PIN_RATIO = 0.12  # length of a pin in a picture, over the size of the body
-PIN_SLENDERNESS = 12.0  # of a pin; its ball is three times as thick
 
 
 def match(family: Family, test: Responses, path: Path) -> None:
@@ -30,23 +28,13 @@ def match(family: Family, test: Responses, path: Path) -> None:
 def drawn(
     family: Family, channels: tuple[Channels, Channels], path: Path, title: str, more: str
 ) -> None:
-    """A picture of the body with a pin along each channel, its ball where it is mounted."""
-    surface = _surface(family)
-    length = PIN_RATIO * float(np.ptp(surface[0], axis=0).max())
-    thick = length / PIN_SLENDERNESS
-    things = {"body": surface}
-    for name, several in zip(("sensors", "forces"), channels, strict=True):
-        pins = []
-        for x, d in zip(np.asarray(several.points), np.asarray(several.directions), strict=True):
-            pins += [view.cylinder(x, x + length * d / np.linalg.norm(d), thick, sides=12)]
-            pins += [view.ellipsoid((1.5 * thick,) * 3, x, sides=12)]
-        things[name] = view.joined(pins)
-    text = "A ball marks a point, its pin the direction, in the axes of the geometry; a point may"
+    """A picture of the body with its channels, from two sides."""
+    pairs = zip(("sensors", "forces"), channels, strict=True)
+    several = {name: (one.points, one.directions) for name, one in pairs}
     sides = ("the front and above", -1.0, 1.0), ("behind and below", 1.0, -1.0)
-    scenes = [
-        view.Scene(f"Seen from {side}", things, view=(0.6 * y, y, 0.7 * z), up=(0, 0, 1))
-        for side, y, z in sides
-    ]
+    seen = partial(view.channels, _surface(family), several, up=(0, 0, 1))
+    scenes = [seen(title=f"Seen from {side}", view=(0.6 * y, y, 0.7 * z)) for side, y, z in sides]
+    text = "A ball marks a point, its pin the direction, in the axes of the geometry; a point may"
     view.plane(scenes, path, title=title, caption=f"{text} carry several. {more}")
 
 
