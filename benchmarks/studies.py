@@ -6,47 +6,24 @@ counts. The same slider-cranks, by Exudyn's variation of parameters on as many p
 
 import json
 from collections.abc import Callable, Iterator
-from functools import cache
 from pathlib import Path
-from time import perf_counter, sleep
+from time import perf_counter
 from typing import Any
 
 import numpy as np
 
+from benchmarks.measures import RADIUS, SHORT, STEPS, T_END, crank, short
 from benchmarks.peers.compare import answer_of, interpreter
-from benchmarks.peers.mechanisms import built, slider_crank
+from benchmarks.peers.mechanisms import slider_crank
 from benchmarks.peers.motion import SCRIPT_FILE, Run, reduced, rod, save_for_exudyn, with_all_nodes
 from benchmarks.timing import Row
 from rom.components.studies.study import Study, study
 from rom.io.native import load, save
-from rom.mbs.integrate.simulation import simulate
 from rom.process.child import scratch
 
 WORKERS = 2
-RADIUS, SPEEDS = 0.04, (50.0, 70.0)  # of cranks [m, rad/s]
-T_END, STEPS = 0.25, 1000
-SHORT = 1e-3  # of a sample that does nothing else [s]
+SPEEDS = 50.0, 70.0  # of cranks [rad/s]
 TAKEN = 2  # times each case is measured
-
-
-@cache
-def body_of(file: str) -> Any:
-    """The rod, read once in each process."""
-    return load(file)
-
-
-def crank(speed: float, file: str) -> dict[str, Any]:
-    """How far the slider of a crank goes that starts at a speed [rad/s]."""
-    body = body_of(file)
-    mechanism = built(slider_crank(body, RADIUS, speed), body)
-    motion = simulate(mechanism, t_end=T_END, dt=T_END / STEPS, save_every=STEPS // 50)
-    return {"least": motion.position("slider", "o")[:, 0].min()}
-
-
-def short(x: float) -> dict[str, Any]:
-    """A sample of a millisecond."""
-    sleep(SHORT)
-    return {"y": x}
 
 
 def measured(cranks: int = 500, peers: int = 40, shorts: int = 10_000) -> Iterator[Row]:
