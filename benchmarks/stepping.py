@@ -50,6 +50,14 @@ def crank(rod: Any = None) -> Any:
     return mech
 
 
+def pendulum(link: Any) -> Any:
+    """One flexible link on a hinge, released level."""
+    mech = Mechanism(gravity=(0, -9.81, 0))
+    one = mech.add_flexible("a", link, at=-link.marker("root").point)
+    mech.revolute("main", mech.ground.marker((0.0, 0.0, 0.0)), one.marker("root"), axis=(0, 0, 1))
+    return mech
+
+
 def two_links(link: Any) -> Any:
     """Two flexible links in a row, a coil between them, with a load of 0.2 kg at the end."""
     mech, z, root = Mechanism(gravity=(0, 0, 0)), (0, 0, 1), link.marker("root").point
@@ -74,6 +82,7 @@ def measured(steps: int = 4000, rounds: int = 5, pieces: int = 100) -> Iterator[
     rod = _reduced((0.16, 0.02, 0.012), 20)
     link = _reduced((0.25, 0.02, 0.012), 8)
     cases: dict[str, tuple[Callable[[], Any], float]] = {
+        "flexible pendulum": (lambda: pendulum(link), 1e-4),
         "rigid slider-crank": (crank, 1e-4),
         "slider-crank with a flexible rod": (lambda: crank(rod), 1e-4),
         "arm of two flexible links": (lambda: two_links(link), 1e-4),

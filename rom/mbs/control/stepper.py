@@ -13,7 +13,7 @@ from rom.arguments import AnyMechanism, Positive, Share, finite, typed, typed_re
 from rom.errors import ConfigError, RomError, SolverError
 from rom.mbs.control.variables import Inputs, Outputs, View
 from rom.mbs.elements.family import apply_laws
-from rom.mbs.equations.equations import accelerate, evaluate, factorise_motion
+from rom.mbs.equations.equations import accelerated, evaluate
 from rom.mbs.equations.packing import Packed, pack
 from rom.mbs.integrate import generalized_alpha as alpha
 from rom.mbs.integrate.consistent_start import initial_state
@@ -272,7 +272,7 @@ class Stepper:
         self._mark = [(x, x.copy()) for x in (flat, count, W.base)]
         names = (*FACTOR_FIELDS, "factor", "lu")
         self._factor = [(x, x.copy()) for x in (getattr(W, name) for name in names)]
-        self._a, self._lam = np.zeros((2, packed.v.size)), np.zeros((2, W.value.size))
+        self._a, self._lam, self._now = np.zeros(packed.v.size), np.zeros(W.value.size), np.zeros(1)
         self._samples, self._spare = bool(samples_of(packed)), space(W, self._step, 0)
         self.inputs.bind(packed)
         self.outputs.bind(View(packed, self.mechanism.parts, self._S, self._step))
@@ -313,6 +313,7 @@ class Stepper:
         self.inputs.tell()
         made, self._record.final = begin_sampled(self._record, W, state, packed.asked)
         alpha.advance.link()
+        self._rank = packed.rows_solved(self._record.final.rank)
         for name, x in made.items():
             getattr(self._step, name)[...] = x
         signals_at(self._record, self._S, state.t)
@@ -335,28 +336,25 @@ class Stepper:
             self._seen = True
 
     def _jump(self) -> None:
-        """What the change of inputs since the last step does to accelerations and multipliers."""
+        """What the change of inputs since the last step does to accelerations and multipliers.
+
+        Before it they are those of the step, which satisfy the equations at its end.
+        """
         self._look()
-        S, step, packed, now = self._S, self._step, self._packed, self.inputs.values.copy()
-        rank, t = packed.rows_solved(self._record.final.rank), np.array([self._t])
+        S, step, packed, inputs = self._S, self._step, self._packed, self.inputs
+        if inputs.drives:
+            now = inputs.values.copy()
+            inputs.values[:] = self._held
+            inputs.follow(self._t)
+            inputs.values[:] = now
+        self._now[0] = self._t
+        inputs.write(self._now, S.signal[None])
+        apply_laws(packed.asked, S, self._t)
         S.U_lu[:] = self._W.U_lu  # a range of the constraints
-        if not factorise_motion(packed.system, S, rank, False):
+        if not accelerated(packed.system, S, step.q, step.v, self._a, self._lam, self._rank):
             raise SolverError(f"the equations of motion are singular at t = {self._t:.9g} s.")
-        try:
-            for k, values in enumerate((self._held, now)):
-                self.inputs.values[:] = values
-                self.inputs.write(t, S.signal[None])
-                if values is self._held:
-                    self.inputs.follow(self._t)
-                apply_laws(packed.asked, S, self._t)
-                accelerate(packed.system, S, step.q, step.v, self._a[k], self._lam[k], rank)
-        finally:
-            self.inputs.values[:] = now
-        change = self._a[1] - self._a[0]
-        step.vd[:] += change
-        step.a[:] += change
-        step.lam[:] += self._lam[1] - self._lam[0]
-        step.lost[:] = S.power
+        step.a[:] += self._a - step.vd
+        step.vd[:], step.lam[:], step.lost[:] = self._a, self._lam, S.power
 
     def _go(self, n: int) -> None:
         """Take n steps."""
