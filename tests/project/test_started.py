@@ -39,12 +39,15 @@ BRIEF = {  # benchmark: arguments with which it takes seconds
     "peers": {"meshes": (0.024,)},
     "motion": {"meshes": (0.024,), "links": (2,)},
     "rods": {"lengths": (10, 20)},
+    "stepper": {"steps": 20, "rounds": 1, "pieces": 2},
     "start": {"cases": ("best_matching",), "again": ("best_matching",)},
+    "studies": {"cranks": 4, "peers": 2, "shorts": 40},
     "updating": {"sizes": (2e3,)},
     "large-deflection": {
         "size": 2e3, "coarse": (10, 1), "fine": (12, 1), "segments": (10,), "elements": (10,)},
 }  # fmt: skip
-LIGHT = ("film", "integrator", "chain", "adaptive", "loops", "start", "geared")  # without FEniCSx
+# without FEniCSx
+LIGHT = ("film", "integrator", "chain", "adaptive", "loops", "start", "geared", "stepper")
 
 
 def test_every_benchmark_has_a_brief_form():
