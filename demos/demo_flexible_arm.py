@@ -216,9 +216,9 @@ for name, share in shares.items():
 
 
 def posture(angles):
-    """Corners of the arm as lines x, y."""
+    """Corners of the arm as lines y, x."""
     corners = np.cumsum([0 * goal, *(np.array(LENGTHS)[:, None] * ray(np.cumsum(angles)))], axis=0)
-    return corners[:, 0], corners[:, 1]
+    return corners[:, 1], corners[:, 0]
 
 
 late = now > 0.3
@@ -228,12 +228,12 @@ view.panels(
     [
         [
             view.Panel(
-                "Path of the tool, seen from above", "x [m]", "y [m]",
-                {name: (paths[name][:, 0], paths[name][:, 1]) for name in shown}
+                "Path of the tool, seen from below", "y [m]", "x [m]",
+                {name: (paths[name][:, 1], paths[name][:, 0]) for name in shown}
                 | {"_before": posture(PICK), "_after": posture(PLACE)},
                 notes={
                     "start": tuple(p[-1] for p in posture(PICK)),
-                    "goal": (goal[0] - 0.3, goal[1] - 0.1),
+                    "goal": (goal[1] - 0.05, goal[0] - 0.15),
                 },
                 equal=True,
             ),
