@@ -24,9 +24,8 @@ MODES_PER_SUPPORT = 12  # that the search for them makes orthogonal, with rigid 
 LONG_COMPARISON = 60.0  # [s]; a shorter one is not weighed against the reduction
 SHARED_RATE_RATIO = 0.3  # of each rank in a factor of MUMPS over ranks, over PEAK_RATE
 WAIT_SECONDS = 3e-3  # of ranks for each other in such a solution, for each doubling of them
-SHARED_BYTES = (
-    15.0  # MUMPS on the busiest of 3 to 16 ranks, per entry of the whole factor: 11 to 22
-)
+# of MUMPS on the busiest of 3 to 16 ranks, per entry of the whole factor: 11 to 22
+SHARED_BYTES = 15.0
 SENT_BYTES = 20.0  # in such a factorisation, the busiest of 8 ranks, per entry: 18 and 23
 # {ranks: dofs of the border, and of what an inside touches, over n^2/3; flops and entries of the
 # largest inside, and of the border by MUMPS, over those of one factor}

@@ -266,7 +266,8 @@ def _motion(moved: Run, look: Told) -> list[str]:
 
 def _connection_table(file: MechanismFile) -> str:
     rows = []
-    for section in sections_of_files():
+    some = (name for name, one in sections_of_files().items() if not one.single)
+    for section in some:
         for name, values in file.values[section].items():
             ends = list(values.get("between") or values.get("markers") or [])
             ends += [values["marker"]] if "marker" in values else []

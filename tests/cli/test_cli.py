@@ -3,6 +3,7 @@
 import json
 import logging
 import resource
+import shlex
 import shutil
 import subprocess
 import sys
@@ -83,7 +84,7 @@ def test_help_of_a_verb_has_examples_that_parse(verb, capsys):
     commands = [line.partition("rom ")[2].partition("#")[0] for line in examples if "rom " in line]
     assert commands
     for line in commands:
-        assert build_parser().parse_args(line.split()).verb == verb
+        assert build_parser().parse_args(shlex.split(line)).verb == verb
 
 
 def test_check_prints_the_certificate_and_its_numbers(file, capsys):

@@ -169,6 +169,7 @@ def test_every_verb_that_writes_has_force():
         "simulate",
         "view",
         "report",
+        "study",
         "swing",
         "update",
     }

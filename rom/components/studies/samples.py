@@ -5,7 +5,6 @@ from contextlib import suppress
 from typing import Annotated, Any
 
 import numpy as np
-from scipy.stats import qmc
 
 from rom.arguments import Count, one_of, typed
 from rom.errors import ConfigError
@@ -52,6 +51,8 @@ def design(
     rng = _generator(rng)
     if kind == "random":
         return _scaled(rng.random((n, k)), ranges, log)
+    from scipy.stats import qmc  # which takes most of a second to import
+
     made = qmc.LatinHypercube if kind == "latin" else qmc.Sobol
     return _scaled(made(k, seed=rng).random(n), ranges, log)
 
@@ -73,6 +74,8 @@ def indices_design(
         Saltelli et al., Comput. Phys. Comm. 181 (2010) 259.
     """
     check_ranges(ranges, log)
+    from scipy.stats import qmc
+
     k = len(ranges)
     U = qmc.Sobol(2 * k, seed=_generator(rng)).random(n)
     A, B = U[:, :k], U[:, k:]

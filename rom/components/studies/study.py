@@ -13,7 +13,6 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
-from scipy.stats import binom
 
 from rom import __version__
 from rom.arguments import Count, NotNegative, typed
@@ -116,6 +115,8 @@ class Study:
         Source:
             Conover, Practical nonparametric statistics, 1999, section 3.2.
         """
+        from scipy.stats import binom
+
         x = np.sort(self._value(name)[self.good], axis=0)
         n, tail = len(x), (1 - level) / 2
         if not n:

@@ -14,9 +14,7 @@ from rom.cli.answer import Answer, table
 from rom.cli.options import assignment, count, option, unique
 from rom.cli.output import add_force, checked, usual
 from rom.cli.schemas import FILE, OUTPUT, by_name, each, number, record, text, whole
-from rom.components.studies.pictures import scatter_matrix
 from rom.components.studies.samples import KINDS, design, range_of
-from rom.components.studies.study import study
 from rom.config.mechanism import read_mechanism
 from rom.errors import ConfigError
 from rom.io.files import check_writable
@@ -27,11 +25,13 @@ SUMMARY = "move a mechanism at many samples of its keys"
 SHARES = (0.05, 0.5, 0.95)
 USUAL = {"vary": {}, "keep": (), "samples": 16, "design": KINDS[0], "seed": 1}
 EXAMPLES = """\
+  rom study demos/return_spring.toml            # what its table [study] says
   rom study demos/slider_crank.toml --vary bodies.slider.mass=0.2:0.4 -n 20 \\
       --keep "max(abs(crank pin force))"
-  rom study demos/slider_crank.toml --vary bodies.rod.mesh.web_width=0.008:0.012 -n 64 -j 2 \\
-      --vary bodies.rod.damping.ratio=0.001:0.05:log --keep "max(abs(crank pin force))" -o rod.study
-  rom study arm.toml ... -o arm.study --resume   # after anything that ended it
+  rom study demos/slider_crank.toml --vary bodies.rod.mesh.t_web=0.003:0.006 -n 64 -j 2 \\
+      --vary bodies.rod.damping.ratio=0.001:0.05:log --keep "max(abs(crank pin force))" \\
+      -o rod.study --picture rod.png
+  rom study demos/return_spring.toml --resume   # after anything that ended it
 """
 SCHEMA = record(
     "what was measured at the samples",
@@ -77,10 +77,14 @@ def run(args: argparse.Namespace) -> Answer:
         rng=np.random.default_rng(how["seed"]),
     )
     asked = {"keep": how["keep"], "trust": args.trust, "workers": args.workers}
+    from rom.components.studies.study import study
+
     found = study(
         args.file, samples, **asked, into=path, resume=args.resume, progress=not args.quiet
     )
     if args.picture and found.good.size:
+        from rom.components.studies.pictures import scatter_matrix
+
         scatter_matrix(found, args.picture)
     numbers = {name: x for name, x in found.values.items() if x.ndim == 1 and found.good.size}
     quantiles = {name: found.quantiles(name, SHARES)[0].tolist() for name in numbers}
