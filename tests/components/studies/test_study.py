@@ -151,6 +151,10 @@ def test_a_file_cut_anywhere_goes_on_to_the_same_bits_and_damage_is_named(tmp_pa
     for end in rng().integers(first, len(content), 8):
         file.write_bytes(content[:end])
         same(whole, rom.study(histories, X, workers=0, into=file, resume=True))
+    last = content[: content.rindex(b"\n", 0, -1) + 1]
+    file.write_bytes(last + b'01234567 {"sample":11,' + 500 * b" ")
+    same(whole, rom.study(histories, X, workers=0, into=file, resume=True))
+    same(whole, read_study(file))
     for place in rng().integers(first, len(content) - 1, 8):
         damaged = bytearray(content)
         damaged[place] ^= 4
@@ -256,6 +260,12 @@ def test_intervals_of_quantiles_hold_as_often_as_they_say():
         hits.append(ends[0, 0] <= np.log(2) <= ends[0, 1])
         assert ends[0, 0] <= quantile[0] <= ends[0, 1]
     assert 0.87 < np.mean(hits) < 0.97
+    x = np.arange(60.0)
+    made = rom.components.studies.Study({"x": x}, {"y": x}, {}, {}, np.zeros(60))
+    low, high = made.quantiles("y", (0.5,), 0.9)[1][0] + 1  # ranks of the ends
+    sure = stats.binom(60, 0.5).cdf
+    assert sure(high - 1) - sure(low - 1) >= 0.9 > sure(high - 2) - sure(low)
+    assert sure(low - 1) <= 0.05 and sure(high - 1) >= 0.95 > sure(high - 2)
     few = rom.components.studies.Study({"x": x[:5]}, {"y": x[:5]}, {}, {}, np.zeros(5))
     assert np.isinf(few.quantiles("y", (0.01,))[1][0, 0])
 
