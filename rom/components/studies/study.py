@@ -434,5 +434,5 @@ def _said(what: str, told: Mapping[int, object], n: int) -> str:
     """A sentence on the samples that failed or warned, if any did."""
     if not told:
         return ""
-    some = "; ".join(f"sample {k}: {text!s:.100}" for k, text in list(told.items())[:MOST_TOLD])
+    some = "; ".join(f"sample {k}: {text!s:.200}" for k, text in list(told.items())[:MOST_TOLD])
     return f"{len(told)} of {n} samples {what} ({len(told) / n:.0%}): {some}."

@@ -38,7 +38,7 @@ SCHEMA = record(
     file=FILE,
     output=OUTPUT,
     samples=whole("of the design"),
-    failed=by_name(text("class of the error, and its text"), "samples that failed, by number"),
+    failures=by_name(text("class of the error, and its text"), "samples that failed, by number"),
     values=by_name(each(number("quantile"), "5, 50 and 95 %"), "what was kept"),
 )
 
@@ -93,11 +93,12 @@ def run(args: argparse.Namespace) -> Answer:
         "file": str(args.file),
         "output": str(path),
         "samples": len(found.seconds),
-        "failed": {str(k): text for k, text in found.failed.items()},
+        "failures": {str(k): text for k, text in found.failed.items()},
         "values": quantiles,
     }
     head = f"{path}: {len(found.seconds)} samples, {len(found.failed)} failed"
-    return Answer(data, f"{head}\n{table(('', '5 %', '50 %', '95 %'), rows)}")
+    said = f"{head}\n{table(('', '5 %', '50 %', '95 %'), rows)}"
+    return Answer(data, said if rows else head, failed=() if found.good.size else ("every sample failed",))
 
 
 def _asked(args: argparse.Namespace) -> dict[str, Any]:

@@ -66,7 +66,7 @@ def test_force_of_a_pendulum_is_three_weights_at_every_mass(file, tmp_path):
     said, found = json.loads(done.stdout), read_study(tmp_path / "p.study")
     m, force = found.parameters["bodies.bob.mass"], found.values["max(abs(pivot force))"]
     assert force == pytest.approx(3 * m * 9.81, rel=2e-4)  # it passes the lowest point
-    assert said["samples"] == 6 and not said["failed"]
+    assert said["samples"] == 6 and not said["failures"]
     expected = np.quantile(force, (0.05, 0.5, 0.95))
     assert said["values"]["max(abs(pivot force))"] == pytest.approx(expected)
     # options go before the table of the file
@@ -109,6 +109,9 @@ def test_ranges_are_refused_by_name(file):
     for words, named in (("1:2:lin", "1:2:lin"), ("2:1", "bodies.bob.mass"), ("a:b", "'a:b'")):
         done = run("study", file, "--vary", f"bodies.bob.mass={words}")
         assert done.returncode == 2 and named in done.stderr
+    gone = ("--vary", "simulation.rho_inf=1.5:2", "-n", 2, "-o", file.with_suffix(".gone"))
+    done = run("study", file, *gone)  # no sample can be moved
+    assert done.returncode in (2, 5) and "rho_inf" in done.stderr
     file.write_text(PENDULUM + STUDY.replace("0.5:2:log", "0.5-2"))
     done = run("study", file)
     assert done.returncode == 2 and "study.vary.bodies.bob.mass" in done.stderr

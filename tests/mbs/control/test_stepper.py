@@ -105,10 +105,14 @@ def test_constant_inputs_give_the_bits_of_one_run(case, tmp_path):
     assert_array_equal(more.q[-1], sol.q[-1])
 
 
-def test_an_input_that_jumps_moves_a_mass_as_it_does_by_hand():
+@pytest.mark.parametrize("repeated", [False, True])
+def test_an_input_that_jumps_moves_a_mass_as_it_does_by_hand(repeated):
     """Forces held over steps give a mass parabolas, which the method has exactly."""
     mech, values = rom.Mechanism(gravity=(0, 0, 0)), np.random.default_rng(1).normal(size=50)
     on_guide(mech, mass=2.0)
+    if repeated:  # the same guide once more: the loads of both are shared
+        (part,) = mech.parts.values()
+        mech.prismatic("again", "ground", part.marker((0.0, 0.0, 0.0)), axis=(1, 0, 0))
     mech.motor("engine", "guide", lambda t, x, v: 0.0)
     stepper, x, v = rom.Stepper(mech, dt=0.1, inputs=["engine"], outputs=["guide"]), 0.0, 0.0
     for force in values:
