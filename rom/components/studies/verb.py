@@ -98,7 +98,9 @@ def run(args: argparse.Namespace) -> Answer:
     }
     head = f"{path}: {len(found.seconds)} samples, {len(found.failed)} failed"
     said = f"{head}\n{table(('', '5 %', '50 %', '95 %'), rows)}"
-    return Answer(data, said if rows else head, failed=() if found.good.size else ("every sample failed",))
+    return Answer(
+        data, said if rows else head, failed=() if found.good.size else ("every sample failed",)
+    )
 
 
 def _asked(args: argparse.Namespace) -> dict[str, Any]:
