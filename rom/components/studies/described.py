@@ -6,7 +6,7 @@ import re
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -72,16 +72,23 @@ class MotionOf:
         solution = read_mechanism(self.file, own, trust=self.trust).simulate()
         return {text: value_of(text, solution) for text in self.kept}
 
+    @cached_property
+    def components(self) -> dict[str, Path]:
+        """Component files by body, as the file is when a study begins."""
+        bodies = read_mechanism(self.file).values["bodies"]
+        files = {name: values["file"] for name, values in bodies.items() if "file" in values}
+        return {name: place for name, place in files.items() if place.suffix == ".toml"}
+
     @property
     def name(self) -> str:
         """By which a study knows the files, as they are now, and what is kept."""
-        files = {Path(self.file), *components(self.file).values()}
+        files = {Path(self.file), *self.components.values()}
         digest = _digest("".join(map(_content, sorted(files))))
         return "; ".join([f"{Path(self.file).name} {digest}", *self.kept])
 
     def sorted(self, given: Mapping[str, Any]) -> tuple[Changes, dict[str, tuple[str, Changes]]]:
         """Changes of the mechanism, and component file and changes by body."""
-        parts = {name: (str(place), Changes()) for name, place in components(self.file).items()}
+        parts = {name: (str(place), Changes()) for name, place in self.components.items()}
         own = Changes()
         for text, value in given.items():
             match key_path(text):
@@ -109,14 +116,6 @@ class MotionOf:
             if not (component.kinds or file.values["bodies"][name]["rigid"]):
                 component.body()  # says that it has no interface
         return file
-
-
-@cache
-def components(file: str) -> dict[str, Path]:
-    """Component files by body."""
-    bodies = read_mechanism(file).values["bodies"]
-    files = {name: values["file"] for name, values in bodies.items() if "file" in values}
-    return {name: place for name, place in files.items() if place.suffix == ".toml"}
 
 
 @cache

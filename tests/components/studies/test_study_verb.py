@@ -190,6 +190,10 @@ def test_geometries_vary_and_bodies_of_equal_parameters_are_made_once(swing, tmp
     rom.study(swing, again, keep=keep, workers=0)
     assert len(made) == 2
     monkeypatch.undo()
+    swing.write_text(SWING.replace('"beam.toml"', '"other.toml"'))  # read anew by each study
+    (tmp_path / "other.toml").write_text(BEAM.replace("modes = 4", "modes = 3"))
+    one = {name: x[:1] for name, x in samples.items()}
+    assert rom.study(swing, one, keep="rod elastic", workers=0).values["rod elastic"].shape[2] == 9
     bad = rom.study(swing, samples | {"mesh.h": [0.01, -1.0, 0.01]}, keep=keep, workers=2)
     assert list(bad.failed) == [1] and "beam.geo" in bad.failed[1]
 
