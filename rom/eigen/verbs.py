@@ -13,7 +13,7 @@ from scipy.linalg import eigh, qr
 from scipy.sparse import csr_matrix, identity, kron
 
 from rom.errors import InterfaceError, ModelError
-from rom.model import Array, Index, Interface, Mask
+from rom.model import Array, Index, Interface, Mask, Rotations
 
 Value = TypeVar("Value")
 Product = Callable[[Array, Array], Array]
@@ -365,6 +365,21 @@ def rigid_motions(points: Array) -> Array:
     return R.reshape(-1, 6)
 
 
+def all_motions(points: Array, rotations: Rotations | None, n: int) -> Array:
+    """(n, 6) rigid motions of points (k, 3), of their rotations, and of what has no place."""
+    R = np.zeros((n, 6))
+    R[: points.size] = rigid_motions(points)
+    if rotations is not None:
+        R[points.size : points.size + len(rotations.axes), 3:] = rotations.axes
+    return R
+
+
+def interface_motions(interface: Interface, about: Array | float = 0.0) -> Array:
+    """(3k + t, 6) motions of the dofs of a rigid interface, its rotations about a point (3,)."""
+    n = interface.dofs.size
+    return all_motions(interface.points - about, interface.rotations, n)
+
+
 def modes_within(N: Array, K: Array, M: Array) -> tuple[Array, Array]:
     """Eigenvalues (m,) [rad^2/s^2], ascending, and modes (k, m) of small matrices (k, k).
 
@@ -392,23 +407,38 @@ def on_a_line(interface: Interface) -> InterfaceError:
 
 
 def mean_motion(interface: Interface) -> Array:
-    """(6, 3k) translation [1] and rotation [1/m] of a surface, least squares over its area.
+    """(6, 3k + t) translation [1] and rotation [1/m] of a surface, least squares over its area.
 
     C = (R^T S R)^-1 R^T S with R the rigid motions about the origin of the interface and S the
-    surface mass: the rigid motion c = C u leaves the smallest integral of |u - R c|^2.
+    surface mass: the rigid motion c = C u leaves the smallest integral of |u - R c|^2. Rotations of
+    nodes count where these lie on a line or in one point, each as a displacement at their mean
+    distance from the origin.
 
     Raises:
         InterfaceError: if the nodes lie on a line, whose rotation about itself no node feels.
+
+    Source:
+        MSC Nastran Quick Reference Guide, RBE3, for the length that weighs rotations.
     """
     x = interface.points - interface.origin
     size = np.linalg.norm(x, axis=1).max(initial=0.0) or 1.0
-    R = rigid_motions(x / size)
-    SR = kron(interface.surface_mass, identity(3)) @ R
+    R = interface_motions(interface, interface.origin) / np.r_[np.ones(3), np.full(3, size)]
+    area = np.asarray(interface.surface_mass.sum(axis=1)).ravel()
+    SR, n = np.zeros(R.shape), x.size
+    SR[:n] = kron(interface.surface_mass, identity(3)) @ R[:n]
     gram = R.T @ SR
-    spectrum = np.linalg.eigvalsh(gram)
-    if not spectrum[0] > ON_A_LINE * spectrum[-1]:
+    if _undetermined(gram) and (turning := interface.rotations) is not None:
+        arm = float(area @ np.linalg.norm(x, axis=1) / area.sum()) or size
+        SR[n:] = (arm**2 * area[turning.nodes])[:, None] * R[n:]
+        gram = R.T @ SR
+    if _undetermined(gram):
         raise on_a_line(interface)
     return np.linalg.solve(gram, SR.T) / np.r_[np.ones(3), np.full(3, size)][:, None]
+
+
+def _undetermined(gram: Array) -> bool:
+    spectrum = np.linalg.eigvalsh(gram)
+    return not spectrum[0] > ON_A_LINE * spectrum[-1]
 
 
 def mac(ops: Operators, Phi: Array, Psi: Array) -> Array:
