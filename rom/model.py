@@ -87,7 +87,9 @@ class Interface:
     def dofs(self) -> Index:
         """(3k + t,) dof numbers, node by node: ``3*node + axis``; then those of the rotations."""
         displacements = (3 * self.nodes[:, None] + np.arange(3)).ravel()
-        return displacements if self.rotations is None else np.r_[displacements, self.rotations.dofs]
+        return (
+            displacements if self.rotations is None else np.r_[displacements, self.rotations.dofs]
+        )
 
     @property
     def area(self) -> float:

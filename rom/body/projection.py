@@ -25,6 +25,7 @@ from rom.eigen.verbs import (
     dofs_of,
     given_rigid_motions,
     interface_motions,
+    massless,
     mean_motion,
     modes_within,
     orthonormal,
@@ -58,9 +59,7 @@ def elastic_part(ops: Operators, Psi: Array, labels: Sequence[str]) -> Elastic:
     mu, V = np.linalg.eigh(M)
     if mu[0] < 1e-13:
         if V[:, 0] @ K @ V[:, 0] > MASSLESS_RTOL * np.diag(K).max():
-            text = f"a motion of {labels[int(np.abs(V[:, 0]).argmax())]!r} has stiffness and no mass"
-            hint = "Give the nodes an inertia, or the interface one with rom.Attachment."
-            raise ModelError(f"{text}: it would be infinitely fast.", hint=hint)
+            raise massless(repr(labels[int(np.abs(V[:, 0]).argmax())]))
         text = "the basis has columns that depend on each other"
         raise ModelError(f"{text}; ask for fewer modes, or name each interface once.")
     R = orthonormal(ops, given_rigid_motions(ops))

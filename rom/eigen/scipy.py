@@ -130,7 +130,9 @@ class SciPyOperators(ModeSearch):
         if bad.any() or not (diagonal > 0.0).any():
             at = int(np.flatnonzero(bad | (diagonal <= 0.0))[0])
             text = f"M has {diagonal[at]:.3g} on the diagonal of dof {at}"
-            raise QualityGateError(f"{text}; without mass it needs stiffness, and no coupling in M.")
+            raise QualityGateError(
+                f"{text}; without mass it needs stiffness, and no coupling in M."
+            )
 
     def comparison_pays(self, n_supports: int, n_interface: int, n_modes: int) -> bool:
         """Always: matrices whose origin is unknown are compared in every support."""

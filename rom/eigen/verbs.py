@@ -177,6 +177,10 @@ class Searched(Operators, Protocol):
     largest: Callable[[], float]
 
     @property
+    def n_massive(self) -> int:
+        """Number of dofs of the whole body that have mass, and thereby of modes."""
+
+    @property
     def stiffness_diagonal(self) -> Array:
         """(n_local,) diagonal of K."""
 
@@ -387,6 +391,13 @@ def modes_within(N: Array, K: Array, M: Array) -> tuple[Array, Array]:
     """
     lam, V = eigh(N.T @ K @ N, N.T @ M @ N)
     return lam, N @ V
+
+
+def massless(of: str) -> ModelError:
+    """The error of a motion that has stiffness and no mass."""
+    hint = "Give its nodes an inertia, or the interface one with rom.Attachment."
+    text = f"a motion of {of} has stiffness and no mass"
+    return ModelError(f"{text}: it would be infinitely fast.", hint=hint)
 
 
 def pins(motions: Array) -> Index:
