@@ -15,11 +15,26 @@ def ImportPETSc(arch=None):
     print("PETSc")
     return module
 """
+OPTIONS = "-skip_petscrc -no_signal_handler"
 START = """
 import rom.fe
 print("rom")
 from petsc4py.lib import ImportPETSc
 ImportPETSc()
+"""
+HANGS_UP = """
+import os, threading
+import rom.fe.compat
+reads, writes = os.pipe()
+os.close(reads)
+def write():
+    try:
+        os.write(writes, b"x")
+    except OSError as error:
+        print(type(error).__name__)
+thread = threading.Thread(target=write)
+thread.start()
+thread.join()
 """
 
 
@@ -39,13 +54,13 @@ def started(folder, helper=None):
 def test_the_helper_of_the_wheel_is_loaded_before_petsc_and_not_with_rom(tmp_path):
     """It starts MPI, which processes that only run gmsh must not."""
     done = started(tmp_path, "print('helper')\n")
-    assert done.stdout.split("\n")[:4] == ["rom", "helper", "PETSc", "rom -skip_petscrc"]
+    assert done.stdout.split("\n")[:4] == ["rom", "helper", "PETSc", f"rom {OPTIONS}"]
 
 
 def test_petsc_of_the_system_has_no_helper_to_wait_for(tmp_path):
     if find_spec(HELPER_MODULE) is not None:
         pytest.skip("here the helper is installed, and refuses this PETSc")
-    assert started(tmp_path).stdout.split("\n")[:3] == ["rom", "PETSc", "rom -skip_petscrc"]
+    assert started(tmp_path).stdout.split("\n")[:3] == ["rom", "PETSc", f"rom {OPTIONS}"]
 
 
 def test_what_the_helper_complains_of_is_not_passed_over(tmp_path):
@@ -53,6 +68,13 @@ def test_what_the_helper_complains_of_is_not_passed_over(tmp_path):
     done = started(tmp_path, "raise ImportError('petsc4py would be imported from elsewhere')\n")
     assert done.returncode == 1 and "PETSc" not in done.stdout
     assert "petsc4py would be imported from elsewhere" in done.stderr
+
+
+@pytest.mark.fenicsx
+def test_a_thread_is_told_of_who_has_hung_up_where_petsc_has_started():
+    """The handler of PETSc ends the process, or crashes in Python without the lock."""
+    done = python("-c", HANGS_UP, timeout=60)
+    assert (done.returncode, done.stdout) == (0, "BrokenPipeError\n"), done.stderr
 
 
 @pytest.mark.fenicsx
