@@ -4,6 +4,8 @@ The frame and the plate are assembled in `cases.frames`; what is known of them f
 beam theory, Kirchhoff's plate, and the mass of what is drawn.
 """
 
+import shutil
+import subprocess
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +17,7 @@ from scipy.sparse import block_diag, csr_matrix, diags
 import rom
 from cases.frames import Section, cantilever, frame, interface, plate
 from cases.refusals import refuses
+from rom.eigen.verbs import all_motions
 from rom.errors import FileFormatError, ModelError, QualityGateError
 from rom.io.matrices.dmig import write_dmig
 from rom.io.matrices.matrix_files import write_abaqus_matrix
@@ -234,3 +237,67 @@ def test_rotations_without_inertia_are_condensed():
 def _tenth(values):
     """Of nodal values (3 k,) every tenth node, with ten times the mass."""
     return 10 * values.reshape(-1, 3)[::10].ravel()
+
+
+def us3_deck(points, triangles, h):
+    """Flat triangles of six dofs a node, CalculiX's user element US3."""
+    nodes = (f"{k},{x:.12g},{y:.12g},{z:.12g}" for k, (x, y, z) in enumerate(points, 1))
+    cells = (f"{k},{a + 1},{b + 1},{c + 1}" for k, (a, b, c) in enumerate(triangles, 1))
+    return "\n".join([
+        "*NODE, NSET=ALL", *nodes, "*USER ELEMENT,TYPE=US3,NODES=3,INTEGRATION POINTS=3,MAXDOF=6",
+        "*ELEMENT, TYPE=US3, ELSET=E", *cells, "*MATERIAL, NAME=S", "*ELASTIC", "210e9, 0.3",
+        "*DENSITY", "7850", "*USER SECTION, ELSET=E, MATERIAL=S, CONSTANTS=1", f"{h}", "*STEP",
+    ])  # fmt: skip
+
+
+def tube(side, length, around, along):
+    """Points and triangles of a square tube along x, closed by no plates."""
+    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * side / 2
+    ring = [c + (d - c) * k / around for c, d in zip(corners, np.roll(corners, -1, 0), strict=True)
+            for k in range(around)]  # fmt: skip
+    x = np.linspace(0.0, length, along + 1)
+    points = np.array([[at, *c] for at in x for c in ring])
+    m, cells = len(ring), []
+    for i in range(along):
+        for k in range(m):
+            a, b = i * m + k, i * m + (k + 1) % m
+            cells += [(a, a + m, b + m), (a, b + m, b)]
+    return points, cells
+
+
+def strip(size, cells):
+    """Points and triangles of a rectangle in the plane of x and y."""
+    x, y = (np.linspace(0.0, s, c + 1) for s, c in zip(size, cells, strict=True))
+    points, m = np.array([[a, b, 0.0] for a in x for b in y]), cells[1] + 1
+    squares = [(i * m + j, (i + 1) * m + j) for i in range(cells[0]) for j in range(cells[1])]
+    return points, [t for a, b in squares for t in ((a, b, b + 1), (a, b + 1, a + 1))]
+
+
+@pytest.mark.skipif(not shutil.which("ccx"), reason="CalculiX is not installed")
+@pytest.mark.parametrize("shape", ["plate", "box beam"])
+def test_shells_of_calculix_vibrate_as_it_says(shape, tmp_path):
+    """Free frequencies by its own search; reduced on its ends, mass and inertia as drawn."""
+    h = 2e-3
+    points, cells = strip((0.5, 0.2), (12, 5)) if shape == "plate" else tube(0.06, 0.8, 2, 12)
+    deck = us3_deck(points, cells, h)
+    (tmp_path / "s.inp").write_text(deck + "\n*FREQUENCY, SOLVER=MATRIXSTORAGE\n*END STEP\n")
+    (tmp_path / "f.inp").write_text(deck + "\n*FREQUENCY\n16\n*END STEP\n")
+    for job in "sf":
+        subprocess.run(["ccx", job], cwd=tmp_path, check=True, capture_output=True)
+    lines = (tmp_path / "f.dat").read_text().split("E I G E N V A L U E   O U T P U T")[1]
+    rows = [line.split() for line in lines.splitlines()]
+    exact = np.array([float(row[3]) for row in rows if len(row) == 5 and row[0].isdigit()])[6:]
+    ends = {"root": np.flatnonzero(points[:, 0] == 0.0) + 1,
+            "tip": np.flatnonzero(points[:, 0] == points[:, 0].max()) + 1}  # fmt: skip
+    model = read_model(tmp_path / "s.sti", tmp_path / "s.mas", nodes=tmp_path / "s.inp",
+                       interfaces=ends)  # fmt: skip
+    assert_allclose(rom.modes(model, 16).frequencies[6:], exact, rtol=1e-6)
+    area = 0.5 * 0.2 if shape == "plate" else 4 * 0.06 * 0.8
+    body = rom.reduce(model, interfaces={"root": "rbe2", "tip": "rbe3"})
+    assert body.mass == pytest.approx(7850 * h * area, rel=1e-6)
+    assert body.certificate.ok, body.certificate
+    R = all_motions(points, model.rotations, model.n_dofs)
+    assert_allclose(body.inertia, (R.T @ model.M @ R)[3:, 3:], rtol=1e-9, atol=1e-12)
+    kinds = {"root": "full", "tip": "full"}
+    every = rom.reduce(model, method=rom.CraigBampton(250), interfaces=kinds, certify=False)
+    assert_allclose(every.frequencies(12)[6:], rom.modes(model, 12).frequencies[6:], rtol=1e-6)
