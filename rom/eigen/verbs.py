@@ -395,7 +395,7 @@ def modes_within(N: Array, K: Array, M: Array) -> tuple[Array, Array]:
 
 def massless(of: str) -> ModelError:
     """The error of a motion that has stiffness and no mass."""
-    hint = "Give its nodes an inertia, or the interface one with rom.Attachment."
+    hint = "Give its nodes an inertia, or let the interface move as a whole, as rbe2 and rbe3 do."
     text = f"a motion of {of} has stiffness and no mass"
     return ModelError(f"{text}: it would be infinitely fast.", hint=hint)
 
