@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
-from functools import partial
 from math import isfinite
 from typing import Annotated
 
@@ -14,7 +13,7 @@ from rom.arguments import AnyMechanism, Positive, Share, finite, typed, typed_re
 from rom.errors import ConfigError, RomError, SolverError
 from rom.mbs.control.variables import Inputs, Outputs, View
 from rom.mbs.elements.family import apply_laws
-from rom.mbs.equations.equations import accelerate, evaluate, factorise_motion
+from rom.mbs.equations.equations import evaluate
 from rom.mbs.equations.packing import Packed, pack
 from rom.mbs.integrate import generalized_alpha as alpha
 from rom.mbs.integrate.consistent_start import initial_state
@@ -24,7 +23,6 @@ from rom.mbs.integrate.sampling import begin_sampled, check_samples, samples_of,
 from rom.mbs.integrate.simulation import check_fit
 from rom.mbs.integrate.step_memory import FACTOR_FIELDS, signals_at, state_of
 from rom.mbs.kernels import work as entry
-from rom.mbs.kernels.compiled import copy as copied, kernel
 from rom.mbs.kernels.work import Step, Work, workspace
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.foreign import KEPT_HINT
@@ -33,8 +31,7 @@ from rom.mbs.results.state import State
 from rom.model import Array
 from rom.notebook import listed
 
-AHEAD = 256  # steps at once for which functions of time are asked
-NEVER = 2**62  # steps between two that are recorded
+AHEAD = 512  # steps at once for which functions of time are asked
 NEWTON_RTOL = 1e-9  # as of rom.simulate
 NO_TIMES = np.zeros(0)
 SAME_STEP = 1e-6  # of a step, by which a time may miss a multiple of it
@@ -130,7 +127,7 @@ class Stepper:
         self._initial: State | None = None
         self._state: State | None = None  # that the steps of this length began from
         self._begun_from: State | None = None  # that the next step is to begin from
-        self._held, self._t = self.inputs.start.tobytes(), 0.0
+        self._held, self._t, self._factorised = self.inputs.start.tobytes(), 0.0, -1
         self._take(pack(self.mechanism, sampled=True, watched=self.outputs.followed))
 
     def step(self, values: npt.ArrayLike = ()) -> Array:
@@ -152,7 +149,7 @@ class Stepper:
             finite(f"values {listed(self.input_names)}", values, self.inputs.start.shape)
         if self._state is None:
             self.reset()
-        self.inputs.values[:] = given
+        self.inputs.values[...] = given
         self.advance(self.count, self.dt)
         return self.outputs.read()
 
@@ -241,7 +238,11 @@ class Stepper:
         """Go on by n steps of length h with the inputs as they are; where that fails, stay."""
         if self._begun_from is not None or self.h != h:
             self._begin(h)
-        inputs, self._kept[:] = self.inputs, self._numbers
+        inputs, self._kept[...] = self.inputs, self._numbers
+        if self._step.count[entry.FACTORISATIONS] != self._factorised:
+            self._factorised = int(self._step.count[entry.FACTORISATIONS])
+            for x, kept in self._factor:  # in whose place a step that fails has another one
+                kept[:] = x
         t, past, now = self._t, inputs.past if inputs.drives else [], inputs.values.tobytes()
         try:
             inputs.tell()
@@ -256,8 +257,6 @@ class Stepper:
             self._t, self._times, self._seen, inputs.past = t, NO_TIMES, False, past
             raise
         self._held = now
-        if self._step.count[entry.FACTORISATIONS] != self._factorised:
-            self._keep_factor()
 
     def _take(self, packed: Packed) -> None:
         """Make room for a mechanism, and find in it what inputs and outputs speak of."""
@@ -300,7 +299,7 @@ class Stepper:
         W, packed = self._W, self._packed
         numbers = (1, self.rho_inf, NEWTON_RTOL, 1.0, 1.0, False)
         settings = Unending(state.t, state.t + h, h, *numbers).after(state)
-        settings = replace(settings, save_every=NEVER)
+        settings = replace(settings, save_every=alpha.NEVER)
         check_samples(packed, settings)
         self._record = Record(self.mechanism, packed, settings, 0.0, t=state.t, given=state)
         self._record.final = state
@@ -309,19 +308,11 @@ class Stepper:
         self.inputs.tell()
         made, self._record.final = begin_sampled(self._record, W, state, packed.asked)
         alpha.advance.link()
-        self._rank = packed.rows_solved(self._record.final.rank)
         for name, x in made.items():
             getattr(self._step, name)[...] = x
         signals_at(self._record, self._S, state.t)
         self._state, self._begun_from, self.h = state, None, h
-        self._times, self._at = NO_TIMES, 0
-        self._keep_factor()
-
-    def _keep_factor(self) -> None:
-        """Remember a new factorisation, in whose place a step that fails has another one."""
-        self._factorised = int(self._step.count[entry.FACTORISATIONS])
-        for x, kept in self._factor:
-            kept[:] = x
+        self._times, self._at, self._factorised = NO_TIMES, 0, -1
 
     def _look(self) -> None:
         """Evaluate the mechanism where it stands, in memory of its own."""
@@ -352,31 +343,30 @@ class Stepper:
                 record.t = self._t
                 record.reach(state_of(record, W, step))
                 most = 0 if jumps else steps_up_to_sample(record, W, step, asked, n)
-            at = self._ahead(most)
-            while (answer := self._take_steps(at, most, jumps)) == alpha.NEEDS_LAWS:
-                t = float(self._times[at + _taken(step)])
+            self._ahead(most)
+            while (answer := alpha.go_on(self._moved, self._at, most, jumps)) != alpha.CONVERGED:
+                t = record.settings.time(int(step.count[entry.STEPS]) + 1)
+                if answer != alpha.NEEDS_LAWS:
+                    raise failed_step(record, W, step, answer, t)
                 apply_laws(asked, W, t, slopes=not step.count[entry.HAS_FACTOR])
-            if answer != alpha.CONVERGED:
-                raise failed_step(record, W, step, answer, self._times[at + _taken(step)])
-            if most:
-                self._t = self._times.item(at + most - 1)
-            self._at, self._seen, n, jumps = at + most, True, n - most, False
+            self._at, self._seen, n, jumps = self._at + most, True, n - most, False
+            self._t = self._times.item(self._at)
 
-    def _ahead(self, n: int) -> int:
-        """Row of the times and signals at which the next n steps begin."""
+    def _ahead(self, n: int) -> None:
+        """Have the signals of the next n steps, with the inputs as they are."""
         if self._at + n >= self._times.size:
             self._sample(max(n, AHEAD))
         rows = slice(self._at, self._at + n)
         if rows.stop > self._good:
             raise self._failure or SolverError(f"no signals beyond t = {self._t:.9g} s.")
         if self.inputs.signals:
-            self.inputs.write(self._times[rows], self._signals[rows])
-        return self._at
+            self.inputs.write(self._times[1:][rows], self._signals[rows])
 
     def _sample(self, n: int) -> None:
         """Ask the functions of time that are no inputs for the next n steps."""
         settings, done = self._record.settings, int(self._step.count[entry.STEPS])
-        t = settings.time(np.arange(done + 1, done + n + 1))
+        self._times = settings.time(np.arange(done, done + n + 1))
+        t = self._times[1:]
         others = tuple(self._packed.signals[k] for k in self.inputs.others)
         table, failure = sampled(others, padded(t), settings.span, settings.spacing)
         good = min(len(table), n)
@@ -386,42 +376,9 @@ class Stepper:
             good, failure = looked, late if looked < good else failure
         self._signals = np.zeros((n, len(self._packed.signals), 3))
         self._signals[:good, self.inputs.others] = table[:good]
-        self._times, self._at, self._good, self._failure = t, 0, good, failure
-        memory = self._packed.system, self._W, self._step, self._system, self._S
-        self._take_steps = partial(take_steps, *memory, self._rank, self._signals)
-
-
-@kernel
-def take_steps(s, W, step, seen, S, rank, signals, at, n, jumps):  # noqa: PLR0913  no keywords
-    """Take n steps by the signals from a row on, and evaluate what is ``seen`` then; see `advance`.
-
-    Where inputs jump, S has all evaluated with them. Accelerations and multipliers before it are
-    those of the step, which satisfy the equations at its end.
-    """
-    if step.count[entry.LAWS_ASKED] == 0:
-        step.count[entry.STEPS_BEFORE] = step.count[entry.STEPS]
-        if jumps:
-            copied(W.U_lu, S.U_lu)  # a range of the constraints
-            if not factorise_motion(s, S, rank, False):
-                return alpha.SINGULAR
-            accelerate(s, S, step.q, step.v, step.vd1, step.lam1, rank)
-            for i in range(step.a.size):
-                step.a[i] += step.vd1[i] - step.vd[i]
-            copied(step.vd1, step.vd)
-            copied(step.lam1, step.lam)
-            copied(S.power, step.lost)
-    nowhere = (W.S, W.S, W.S, W.S, W.S, W.S)  # nothing is saved
-    answer = alpha.advance(s, W, step, rank, signals[at : at + n], NEVER, nowhere)
-    if answer == alpha.CONVERGED and n > 0:
-        copied(signals[at + n - 1], S.signal)
-        copied(W.base, S.base)
-        evaluate(seen, S, step.q, step.v)
-    return answer
-
-
-def _taken(step: Step) -> int:
-    """Number of steps since `take_steps` began."""
-    return int(step.count[entry.STEPS] - step.count[entry.STEPS_BEFORE])
+        self._at, self._good, self._failure = 0, good, failure
+        memory = self._packed.system, self._W, self._step, self._system, self._S, self._signals
+        self._moved = alpha.Moved(*memory, self._packed.rows_solved(self._record.final.rank))
 
 
 def _copied(mechanism: Mechanism) -> Mechanism:

@@ -135,7 +135,7 @@ class Inputs:
     def tell(self) -> None:
         """Tell motors and laws their values."""
         for place, values in self.told:
-            place[:] = values
+            place[...] = values
 
     def write(self, t: Array, signals: Array) -> None:
         """Tell signals (n, s, 3) at times (n,) the values of loads and drives."""
@@ -318,9 +318,9 @@ class Outputs:
     def read(self) -> Array:
         """(n,) all outputs after an evaluation of the mechanism."""
         for own, found in self.copied:
-            own[:] = found
+            own[...] = found
         for own, compute, pick in self.computed:
-            own[:] = compute()[pick]
+            own[...] = compute()[pick]
         return self.values
 
     def _marker(self, body: str, marker: str) -> None:
