@@ -207,7 +207,7 @@ def test_a_failure_where_functions_of_time_are_asked_anew_leaves_their_times_as_
     for one in steppers:
         one.reset()
         one.advance(AHEAD - 4, 1e-2)
-    steppers[0].inputs.values[0] = 4.0
+    steppers[0].inputs.values[0] = 2.0
     with pytest.raises(rom.SolverError):
         steppers[0].advance(10, 1e-2)
     steppers[0].inputs.values[0] = 0.0
