@@ -13,17 +13,17 @@ from rom.arguments import AnyMechanism, Positive, Share, finite, typed, typed_re
 from rom.errors import ConfigError, RomError, SolverError
 from rom.mbs.control.variables import Inputs, Outputs, View
 from rom.mbs.elements.family import apply_laws
-from rom.mbs.equations.equations import accelerated, evaluate
+from rom.mbs.equations.equations import evaluate
 from rom.mbs.equations.packing import Packed, pack
 from rom.mbs.integrate import generalized_alpha as alpha
 from rom.mbs.integrate.consistent_start import initial_state
-from rom.mbs.integrate.fixed_step import advance, failed_step, space
+from rom.mbs.integrate.fixed_step import failed_step
 from rom.mbs.integrate.run import Record, Settings
 from rom.mbs.integrate.sampling import begin_sampled, check_samples, samples_of, steps_up_to_sample
 from rom.mbs.integrate.simulation import check_fit
 from rom.mbs.integrate.step_memory import FACTOR_FIELDS, signals_at, state_of
 from rom.mbs.kernels import work as entry
-from rom.mbs.kernels.work import Step, workspace
+from rom.mbs.kernels.work import Step, Work, workspace
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.foreign import KEPT_HINT
 from rom.mbs.parts.signals import Span, first_failure, padded, sampled
@@ -31,8 +31,7 @@ from rom.mbs.results.state import State
 from rom.model import Array
 from rom.notebook import listed
 
-AHEAD = 256  # steps at once for which functions of time are asked
-NEVER = 2**62  # steps between two that are recorded
+AHEAD = 512  # steps at once for which functions of time are asked
 NEWTON_RTOL = 1e-9  # as of rom.simulate
 NO_TIMES = np.zeros(0)
 SAME_STEP = 1e-6  # of a step, by which a time may miss a multiple of it
@@ -128,8 +127,7 @@ class Stepper:
         self._initial: State | None = None
         self._state: State | None = None  # that the steps of this length began from
         self._begun_from: State | None = None  # that the next step is to begin from
-        self._held, self._t, self._at = self.inputs.start.copy(), 0.0, 0
-        self._factorised = 0
+        self._held, self._t, self._factorised = self.inputs.start.tobytes(), 0.0, -1
         self._take(pack(self.mechanism, sampled=True, watched=self.outputs.followed))
 
     def step(self, values: npt.ArrayLike = ()) -> Array:
@@ -144,16 +142,16 @@ class Stepper:
         """
         try:
             given = np.asarray(values, dtype=float)
-            good = given.shape == self._held.shape and all(map(isfinite, given.tolist()))
+            good = given.shape == self.inputs.start.shape and all(map(isfinite, given.tolist()))
         except (TypeError, ValueError, OverflowError):
             good = False
         if not good:
-            finite(f"values {listed(self.input_names)}", values, self._held.shape)
+            finite(f"values {listed(self.input_names)}", values, self.inputs.start.shape)
         if self._state is None:
             self.reset()
-        self.inputs.values[:] = given
+        self.inputs.values[...] = given
         self.advance(self.count, self.dt)
-        return self.read()
+        return self.outputs.read()
 
     @typed
     def reset(self, state: State | None = None) -> Array:
@@ -193,7 +191,7 @@ class Stepper:
         base = np.delete(self._W.base, extra)
         if found.memory is None:
             return replace(found, base=base)
-        arrays = found.memory.arrays | {HELD_KEY: self._held.copy()}
+        arrays = found.memory.arrays | {HELD_KEY: np.frombuffer(self._held).copy()}
         arrays[PAST_KEY] = np.array(self.inputs.past, dtype=float).reshape(-1, 3)
         arrays[WATCHED_KEY] = self._W.base[extra].copy()
         return replace(found, base=base, memory=replace(found.memory, arrays=arrays))
@@ -202,11 +200,6 @@ class Stepper:
     def t(self) -> float:
         """Time reached [s]."""
         return self._t
-
-    @property
-    def h(self) -> float:
-        """Length of its last step; 0 before the first [s]."""
-        return float(self._step.method[0])
 
     def start(self, t: float = 0.0, *, placing: bool = False) -> None:
         """Stand at the start with the inputs as they are; ``placing`` as of `initial_state`."""
@@ -225,13 +218,14 @@ class Stepper:
             state = replace(state, base=np.insert(state.base, [needed] * watched, extra))
         check_fit(state, self._packed, self.mechanism)
         sizes = [np.size(kept.get(key, ())) for key in (HELD_KEY, PAST_KEY)]
-        if HELD_KEY in kept and sizes == [self._held.size, 3 * len(self.inputs.past)]:
-            self.inputs.values[:] = self._held[:] = kept[HELD_KEY]
+        if HELD_KEY in kept and sizes == [self.inputs.start.size, 3 * len(self.inputs.past)]:
+            self.inputs.values[:] = kept[HELD_KEY]
+            self._held = self.inputs.values.tobytes()
             self.inputs.past = kept[PAST_KEY].tolist()
         else:
             self.inputs.values[:] = self.inputs.start
             self.inputs.begin(state.t)
-            if self._held.size:  # nobody knows from which values they jump
+            if self._held:  # nobody knows from which values they jump
                 state = replace(state, memory=None, algorithmic=None)
         self._stand(state)
 
@@ -244,36 +238,37 @@ class Stepper:
         """Go on by n steps of length h with the inputs as they are; where that fails, stay."""
         if self._begun_from is not None or self.h != h:
             self._begin(h)
-        for x, kept in self._mark:
-            kept[:] = x
-        t, at, past = self._t, self._at, self.inputs.past
+        inputs, self._kept[...] = self.inputs, self._numbers
+        if self._step.count[entry.FACTORISATIONS] != self._factorised:
+            self._factorised = int(self._step.count[entry.FACTORISATIONS])
+            for x, kept in self._factor:  # in whose place a step that fails has another one
+                kept[:] = x
+        t, past, now = self._t, inputs.past if inputs.drives else [], inputs.values.tobytes()
         try:
-            if self._held.tobytes() != self.inputs.values.tobytes():
-                self._jump()
-            self._go(n)
+            inputs.tell()
+            if jumps := now != self._held:
+                self._look_at_jump()
+            self._go(n, jumps)
         except BaseException as raised:
             if isinstance(raised, RomError):
                 raised.hint = raised.hint.replace(KEPT_HINT, "The stepper stands before the step.")
-            for x, kept in (*self._mark, *self._factor):
+            for x, kept in ((self._numbers, self._kept), *self._factor):
                 x[:] = kept
-            self._t, self._at, self._seen, self.inputs.past = t, at, False, past
+            self._t, self._times, self._seen, inputs.past = t, NO_TIMES, False, past
             raise
-        self._held[:] = self.inputs.values
-        self._keep_factor()
+        self._held = now
 
     def _take(self, packed: Packed) -> None:
         """Make room for a mechanism, and find in it what inputs and outputs speak of."""
         self._packed = packed
         seen = packed.system.replace(markers=packed.seen.markers)
         self._system, signals = seen, len(packed.signals)
-        self._W, self._S = workspace(packed.system, signals), workspace(seen, signals)
-        self._step, flat = _room(packed)
-        W, count = self._W, self._step.count
-        self._mark = [(x, x.copy()) for x in (flat, count, W.base)]
+        W, self._S = workspace(packed.system, signals), workspace(seen, signals)
+        self._step, self._W, self._numbers = _room(packed, W)
+        self._kept = self._numbers.copy()
         names = (*FACTOR_FIELDS, "factor", "lu")
         self._factor = [(x, x.copy()) for x in (getattr(W, name) for name in names)]
-        self._a, self._lam, self._now = np.zeros(packed.v.size), np.zeros(W.value.size), np.zeros(1)
-        self._samples, self._spare = bool(samples_of(packed)), space(W, self._step, 0)
+        self._samples, self.h = bool(samples_of(packed)), 0.0  # length of its last step [s]
         self.inputs.bind(packed)
         self.outputs.bind(View(packed, self.mechanism.parts, self._S, self._step))
 
@@ -304,29 +299,20 @@ class Stepper:
         W, packed = self._W, self._packed
         numbers = (1, self.rho_inf, NEWTON_RTOL, 1.0, 1.0, False)
         settings = Unending(state.t, state.t + h, h, *numbers).after(state)
-        settings = replace(settings, save_every=NEVER)
+        settings = replace(settings, save_every=alpha.NEVER)
         check_samples(packed, settings)
         self._record = Record(self.mechanism, packed, settings, 0.0, t=state.t, given=state)
         self._record.final = state
         if state.algorithmic is None:
-            self._held[:] = self.inputs.values
+            self._held = self.inputs.values.tobytes()
         self.inputs.tell()
         made, self._record.final = begin_sampled(self._record, W, state, packed.asked)
         alpha.advance.link()
-        self._rank = packed.rows_solved(self._record.final.rank)
         for name, x in made.items():
             getattr(self._step, name)[...] = x
         signals_at(self._record, self._S, state.t)
-        self._state, self._begun_from, self._times, self._at = state, None, NO_TIMES, 0
-        self._keep_factor(anyhow=True)
-
-    def _keep_factor(self, *, anyhow: bool = False) -> None:
-        """Remember a new factorisation, in whose place a step that fails has another one."""
-        count = int(self._step.count[entry.FACTORISATIONS])
-        if anyhow or count != self._factorised:
-            self._factorised = count
-            for x, kept in self._factor:
-                kept[:] = x
+        self._state, self._begun_from, self.h = state, None, h
+        self._times, self._at, self._factorised = NO_TIMES, 0, -1
 
     def _look(self) -> None:
         """Evaluate the mechanism where it stands, in memory of its own."""
@@ -335,61 +321,52 @@ class Stepper:
             evaluate(self._system, self._S, self._step.q, self._step.v)
             self._seen = True
 
-    def _jump(self) -> None:
-        """What the change of inputs since the last step does to accelerations and multipliers.
-
-        Before it they are those of the step, which satisfy the equations at its end.
-        """
+    def _look_at_jump(self) -> None:
+        """Evaluate where it stands under inputs that have changed since the last step."""
         self._look()
-        S, step, packed, inputs = self._S, self._step, self._packed, self.inputs
+        S, inputs = self._S, self.inputs
         if inputs.drives:
             now = inputs.values.copy()
-            inputs.values[:] = self._held
+            inputs.values[:] = np.frombuffer(self._held)
             inputs.follow(self._t)
             inputs.values[:] = now
-        self._now[0] = self._t
-        inputs.write(self._now, S.signal[None])
-        apply_laws(packed.asked, S, self._t)
-        S.U_lu[:] = self._W.U_lu  # a range of the constraints
-        if not accelerated(packed.system, S, step.q, step.v, self._a, self._lam, self._rank):
-            raise SolverError(f"the equations of motion are singular at t = {self._t:.9g} s.")
-        step.a[:] += self._a - step.vd
-        step.vd[:], step.lam[:], step.lost[:] = self._a, self._lam, S.power
+        if inputs.signals:
+            inputs.write(np.array([self._t]), S.signal[None])
+        apply_laws(self._packed.asked, S, self._t)
 
-    def _go(self, n: int) -> None:
+    def _go(self, n: int, jumps: bool) -> None:
         """Take n steps."""
-        record, step, asked = self._record, self._step, self._packed.asked
+        record, W, step, asked = self._record, self._W, self._step, self._packed.asked
         while n:
             most = n
             if self._samples:
                 record.t = self._t
-                record.reach(state_of(record, self._W, step))
-                most = steps_up_to_sample(record, self._W, step, asked, n)
-            t, signals = self._ahead(most)
-            step.count[entry.STEPS_BEFORE] = step.count[entry.STEPS]
-            answer = advance(record, self._W, step, asked, (t, signals, self._spare))
-            if answer != alpha.CONVERGED:
-                taken = step.count[entry.STEPS] - step.count[entry.STEPS_BEFORE]
-                raise failed_step(record, self._W, step, answer, t[taken])
-            self._t, self._seen, n = float(t[-1]), False, n - most
-            self._S.signal[:] = signals[-1]
+                record.reach(state_of(record, W, step))
+                most = 0 if jumps else steps_up_to_sample(record, W, step, asked, n)
+            self._ahead(most)
+            while (answer := alpha.go_on(self._moved, self._at, most, jumps)) != alpha.CONVERGED:
+                t = record.settings.time(int(step.count[entry.STEPS]) + 1)
+                if answer != alpha.NEEDS_LAWS:
+                    raise failed_step(record, W, step, answer, t)
+                apply_laws(asked, W, t, slopes=not step.count[entry.HAS_FACTOR])
+            self._at, self._seen, n, jumps = self._at + most, True, n - most, False
+            self._t = self._times.item(self._at)
 
-    def _ahead(self, n: int) -> tuple[Array, Array]:
-        """Times (n,) and signals (n, s, 3) of the next steps."""
-        if self._at + n > self._times.size:
+    def _ahead(self, n: int) -> None:
+        """Have the signals of the next n steps, with the inputs as they are."""
+        if self._at + n >= self._times.size:
             self._sample(max(n, AHEAD))
         rows = slice(self._at, self._at + n)
         if rows.stop > self._good:
             raise self._failure or SolverError(f"no signals beyond t = {self._t:.9g} s.")
-        self._at += n
-        t, signals = self._times[rows], self._signals[rows]
-        self.inputs.write(t, signals)
-        return t, signals
+        if self.inputs.signals:
+            self.inputs.write(self._times[1:][rows], self._signals[rows])
 
     def _sample(self, n: int) -> None:
         """Ask the functions of time that are no inputs for the next n steps."""
         settings, done = self._record.settings, int(self._step.count[entry.STEPS])
-        t = settings.time(np.arange(done + 1, done + n + 1))
+        self._times = settings.time(np.arange(done, done + n + 1))
+        t = self._times[1:]
         others = tuple(self._packed.signals[k] for k in self.inputs.others)
         table, failure = sampled(others, padded(t), settings.span, settings.spacing)
         good = min(len(table), n)
@@ -399,7 +376,9 @@ class Stepper:
             good, failure = looked, late if looked < good else failure
         self._signals = np.zeros((n, len(self._packed.signals), 3))
         self._signals[:good, self.inputs.others] = table[:good]
-        self._times, self._at, self._good, self._failure = t, 0, good, failure
+        self._at, self._good, self._failure = 0, good, failure
+        memory = self._packed.system, self._W, self._step, self._system, self._S, self._signals
+        self._moved = alpha.Moved(*memory, self._packed.rows_solved(self._record.final.rank))
 
 
 def _copied(mechanism: Mechanism) -> Mechanism:
@@ -415,13 +394,14 @@ def _contents(mechanism: Mechanism) -> list[object]:
     return [(name, id(one)) for items in inside for name, one in items]
 
 
-def _room(packed: Packed) -> tuple[Step, Array]:
-    """A step memory whose numbers are one array, that array too."""
+def _room(packed: Packed, W: Work) -> tuple[Step, Work, Array]:
+    """A step memory and the work beside it, whose numbers to come back to are one array, it too."""
     q, n, m = packed.q.size, packed.v.size, packed.system.rows.kind.size
     sizes = {"q": q, "v": n, "a": n, "vd": n, "lam": m, "q1": q, "v1": n, "vd1": n, "lam1": m}
     sizes |= {"psi": n, "work": 3, "lost": 3, "size": 6, "method": 5, "bdf": 3, "past": 2 * n}
-    sizes["drift"] = n
+    sizes |= {"drift": n, "count": 12, "base": W.base.size}
     flat = np.zeros(sum(sizes.values()))
     pieces = dict(zip(sizes, np.split(flat, np.cumsum(list(sizes.values()))[:-1]), strict=True))
-    pieces["past"] = pieces["past"].reshape(2, 1, n)
-    return Step(count=np.zeros(12, dtype=np.int64), **pieces), flat
+    W = W.replace(base=pieces.pop("base"))
+    past, count = pieces.pop("past").reshape(2, 1, n), pieces.pop("count").view(np.int64)
+    return Step(past=past, count=count, **pieces), W, flat

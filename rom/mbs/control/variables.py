@@ -33,7 +33,7 @@ UNITS = {
 }
 Times = TypeVar("Times", float, Array)
 Reading = tuple[str, tuple[str, ...], int]  # what is asked, of what, which number of the answer
-Told = Array | tuple[float, float]  # some numbers
+Told = Array | tuple[Array, Array]  # some numbers
 Past = tuple[float, float, float]  # since when an acceleration holds, coordinate and rate then
 MARKER_OUTPUTS = (
     ("position", 3, "m", "world"),
@@ -135,11 +135,10 @@ class Inputs:
     def tell(self) -> None:
         """Tell motors and laws their values."""
         for place, values in self.told:
-            place[:] = values
+            place[...] = values
 
     def write(self, t: Array, signals: Array) -> None:
-        """Tell all their values: signals (n, s, 3) at times (n,) those of loads and drives."""
-        self.tell()
+        """Tell signals (n, s, 3) at times (n,) the values of loads and drives."""
         for k, values in self.signals.items():
             signals[:, k, : values.size] = values
         for k, held in self.motions.items():
@@ -311,15 +310,17 @@ class Outputs:
             found = _told(view, what, of)
             if callable(found):
                 self.computed.append((own, found, pick))
+            elif isinstance(found, tuple):
+                self.copied += [(own[k : k + 1], x) for k, x in enumerate(found[pick])]
             else:
                 self.copied.append((own, found[pick]))
 
     def read(self) -> Array:
         """(n,) all outputs after an evaluation of the mechanism."""
         for own, found in self.copied:
-            own[:] = found
+            own[...] = found
         for own, compute, pick in self.computed:
-            own[:] = compute()[pick]
+            own[...] = compute()[pick]
         return self.values
 
     def _marker(self, body: str, marker: str) -> None:
@@ -420,7 +421,7 @@ def _told(view: View, what: str, of: tuple[str, ...]) -> Told | Callable[[], Tol
         return _stress(view, *of)
     if what == "joint":
         k = packed.places.coordinate(of[0], dict(_coordinates(packed.places.joints[of[0]]))[of[1]])
-        return lambda: (W.x[k], W.xd[k])
+        return W.x[k : k + 1], W.xd[k : k + 1]
     if what not in ("reaction", "load"):
         return _of_body(view, what, *of)
     rows = packed.rows_of(*of)  # which stand behind each other

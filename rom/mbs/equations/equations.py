@@ -213,15 +213,6 @@ def accelerate(s, W, q, v, a, lam, rank):
 
 
 @kernel
-def accelerated(s, W, q, v, a, lam, rank):
-    """`factorise_motion` and `accelerate`; False when the equations are singular."""
-    if not factorise_motion(s, W, rank, False):
-        return False
-    accelerate(s, W, q, v, a, lam, rank)
-    return True
-
-
-@kernel
 def rates(s, W, y, rank, accepted, a, lam, out):  # noqa: PLR0913  compiled code has no keywords
     """Rates of coordinates, velocities and works in y; False when the equations are singular.
 

@@ -14,8 +14,10 @@ import numpy as np
 from numba import types
 
 from rom.mbs.equations.equations import (
+    accelerate,
     drive_power,
     evaluate,
+    factorise_motion,
     least_multipliers,
     load_columns,
     residual,
@@ -33,12 +35,13 @@ from rom.mbs.integrate.bdf import follow_increment, is_multistep, keep_past, pre
 from rom.mbs.integrate.index2 import close_gaps, fit_velocities, velocity_gaps
 from rom.mbs.kernels import work as entry
 from rom.mbs.kernels.algebra import dot, row, scale, spatial_tangent, unit, vec
-from rom.mbs.kernels.compiled import copy, inner
+from rom.mbs.kernels.compiled import copy, inner, kernel
 from rom.mbs.kernels.constraints import constraint_gradient
 from rom.mbs.kernels.coordinates import follow_coordinates
 from rom.mbs.kernels.markers import own_corner
 from rom.mbs.kernels.stages import REAL_MATRIX, stage
 from rom.mbs.kernels.system import ALONG, DISTANCE, POINT, ROLL, TOUCH, System
+from rom.mbs.kernels.tables import Array3, Table, table
 from rom.mbs.kernels.work import Step, Work
 from rom.model import Array
 
@@ -47,6 +50,7 @@ from rom.model import Array
 FEW_CORRECTIONS, CORRECTION_SIZE = 4, 60
 # what a corrector pass says
 UNFINISHED, CONVERGED, FAILED, NOT_FINITE, SINGULAR, NEEDS_LAWS = 0, 1, 2, 3, 4, 5
+NEVER = 2**62  # steps between two that are saved
 MAX_PASSES = 25
 # passes behind these, in which a correction is halved as long as it leaves forces and gaps more out
 # of balance than before: where friction turns round, and teeth, stops or films come and go, whole
@@ -436,3 +440,42 @@ def save(W, step, out, at):
     copy(step.vd, A[at])
     copy(step.lam, L[at])
     copy(step.work, X[at])
+
+
+@table
+class Moved(Table):
+    """What `go_on` moves, and sees: one table, for each is a cost of a call from Python."""
+
+    s: System
+    W: Work
+    step: Step
+    seen: System
+    S: Work  # of what is seen
+    signals: Array3  # of the next steps
+    rank: int  # of the constraints that are solved
+
+
+@kernel
+def go_on(moved, at, n, jumps):
+    """Take n steps by the signals from a row on, and evaluate at their end; answers as `advance`.
+
+    Before them, where inputs jump, to which S belongs, accelerations and multipliers do so too.
+    """
+    s, W, step, S, rank = moved.s, moved.W, moved.step, moved.S, moved.rank
+    if step.count[entry.LAWS_ASKED] == 0:
+        step.count[entry.STEPS_BEFORE] = step.count[entry.STEPS]
+        if jumps:
+            if not factorise_motion(s, S, rank, True):
+                return SINGULAR
+            accelerate(s, S, step.q, step.v, step.vd1, step.lam, rank)
+            for i in range(step.a.size):
+                step.a[i] += step.vd1[i] - step.vd[i]
+            copy(step.vd1, step.vd)
+            copy(S.power, step.lost)
+    nowhere = (W.S, W.S, W.S, W.S, W.S, W.S)  # nothing is saved
+    answer = advance(s, W, step, rank, moved.signals[at : at + n], NEVER, nowhere)
+    if answer == CONVERGED and n > 0:
+        copy(moved.signals[at + n - 1], S.signal)
+        copy(W.base, S.base)
+        evaluate(moved.seen, S, step.q, step.v)
+    return answer

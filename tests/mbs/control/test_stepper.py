@@ -16,6 +16,7 @@ from cases.mbs.parts import on_guide
 from cases.paths import ROOT
 from cases.refusals import refused
 from rom.body.recovery import StressRecovery
+from rom.mbs.control.stepper import AHEAD
 
 pytestmark = pytest.mark.filterwarnings("ignore::rom.errors.RomWarning")
 N = 40  # steps
@@ -199,6 +200,21 @@ def test_a_step_that_fails_leaves_all_as_it_was(wrong):
         assert steppers[0].t == steppers[1].t
     steppers[0].reset()
     assert_array_equal(steppers[0].step(gust), fresh().step(gust))
+
+
+def test_a_failure_where_functions_of_time_are_asked_anew_leaves_their_times_as_they_were():
+    steppers = [fresh(), fresh()]
+    for one in steppers:
+        one.reset()
+        one.advance(AHEAD - 4, 1e-2)
+    steppers[0].inputs.values[0] = 2.0
+    with pytest.raises(rom.SolverError):
+        steppers[0].advance(10, 1e-2)
+    steppers[0].inputs.values[0] = 0.0
+    for one in steppers:
+        one.advance(1, 1e-2)
+    assert steppers[0].t == steppers[1].t
+    assert_array_equal(*(one.read() for one in steppers))
 
 
 def test_two_steppers_of_one_mechanism_and_a_run_do_not_know_of_each_other():
