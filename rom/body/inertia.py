@@ -40,6 +40,11 @@ def fields_of(integrals: InertiaIntegrals) -> dict[str, Any]:
     return {name: getattr(integrals, name) for name in integrals.__slots__}
 
 
+def of_body(body: Any) -> InertiaIntegrals:
+    """The integrals that a body has."""
+    return InertiaIntegrals(*(getattr(body, name) for name in InertiaIntegrals.__slots__))
+
+
 def weighted(weights: Array, parts: Sequence[InertiaIntegrals]) -> InertiaIntegrals:
     """Integrals of bodies that share the shapes, their densities multiplied by the weights."""
     pairs = list(zip(weights, map(fields_of, parts), strict=True))

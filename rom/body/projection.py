@@ -7,6 +7,7 @@ from scipy.linalg import null_space
 from scipy.sparse import csr_matrix
 
 from rom.body.flexible import FlexibleBody
+from rom.body.frame import mode_labels
 from rom.body.inertia import InertiaIntegrals, fields_of, inertia_integrals, point_integrals
 from rom.body.nonlinear.cauchy import CauchyRecovery
 from rom.body.records import Marker, Patch, Provenance, Surface
@@ -87,7 +88,7 @@ def flexible_body(
         D=np.zeros((omega.size, omega.size)),
         markers={n: _marker(ops, model.interfaces[n], tie, E) for n, tie in ties.items()},
         omega=omega,
-        labels=tuple(f"mode {k + 1}, mean-axis frame" for k in range(omega.size)),
+        labels=mode_labels(omega.size, "mean-axis"),
         surface=surface,
         provenance=provenance,
     )
