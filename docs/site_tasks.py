@@ -59,7 +59,7 @@ TASKS: dict[str, tuple[str, str]] = {
         "Equal sectors, at rest and in rotation, with blades that are alike or not.",
         """CyclicSector cyclic_modes CyclicModes wheel_modes reduce_sector cyclic.ReducedSector
         supported_sector rotating_sector travelling_modes TravellingModes wheel_campbell
-        WheelCampbell mistuned_wheel MistunedWheel cyclic.whitehead substructured_sector
+        WheelCampbell wheel_body mistuned_wheel MistunedWheel cyclic.whitehead substructured_sector
         cyclic.SubstructuredSector reduced_blade ReducedBlade bladed_wheel BladedWheel
         cyclic.gyroscopic_modes cyclic.GyroscopicModes cyclic.divergence_speed
         cyclic.centrifugal_displacement cyclic.rotation_matrices""",

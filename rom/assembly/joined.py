@@ -12,7 +12,6 @@ from collections import Counter
 from dataclasses import replace
 from functools import reduce
 from operator import add
-from typing import Any
 
 import numpy as np
 from scipy.linalg import null_space
@@ -23,9 +22,9 @@ from rom.assembly.coupling import Coupling, Place
 from rom.body.flexible import FlexibleBody
 from rom.body.frame import mode_labels, recombined
 from rom.body.inertia import fields_of, of_body
-from rom.body.records import Surface
-from rom.body.recovery import StressRecovery
+from rom.body.recovery import StressRecovery, one_stress
 from rom.body.reference import moved_frame, rigid_elastic, rigid_mass
+from rom.body.surface import one_surface
 from rom.eigen.verbs import modes_within, whole_clusters
 from rom.errors import ConfigError, ModelError, warn
 from rom.model import Array, Row
@@ -144,8 +143,8 @@ def joined(
         markers=markers,
         omega=omega,
         labels=mode_labels(omega.size, "mean-axis"),
-        surface=_surfaces([part.surface for part in parts.values()]),
-        stress=_stresses([part.stress for part in parts.values()]),
+        surface=one_surface([part.surface for part in parts.values()]),
+        stress=one_stress([part.stress for part in parts.values()]),
         provenance={"reduction": {"method": method, "static shapes": statics}, "bodies": made},
     )
 
@@ -157,30 +156,6 @@ def _moved(body: FlexibleBody, shapes: Array, wanted: set[str]) -> FlexibleBody:
     part = moved_frame(recombined(replace(body, markers=markers, K_geo={}), Y), -X)
     stress = part.stress.moved(-X) if isinstance(part.stress, StressRecovery) else None
     return replace(part, stress=stress)
-
-
-def _surfaces(parts: list[Surface | None]) -> Surface | None:
-    """All surfaces in one; None unless every part has one."""
-    known = [part for part in parts if part is not None]
-    if len(known) < len(parts):
-        return None
-    first = np.cumsum([0, *(len(part.points) for part in known)])
-    triangles = [part.triangles + n for part, n in zip(known, first[:-1], strict=True)]
-    points, shapes = ([getattr(part, x) for part in known] for x in ("points", "shape"))
-    return Surface(np.vstack(points), np.vstack(triangles), np.vstack(shapes))
-
-
-def _stresses(parts: list[Any]) -> StressRecovery | None:
-    """The stress of all parts; None unless every part has it, and so for what is left out."""
-    known = [part for part in parts if part is not None]
-    if len(known) < len(parts):
-        return None
-    inertial = [part.inertial for part in known if part.inertial is not None]
-    return StressRecovery(
-        np.vstack([part.points for part in known]),
-        np.vstack([part.operator for part in known]),
-        np.vstack(inertial) if len(inertial) == len(parts) else None,
-    )
 
 
 def matrix_rows(body: FlexibleBody, R: Array, V: Array, M: Array) -> list[Row]:
