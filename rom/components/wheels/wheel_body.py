@@ -8,6 +8,10 @@ by two real shapes::
 Integrals of the fields 1, x, a and b over one sector are computed once; those of the wheel are
 their combinations, turned into the axes of the wheel and added up. The hub is at rest in all
 shapes: with its rigid motion they are the Craig-Bampton basis of a wheel whose hub is rigid.
+
+Source:
+    Thomas, Dynamics of rotationally periodic structures, Int. J. Numer. Meth. Engng. 14 (1979) 81,
+    for the waves; the sums of integrals over turned sectors are ours.
 """
 
 from collections.abc import Sequence
