@@ -146,8 +146,8 @@ SUBJECTS = {
     periodic isotropy best_matching study""",
     "Large deflection and metal forming": """large_deflection flexure snap_through spin_up sheet
     forming""",
-    "Rotating blades, wheels and rotors": """rotating_blade bladed_disk mistuning lost_tip
-    bent_blade rotor""",
+    "Rotating blades, wheels and rotors": """rotating_blade bladed_disk bladed_rotor mistuning
+    lost_tip bent_blade rotor""",
     "Gears and bearings": "planetary transmission two_stage oil_inlet",
     "Wind turbines": "wind_turbine whole_turbine wind_power",
     "Models and measurements": "updating bolted_frame virtual_sensing",
