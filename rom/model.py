@@ -50,6 +50,23 @@ class Rotations:
         return Rotations(place[here], self.axes[here], self.dofs[here]) if here.size else None
 
 
+def rigid_motions(points: Array, rotations: Rotations | None = None, n: int | None = None) -> Array:
+    """(n, 6) motions of points (k, 3) [m]: unit translations [1], rotations about zero [m].
+
+    The first 3 k rows are theirs, those of their rotations come next; the rest has no place.
+    """
+    R = np.zeros((points.size if n is None else n, 6))
+    moved = R[: points.size].reshape(-1, 3, 6)
+    moved[:, :, :3] = np.eye(3)
+    x, y, z = points.T
+    moved[:, 1, 3], moved[:, 2, 3] = -z, y
+    moved[:, 0, 4], moved[:, 2, 4] = z, -x
+    moved[:, 0, 5], moved[:, 1, 5] = -y, x
+    if rotations is not None:
+        R[points.size : points.size + len(rotations.axes), 3:] = rotations.axes
+    return R
+
+
 @typed
 @dataclass(frozen=True, slots=True)
 class Interface:
@@ -90,6 +107,10 @@ class Interface:
         return (
             displacements if self.rotations is None else np.r_[displacements, self.rotations.dofs]
         )
+
+    def rigid_motions(self, about: Array | float = 0.0) -> Array:
+        """(3k + t, 6) motions of its dofs while it is rigid, turning about a point (3,) [1, m]."""
+        return rigid_motions(self.points - about, self.rotations, self.dofs.size)
 
     @property
     def area(self) -> float:
@@ -216,6 +237,10 @@ class FEModel:
     def interface_names(self) -> tuple[str, ...]:
         """Names of the interfaces."""
         return tuple(self.interfaces)
+
+    def rigid_motions(self, about: Array | float = 0.0) -> Array:
+        """(n, 6) rigid motions of all its dofs, rotations about a point (3,) [1, m]."""
+        return rigid_motions(self.points - about, self.rotations, self.n_dofs)
 
     def mass(self) -> float:
         """Total mass with attachments [kg]; under mpirun to be called on all ranks.

@@ -23,10 +23,9 @@ from typing import Any
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 
-from rom.body.reference import skew_tensor
 from rom.eigen.verbs import Operators, column_blocks, given_rigid_motions
 from rom.model import Array, FEModel
-from rom.rotation import crossed
+from rom.rotation import crossed, skew_tensor
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +47,11 @@ class InertiaIntegrals:
 def fields_of(integrals: InertiaIntegrals) -> dict[str, Any]:
     """The integrals by their names, which bodies have as well."""
     return {name: getattr(integrals, name) for name in integrals.__slots__}
+
+
+def of_body(body: Any) -> InertiaIntegrals:
+    """The integrals that a body has."""
+    return InertiaIntegrals(*(getattr(body, name) for name in InertiaIntegrals.__slots__))
 
 
 def weighted(weights: Array, parts: Sequence[InertiaIntegrals]) -> InertiaIntegrals:

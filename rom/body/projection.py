@@ -8,6 +8,7 @@ from scipy.linalg import null_space
 from scipy.sparse import csr_matrix
 
 from rom.body.flexible import FlexibleBody
+from rom.body.frame import mode_labels
 from rom.body.inertia import (
     InertiaIntegrals,
     fields_of,
@@ -24,7 +25,6 @@ from rom.eigen.verbs import (
     Operators,
     dofs_of,
     given_rigid_motions,
-    interface_motions,
     massless,
     mean_motion,
     modes_within,
@@ -102,7 +102,7 @@ def flexible_body(
         D=np.zeros((omega.size, omega.size)),
         markers={n: _marker(ops, model.interfaces[n], tie, E) for n, tie in ties.items()},
         omega=omega,
-        labels=tuple(f"mode {k + 1}, mean-axis frame" for k in range(omega.size)),
+        labels=mode_labels(omega.size, "mean-axis"),
         surface=surface,
         provenance=provenance,
     )
@@ -132,7 +132,7 @@ def carried_integrals(model: FEModel, ops: Operators, E: Array) -> list[InertiaI
 def _marker(ops: Operators, interface: Interface, tie: Tie, E: Array) -> Marker:
     U = ops.rows(E, interface.dofs)
     motion = mean_motion(interface) @ U
-    hold = np.hstack([tie.coordinates @ interface_motions(interface), tie.coordinates @ U])
+    hold = np.hstack([tie.coordinates @ interface.rigid_motions(), tie.coordinates @ U])
     patch = None
     if tie.label not in ("rbe2", "rbe3"):  # its coordinates let the surface deform
         shapes = csr_matrix(tie.by_masters).toarray() if tie.removed.size else None

@@ -13,7 +13,8 @@ from scipy.linalg import eigh, qr
 from scipy.sparse import csr_matrix, identity, kron
 
 from rom.errors import InterfaceError, ModelError
-from rom.model import Array, Index, Interface, Mask, Rotations
+from rom.model import Array, Index, Interface, Mask
+from rom.model import rigid_motions as rigid_motions
 
 Value = TypeVar("Value")
 Product = Callable[[Array, Array], Array]
@@ -358,32 +359,6 @@ def dofs_of(nodes: Index) -> Index:
     return (3 * nodes[:, None] + np.arange(3)).ravel()
 
 
-def rigid_motions(points: Array) -> Array:
-    """(3k, 6) motions of points (k, 3) [m]: unit translations [1], rotations about zero [m]."""
-    R = np.zeros((points.shape[0], 3, 6))
-    R[:, :, :3] = np.eye(3)
-    x, y, z = points.T
-    R[:, 1, 3], R[:, 2, 3] = -z, y
-    R[:, 0, 4], R[:, 2, 4] = z, -x
-    R[:, 0, 5], R[:, 1, 5] = -y, x
-    return R.reshape(-1, 6)
-
-
-def all_motions(points: Array, rotations: Rotations | None, n: int) -> Array:
-    """(n, 6) rigid motions of points (k, 3), of their rotations, and of what has no place."""
-    R = np.zeros((n, 6))
-    R[: points.size] = rigid_motions(points)
-    if rotations is not None:
-        R[points.size : points.size + len(rotations.axes), 3:] = rotations.axes
-    return R
-
-
-def interface_motions(interface: Interface, about: Array | float = 0.0) -> Array:
-    """(3k + t, 6) motions of the dofs of a rigid interface, its rotations about a point (3,)."""
-    n = interface.dofs.size
-    return all_motions(interface.points - about, interface.rotations, n)
-
-
 def modes_within(N: Array, K: Array, M: Array) -> tuple[Array, Array]:
     """Eigenvalues (m,) [rad^2/s^2], ascending, and modes (k, m) of small matrices (k, k).
 
@@ -433,7 +408,7 @@ def mean_motion(interface: Interface) -> Array:
     """
     x = interface.points - interface.origin
     size = np.linalg.norm(x, axis=1).max(initial=0.0) or 1.0
-    R = interface_motions(interface, interface.origin) / np.r_[np.ones(3), np.full(3, size)]
+    R = interface.rigid_motions(interface.origin) / np.r_[np.ones(3), np.full(3, size)]
     area = np.asarray(interface.surface_mass.sum(axis=1)).ravel()
     SR, n = np.zeros(R.shape), x.size
     SR[:n] = kron(interface.surface_mass, identity(3)) @ R[:n]

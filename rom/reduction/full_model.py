@@ -12,7 +12,6 @@ from rom.eigen.scipy import SciPyOperators
 from rom.eigen.supports import Fixed, Springs, refuse_loose, spring_matrices, supports
 from rom.eigen.verbs import (
     Operators,
-    all_motions,
     column_blocks,
     given_rigid_motions,
     held_rows,
@@ -27,12 +26,7 @@ def mesh_operators(model: FEModel) -> Operators:
     """The operator verbs on the finite elements of a model, attachments left out."""
     if model.operators is not None:
         return model.operators
-    return SciPyOperators(model.K, model.M, rigid_motions_of(model))
-
-
-def rigid_motions_of(model: FEModel) -> Array:
-    """(n, 6) rigid motions of all dofs of a model [1, m]."""
-    return all_motions(model.points, model.rotations, model.n_dofs)
+    return SciPyOperators(model.K, model.M, model.rigid_motions())
 
 
 def operators(model: FEModel) -> Operators:

@@ -1,6 +1,6 @@
 """Structures whose nodes turn, from matrices of other programs: beams and plates as files.
 
-The frame and the plate are assembled in `cases.frames`; what is known of them from outside is
+The frame and the plate are assembled in `cases.mbs.frames`; what is known of them from outside is
 beam theory, Kirchhoff's plate, and the mass of what is drawn.
 """
 
@@ -15,9 +15,8 @@ from scipy.io import mmwrite
 from scipy.sparse import block_diag, csr_matrix, diags
 
 import rom
-from cases.frames import Section, cantilever, frame, interface, plate
+from cases.mbs.frames import Section, cantilever, frame, interface, plate
 from cases.refusals import refuses
-from rom.eigen.verbs import all_motions
 from rom.errors import FileFormatError, ModelError, QualityGateError
 from rom.io.matrices.dmig import write_dmig
 from rom.io.matrices.matrix_files import write_abaqus_matrix
@@ -296,7 +295,7 @@ def test_shells_of_calculix_vibrate_as_it_says(shape, tmp_path):
     body = rom.reduce(model, interfaces={"root": "rbe2", "tip": "rbe3"})
     assert body.mass == pytest.approx(7850 * h * area, rel=1e-6)
     assert body.certificate.ok, body.certificate
-    R = all_motions(points, model.rotations, model.n_dofs)
+    R = model.rigid_motions()
     assert_allclose(body.inertia, (R.T @ model.M @ R)[3:, 3:], rtol=1e-9, atol=1e-12)
     kinds = {"root": "rbe2", "tip": "rbe3"}
     every = rom.reduce(model, method=rom.CraigBampton(150), interfaces=kinds, certify=False)

@@ -10,7 +10,6 @@ from scipy.sparse import block_diag, bsr_matrix, csr_matrix, diags, identity, kr
 from scipy.spatial import cKDTree
 
 from rom.arguments import symmetric, typed
-from rom.eigen.verbs import all_motions
 from rom.errors import (
     ConfigError,
     FileFormatError,
@@ -284,10 +283,9 @@ def _check_mass(model: FEModel) -> None:
 
 def _motions(model: FEModel) -> Array:
     """(n, 6) rigid motions, rotations about the middle of the nodes, as large as translations."""
-    X = model.points - model.points.mean(axis=0)
-    size = max(np.abs(X).max(), 1e-300)
-    R = all_motions(X, model.rotations, model.n_dofs)
-    R[:, 3:] /= size
+    centre = model.points.mean(axis=0)
+    R = model.rigid_motions(centre)
+    R[:, 3:] /= max(np.abs(model.points - centre).max(), 1e-300)
     return R
 
 

@@ -9,7 +9,7 @@ from scipy.sparse import identity, kron
 
 from rom.eigen.connection import Tie
 from rom.eigen.supports import full_kind
-from rom.eigen.verbs import interface_motions, mean_motion
+from rom.eigen.verbs import mean_motion
 from rom.errors import ConfigError, InterfaceError, ResourceError
 from rom.model import Array, Interface
 from rom.names import is_whole
@@ -35,7 +35,7 @@ def tie(interface: Interface, kind: Any) -> Tie:
         itself, nothing = identity(interface.dofs.size, format="csr"), np.zeros((0, 0))
         return Tie(full_kind(interface), names, itself, NO_DOFS, nothing, NO_DOFS, nothing)
     if kind == "rbe2":
-        R = interface_motions(interface, interface.origin)
+        R = interface.rigid_motions(interface.origin)
         return _stiff(interface, "rbe2", SIX_LABELS, mean_motion(interface), R)
     if kind == "rbe3":
         return _averaged(interface)
