@@ -1,7 +1,7 @@
 """Structures whose nodes turn, from matrices of other programs: beams and plates as files.
 
-The frame and the plate are assembled in `cases.mbs.frames`; what is known of them from outside is
-beam theory, Kirchhoff's plate, and the mass of what is drawn.
+The frame and the plate are assembled in `cases.structures.frames`; what is known of them from
+outside is beam theory, Kirchhoff's plate, and the mass of what is drawn.
 """
 
 import shutil
@@ -15,8 +15,8 @@ from scipy.io import mmwrite
 from scipy.sparse import block_diag, csr_matrix, diags
 
 import rom
-from cases.mbs.frames import Section, cantilever, frame, interface, plate
 from cases.refusals import refuses
+from cases.structures.frames import Section, cantilever, frame, interface, plate
 from rom.errors import FileFormatError, ModelError, QualityGateError
 from rom.io.matrices.dmig import write_dmig
 from rom.io.matrices.matrix_files import write_abaqus_matrix
