@@ -59,7 +59,7 @@ TASKS: dict[str, tuple[str, str]] = {
         "Equal sectors, at rest and in rotation, with blades that are alike or not.",
         """CyclicSector cyclic_modes CyclicModes wheel_modes reduce_sector cyclic.ReducedSector
         supported_sector rotating_sector travelling_modes TravellingModes wheel_campbell
-        WheelCampbell mistuned_wheel MistunedWheel cyclic.whitehead substructured_sector
+        WheelCampbell wheel_body mistuned_wheel MistunedWheel cyclic.whitehead substructured_sector
         cyclic.SubstructuredSector reduced_blade ReducedBlade bladed_wheel BladedWheel
         cyclic.gyroscopic_modes cyclic.GyroscopicModes cyclic.divergence_speed
         cyclic.centrifugal_displacement cyclic.rotation_matrices""",
@@ -146,8 +146,8 @@ SUBJECTS = {
     periodic isotropy best_matching study""",
     "Large deflection and metal forming": """large_deflection flexure snap_through spin_up sheet
     forming""",
-    "Rotating blades, wheels and rotors": """rotating_blade bladed_disk mistuning lost_tip
-    bent_blade rotor""",
+    "Rotating blades, wheels and rotors": """rotating_blade bladed_disk bladed_rotor mistuning
+    lost_tip bent_blade rotor""",
     "Gears and bearings": "planetary transmission two_stage oil_inlet",
     "Wind turbines": "wind_turbine whole_turbine wind_power",
     "Models and measurements": "updating bolted_frame virtual_sensing",

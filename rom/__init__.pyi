@@ -74,6 +74,7 @@ from rom.components.wheels.travelling import TravellingModes as TravellingModes
 from rom.components.wheels.travelling import WheelCampbell as WheelCampbell
 from rom.components.wheels.travelling import travelling_modes as travelling_modes
 from rom.components.wheels.travelling import wheel_campbell as wheel_campbell
+from rom.components.wheels.wheel_body import wheel_body as wheel_body
 from rom.config.component import read_component as read_component
 from rom.config.examples import example as example
 from rom.config.mechanism import read_mechanism as read_mechanism

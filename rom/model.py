@@ -28,6 +28,47 @@ OWN_FRAME = "frame of the body"  # the marker that is the frame a body was given
 
 @typed
 @dataclass(frozen=True, slots=True)
+class Rotations:
+    """Dofs that turn a node, of beams and shells; each about one axis.
+
+    Attributes:
+        nodes: (t,) which node each turns: its row in the points of what has these rotations.
+        axes: (t, 3) unit vectors in the body frame, orthogonal for one node.
+        dofs: (t,) their numbers, behind those of all displacements.
+    """
+
+    nodes: Index
+    axes: Array
+    dofs: Index
+
+    def of(self, nodes: Index) -> "Rotations | None":
+        """Those of some nodes (k,), counted there; None where none of these turns."""
+        order = np.argsort(nodes)
+        place = order[np.searchsorted(nodes, self.nodes, sorter=order) % nodes.size]
+        here = np.flatnonzero(nodes[place] == self.nodes)
+        here = here[np.argsort(place[here], kind="stable")]
+        return Rotations(place[here], self.axes[here], self.dofs[here]) if here.size else None
+
+
+def rigid_motions(points: Array, rotations: Rotations | None = None, n: int | None = None) -> Array:
+    """(n, 6) motions of points (k, 3) [m]: unit translations [1], rotations about zero [m].
+
+    The first 3 k rows are theirs, those of their rotations come next; the rest has no place.
+    """
+    R = np.zeros((points.size if n is None else n, 6))
+    moved = R[: points.size].reshape(-1, 3, 6)
+    moved[:, :, :3] = np.eye(3)
+    x, y, z = points.T
+    moved[:, 1, 3], moved[:, 2, 3] = -z, y
+    moved[:, 0, 4], moved[:, 2, 4] = z, -x
+    moved[:, 0, 5], moved[:, 1, 5] = -y, x
+    if rotations is not None:
+        R[points.size : points.size + len(rotations.axes), 3:] = rotations.axes
+    return R
+
+
+@typed
+@dataclass(frozen=True, slots=True)
 class Interface:
     """Nodes through which a body touches the rest of the mechanism.
 
@@ -41,6 +82,7 @@ class Interface:
             where the geometry knows them as cylinders; else the centroid of the surface, or the
             point chosen by the user.
         axis: (3,) unit direction of the axis of such cylinders; None for other surfaces.
+        rotations: those of its nodes; None for solids.
     """
 
     name: str
@@ -49,6 +91,7 @@ class Interface:
     surface_mass: Any
     origin: Array
     axis: Array | None = None
+    rotations: Rotations | None = None
 
     def __post_init__(self) -> None:
         check_text(self.name, "an interface", InterfaceError)
@@ -59,8 +102,15 @@ class Interface:
 
     @property
     def dofs(self) -> Index:
-        """(3k,) dof numbers, node by node: ``3*node + axis``."""
-        return (3 * self.nodes[:, None] + np.arange(3)).ravel()
+        """(3k + t,) dof numbers, node by node: ``3*node + axis``; then those of the rotations."""
+        displacements = (3 * self.nodes[:, None] + np.arange(3)).ravel()
+        return (
+            displacements if self.rotations is None else np.r_[displacements, self.rotations.dofs]
+        )
+
+    def rigid_motions(self, about: Array | float = 0.0) -> Array:
+        """(3k + t, 6) motions of its dofs while it is rigid, turning about a point (3,) [1, m]."""
+        return rigid_motions(self.points - about, self.rotations, self.dofs.size)
 
     @property
     def area(self) -> float:
@@ -130,13 +180,15 @@ class Layered:
 class FEModel:
     """Linear finite element model of one free body, no boundary condition applied.
 
+    The first 3 k dofs displace its k nodes, dof ``3*i + a`` node i along axis a. Rotations of
+    nodes come next, and last coordinates without a place, as those of modes in superelements.
+
     Attributes:
         K: (n, n) stiffness [N/m], symmetric, with the six rigid motions in its null space;
             SciPy sparse, or a PETSc matrix distributed over the ranks.
-        M: (n, n) mass [kg], symmetric positive definite; of the mesh alone when ``attachments``
-            are given.
-        points: (n/3, 3) reference coordinates in the body frame [m], the same on all ranks; dof
-            ``3*i + a`` is axis a of node i.
+        M: (n, n) mass [kg], symmetric, positive definite but for rotations without inertia; of
+            the mesh alone when ``attachments`` are given.
+        points: (k, 3) reference coordinates in the body frame [m], the same on all ranks.
         interfaces: interfaces by name.
         attachments: point masses and rigid bodies carried by interfaces.
         surface: outer surface for pictures; None when there is none.
@@ -145,6 +197,8 @@ class FEModel:
         stresses: evaluates stress of displacements, `rom.fe.forms.stress.Stresses`; None for a
             model without finite elements.
         regions: {name: share of the region}, for parameters; empty when they are not known.
+        rotations: which dofs turn nodes; None for solids.
+        n_scalars: number of coordinates without a place.
     """
 
     K: Any
@@ -157,6 +211,8 @@ class FEModel:
     operators: Any = None
     stresses: Any = None
     regions: Mapping[str, "Region"] = field(default_factory=dict)
+    rotations: Rotations | None = None
+    n_scalars: int = 0
 
     def __repr__(self) -> str:
         return (
@@ -173,13 +229,18 @@ class FEModel:
 
     @property
     def n_dofs(self) -> int:
-        """Number of displacement dofs of the whole model."""
-        return 3 * self.points.shape[0]
+        """Number of dofs of the whole model."""
+        turning = 0 if self.rotations is None else self.rotations.dofs.size
+        return 3 * self.points.shape[0] + turning + self.n_scalars
 
     @property
     def interface_names(self) -> tuple[str, ...]:
         """Names of the interfaces."""
         return tuple(self.interfaces)
+
+    def rigid_motions(self, about: Array | float = 0.0) -> Array:
+        """(n, 6) rigid motions of all its dofs, rotations about a point (3,) [1, m]."""
+        return rigid_motions(self.points - about, self.rotations, self.n_dofs)
 
     def mass(self) -> float:
         """Total mass with attachments [kg]; under mpirun to be called on all ranks.
@@ -192,7 +253,8 @@ class FEModel:
         """
         carried = sum(a.mass for a in self.attachments)
         if self.operators is None:
-            return float(self.M[::3][:, ::3].sum()) + carried
+            x = slice(0, 3 * len(self.points), 3)
+            return float(self.M[x][:, x].sum()) + carried
         along_x = np.zeros((self.operators.n_local, 1))
         along_x[::3] = 1.0
         return self.operators.gram(along_x, self.operators.apply_M(along_x)).item() + carried

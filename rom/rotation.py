@@ -25,6 +25,11 @@ def axial(S: npt.ArrayLike) -> Array:
     return 0.5 * crossed(np.asarray(S, dtype=float).T)
 
 
+def skew_tensor() -> Array:
+    """(3, 3, 3): skew(w)_ab = sum_c tensor[a, b, c] w_c."""
+    return np.stack([skew(e) for e in np.eye(3)], axis=-1)
+
+
 def crossed(S: Array) -> Array:
     """(3, ...) integral of u x v from the (3, 3, ...) integrals of u_a v_b, in their units."""
     return np.array([S[1, 2] - S[2, 1], S[2, 0] - S[0, 2], S[0, 1] - S[1, 0]])

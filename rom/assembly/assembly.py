@@ -1,13 +1,13 @@
 """Reduced bodies coupled where they touch: modes of the whole from its parts."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from scipy.linalg import block_diag
 
-from rom.arguments import lowest, one_of, typed, whole
+from rom.arguments import lowest, matrix, not_both, one_of, typed, whole
 from rom.assembly.condensed import (
     CondensedAssembly,
     Partition,
@@ -19,10 +19,20 @@ from rom.assembly.condensed import (
     per_body,
 )
 from rom.assembly.coupling import Place, coupled_rows, rows_of_parts
+from rom.assembly.joined import (
+    elastic_modes,
+    interface_places,
+    joined,
+    kept_motions,
+    matrix_rows,
+    refuse_loose,
+)
+from rom.body.damping import ModalDamping, Rayleigh, damped
 from rom.body.flexible import FlexibleBody
 from rom.body.records import Marker, n_rigid_motions, still_motions
+from rom.body.reference import MEAN_AXES
 from rom.errors import ConfigError, warn
-from rom.model import Array, Modes, Report
+from rom.model import Array, Modes, Report, Row
 from rom.names import check_known, check_once, named
 from rom.rows import N_COMPARED, frequency_rows, row
 
@@ -163,7 +173,80 @@ class Assembly:
         table = {"reduced": few.tolist(), "full": self._elastic(few.size, fixed).tolist()}
         rows = tuple(frequency_rows(f"{n} interface functions", table))
         report = Report("certificate of the condensed assembly", rows)
-        return CondensedAssembly(level, n, omega, basis, M, K, self._widths(), n_rigid, report)
+        return CondensedAssembly(
+            level, n, omega, basis, M, K, self._widths(), n_rigid, report, self
+        )
+
+    def body(
+        self,
+        name: str = "assembly",
+        *,
+        interfaces: tuple[Place, ...] | dict[str, Place] | None = None,
+        n_modes: int | None = None,
+        f_max: float | None = None,
+        reference: object = "mean-axis",
+        damping: Rayleigh | ModalDamping | None = None,
+        within: Array | None = None,
+    ) -> FlexibleBody:
+        """One flexible body of all, for a mechanism; its integrals follow from those of its parts.
+
+        It has all shapes of the assembly, unless a number or a frequency limits those that hold its
+        interfaces: a Craig-Bampton basis of the whole, whose statics stay exact. Geometric
+        stiffness of the bodies is left out.
+
+        Args:
+            name: of the body.
+            interfaces: (body, interface) pairs it keeps, or {name: pair}; those that nothing is
+                coupled to unless given. Two of one name become "left.bore" and "right.bore".
+            n_modes: number of modes that hold these interfaces; a repeated frequency is kept whole.
+            f_max: alternatively, all such modes up to this frequency [Hz].
+            reference: how its frame follows it, see `FlexibleBody.with_reference`.
+            damping: in place of that of the bodies.
+            within: (n, m) motions in coordinates of all bodies, among which shapes are sought; all
+                that close the couplings unless given.
+
+        Raises:
+            ConfigError: for both n_modes and f_max, or motions without the rigid ones.
+            InterfaceError: if an interface is unknown.
+            ModelError: if bodies can move against each other without strain.
+
+        Warns:
+            RomWarning: if geometric stiffness is left out, or the certificate fails.
+        """
+        not_both("Assembly.body", n_modes=n_modes, f_max=f_max)
+        places = interface_places(self.bodies, self.couplings, interfaces)
+        conditions, n_c = self.conditions(tuple(places.values())), sum(self.n_conditions)
+        refuse_loose(self.bodies, conditions[:n_c])
+        R = np.vstack([np.eye(width, 6) for width in self._widths().values()])
+        M, K = self._matrices()
+        N = self._free(()) if within is None else matrix("within", within, (len(M), None))
+        n_rigid, most = self._n_rigid(tuple(places.values())), (n_modes, f_max)
+        N = kept_motions(N, conditions[n_c:], (M, K), n_rigid, most)
+        omega, V = elastic_modes(N, R, (M, K))
+        body = joined(name, self.bodies, omega, V, places)
+        rows = matrix_rows(body, R, V, M)
+        if reference not in MEAN_AXES:
+            body = body.with_reference(reference)
+        if damping is not None:
+            body = damped(body, damping)
+        own = Report(f"certificate of {name}", (*rows, *self._compared(body, places)))
+        own.warn_of_failures(f"the certificate of body {name!r}")
+        report = replace(own, rows=(*self.certificate.rows, *own.rows))
+        return replace(body, certificate=report)
+
+    def _compared(self, body: FlexibleBody, places: dict[str, Place]) -> list[Row]:
+        """Frequencies of a body against those of the assembly, free and held by each interface."""
+        rows = []
+        held = places if body.has_static_shapes else {}
+        for fixed in ({}, *({name: place} for name, place in held.items())):
+            omega = body.modes(fixed=tuple(fixed)).omega
+            found = omega[omega > 0][:N_COMPARED]
+            full = self._elastic(found.size, tuple(fixed.values()))
+            support = f"{' + '.join(fixed)} held" if fixed else "free"
+            if found.size:
+                table = {"reduced": found.tolist(), "full": full.tolist()}
+                rows += frequency_rows(support, table)
+        return rows
 
     def _elastic(self, n: int, fixed: tuple[Place, ...]) -> Array:
         """(n,) lowest circular frequencies that are not those of rigid motions [rad/s]."""

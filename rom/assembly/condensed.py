@@ -14,12 +14,14 @@ Source:
 """
 
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from scipy.linalg import block_diag, eigh
 
 from rom.arguments import lowest
+from rom.body.flexible import FlexibleBody
 from rom.eigen.verbs import modes_within, whole_clusters
 from rom.model import Array, Modes, Report
 from rom.reduction.bases.selection import reduced_modes
@@ -55,6 +57,7 @@ class CondensedAssembly:
         widths: {body: number of its coordinates}.
         n_rigid: rigid motions that the supports leave free.
         certificate: frequencies against the assembly with all its interface coordinates.
+        assembly: the one that was reduced.
     """
 
     level: str
@@ -66,6 +69,7 @@ class CondensedAssembly:
     widths: dict[str, int]
     n_rigid: int
     certificate: Report
+    assembly: Any = field(repr=False)
 
     def frequencies(self, n: int | None = None) -> Array:
         """(k,) natural frequencies [Hz], lowest first; None for all."""
@@ -76,6 +80,14 @@ class CondensedAssembly:
         omega, V = natural_modes(self.M, self.K, self.n_rigid)
         kept = lowest(n)
         return Modes(omega[kept], per_body(self.widths, self.basis @ V[:, kept]))
+
+    def body(self, name: str = "assembly", **options: Any) -> FlexibleBody:
+        """One body with these interface functions, of an assembly without supports.
+
+        Arguments and errors as of `Assembly.body`.
+        """
+        found: FlexibleBody = self.assembly.body(name, within=self.basis, **options)
+        return found
 
 
 def natural_modes(M: Array, K: Array, n_rigid: int) -> tuple[Array, Array]:

@@ -12,9 +12,11 @@ from scipy.sparse import block_diag
 from scipy.spatial import cKDTree
 
 from rom.body.records import Marker, Patch
+from rom.eigen.supports import FULL_TURNING
 from rom.eigen.verbs import dofs_of, new_part
 from rom.errors import InterfaceError
 from rom.model import Array, Index, Interface, Row
+from rom.names import named
 
 Place = tuple[str, str]  # body, interface
 Coupling = tuple[Place, Place]
@@ -72,6 +74,8 @@ def projected_rows(one: Marker, other: Marker, projection: Any) -> tuple[Array, 
         the whole interface as multipliers.
     """
     a, b = one.patch, other.patch
+    if turning := [m.name for m in (one, other) if m.kind.startswith(FULL_TURNING)]:
+        raise unlike(f"nodes of interface {named(turning)} turn, and functions only displace")
     V_a, V_b, Q_a, Q_b = _common_functions(a, b, projection)
     SQ_a, SQ_b = a.surface_mass @ Q_a, b.surface_mass @ Q_b
     # V = Q T with T = Q^T S V on either side; coefficients of V, in multiples of T_a
@@ -122,7 +126,10 @@ def _equal_coordinates(
     """Rows of the coordinates, if they mean the same on both sides; None otherwise."""
     one_shapes, other_shapes = one.patch.shapes, other.patch.shapes
     if one_shapes is None or other_shapes is None:
-        return None if order is None else (one.hold, other.hold[dofs_of(order)])
+        n, k = len(other.hold), other.patch.points.size
+        if order is None or n != len(one.hold) or n % k:  # not all nodes turn
+            return None
+        return one.hold, other.hold.reshape(n // k, k, -1)[:, dofs_of(order)].reshape(n, -1)
     if one.hold.shape[0] != other.hold.shape[0]:
         return None
     if order is None:

@@ -121,7 +121,9 @@ def _coordinates(body: BodyData, marker: Marker, f: Factors) -> Array:
     """(n_c,) factors of the coordinates: displacements, rotations, or functions of unit norm."""
     n = marker.hold.shape[0]
     if marker.patch is not None:  # functions q with integral of q^2 = 1 have coefficients in m^2
-        return np.full(n, f.length if marker.patch.shapes is None else f.length**2)
+        if marker.patch.shapes is not None:
+            return np.full(n, f.length**2)
+        return np.where(np.arange(n) < marker.patch.points.size, f.length, 1.0)
     if n == N_INTERFACE_COORDINATES:
         return np.asarray(f.length**SIX)
     text = f"interface {marker.name!r} of body {body.name!r} has {n} coordinates {marker.kind!r}"

@@ -96,6 +96,17 @@ def _on_normal_modes(body: Body) -> tuple[Body, Array]:
     lam, V = eigh(body.K, body.M)
     omega = np.sqrt(np.maximum(lam, 0.0))
     V = V * np.sign(V[np.argmax(np.abs(V), axis=0), np.arange(V.shape[1])])
+    labels = mode_labels(omega.size, body.reference)
+    return replace(recombined(body, V), K=np.diag(omega**2), omega=omega, labels=labels), V
+
+
+def mode_labels(r: int, reference: str) -> tuple[str, ...]:
+    """What r normal modes are called, seen from the frame of a reference condition."""
+    return tuple(f"mode {k + 1}, {reference} frame" for k in range(r))
+
+
+def recombined(body: Body, V: Array) -> Body:
+    """The body in other elastic coordinates, q = V q_new with V (r, m), and its old labels."""
     markers = {
         name: replace(
             m,
@@ -110,19 +121,16 @@ def _on_normal_modes(body: Body) -> tuple[Body, Array]:
         surface = replace(surface, shape=surface.shape @ V)
     stress = body.stress.recombined(V) if isinstance(body.stress, StressRecovery) else None
     S_kl = np.einsum("abkl,km,ln->abmn", body.S_kl, V, V, optimize=True)
-    D = V.T @ body.D @ V
-    found = replace(
+    K, D = (V.T @ A @ V for A in (body.K, body.D))
+    return replace(
         body,
         S=body.S @ V,
         Ibar_kl=body.Ibar_kl @ V,
         S_kl=0.5 * (S_kl + S_kl.transpose(1, 0, 3, 2)),
-        K=np.diag(omega**2),
+        K=0.5 * (K + K.T),
         D=0.5 * (D + D.T),
         K_geo=recombined_stiffening(body.K_geo, V),
         markers=markers,
         surface=surface,
         stress=stress,
-        omega=omega,
-        labels=tuple(f"mode {k + 1}, {body.reference} frame" for k in range(omega.size)),
     )
-    return found, V

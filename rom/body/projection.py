@@ -1,5 +1,6 @@
 """From a basis to a flexible body: rigid motions out, integrals, markers, surface."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,7 +8,14 @@ from scipy.linalg import null_space
 from scipy.sparse import csr_matrix
 
 from rom.body.flexible import FlexibleBody
-from rom.body.inertia import InertiaIntegrals, fields_of, inertia_integrals, point_integrals
+from rom.body.frame import mode_labels
+from rom.body.inertia import (
+    InertiaIntegrals,
+    fields_of,
+    inertia_integrals,
+    point_integrals,
+    turning_integrals,
+)
 from rom.body.nonlinear.cauchy import CauchyRecovery
 from rom.body.records import Marker, Patch, Provenance, Surface
 from rom.body.recovery import StressRecovery, with_elements
@@ -17,17 +25,18 @@ from rom.eigen.verbs import (
     Operators,
     dofs_of,
     given_rigid_motions,
+    massless,
     mean_motion,
     modes_within,
     orthonormal,
     own_points,
     quadratic,
-    rigid_motions,
 )
 from rom.errors import ModelError
 from rom.model import Array, FEModel, Index, Interface
 
 NEGATIVE_STIFFNESS_RTOL = 1e-9  # of the largest eigenvalue of K; round-off is smaller
+MASSLESS_RTOL = 1e-9  # energy of a motion without mass, of the stiffest column's
 RIGID_RESIDUAL = 1e-6  # relative distance of a rigid motion from the basis that is still accepted
 
 
@@ -41,13 +50,16 @@ class Elastic:
     residual: float  # distance of the rigid motions from the basis, relative
 
 
-def elastic_part(ops: Operators, Psi: Array) -> Elastic:
+def elastic_part(ops: Operators, Psi: Array, labels: Sequence[str]) -> Elastic:
     """Split the span of Psi into rigid motions and mass-normalised free-free modes."""
     M, K = quadratic(ops, ops.apply_M, Psi), quadratic(ops, ops.apply_K, Psi)
     scale = 1 / np.sqrt(np.diag(M))
     M, K = (scale[:, None] * A * scale for A in (M, K))
     M, K = (0.5 * (A + A.T) for A in (M, K))
-    if np.linalg.eigvalsh(M)[0] < 1e-13:
+    mu, V = np.linalg.eigh(M)
+    if mu[0] < 1e-13:
+        if V[:, 0] @ K @ V[:, 0] > MASSLESS_RTOL * np.diag(K).max():
+            raise massless(repr(labels[int(np.abs(V[:, 0]).argmax())]))
         text = "the basis has columns that depend on each other"
         raise ModelError(f"{text}; ask for fewer modes, or name each interface once.")
     R = orthonormal(ops, given_rigid_motions(ops))
@@ -75,7 +87,10 @@ def flexible_body(
     provenance: Provenance,
 ) -> FlexibleBody:
     """The body of mass-normalised nodal shapes E (n_local, r), by operators of the mesh alone."""
-    integrals = inertia_integrals(ops, own_points(ops, model.points), E)
+    if model.n_dofs > model.points.size:
+        integrals = turning_integrals(model, ops, E)
+    else:
+        integrals = inertia_integrals(ops, own_points(ops, model.points), E)
     surface = None
     if (mesh := model.surface) is not None:
         shape = ops.rows(E, dofs_of(mesh.nodes))
@@ -87,7 +102,7 @@ def flexible_body(
         D=np.zeros((omega.size, omega.size)),
         markers={n: _marker(ops, model.interfaces[n], tie, E) for n, tie in ties.items()},
         omega=omega,
-        labels=tuple(f"mode {k + 1}, mean-axis frame" for k in range(omega.size)),
+        labels=mode_labels(omega.size, "mean-axis"),
         surface=surface,
         provenance=provenance,
     )
@@ -101,7 +116,9 @@ def canonical_columns(ops: Operators, E: Array, model: FEModel) -> Array:
     weight = np.column_stack(
         [1.0 + a + 0.7 * b**2 - c**3, 0.9 - b + 0.8 * c**2 + a**3, 0.8 + c - 0.6 * a**2 + b**3]
     )
-    sign = np.sign(ops.gram(ops.apply_M(weight.reshape(-1, 1)), E))[0]
+    field = np.zeros((ops.n_local, 1))
+    field[: weight.size, 0] = weight.ravel()
+    sign = np.sign(ops.gram(ops.apply_M(field), E))[0]
     return E * np.where(sign == 0, 1.0, sign)
 
 
@@ -115,7 +132,7 @@ def carried_integrals(model: FEModel, ops: Operators, E: Array) -> list[InertiaI
 def _marker(ops: Operators, interface: Interface, tie: Tie, E: Array) -> Marker:
     U = ops.rows(E, interface.dofs)
     motion = mean_motion(interface) @ U
-    hold = np.hstack([tie.coordinates @ rigid_motions(interface.points), tie.coordinates @ U])
+    hold = np.hstack([tie.coordinates @ interface.rigid_motions(), tie.coordinates @ U])
     patch = None
     if tie.label not in ("rbe2", "rbe3"):  # its coordinates let the surface deform
         shapes = csr_matrix(tie.by_masters).toarray() if tie.removed.size else None

@@ -1,6 +1,7 @@
 """Stress of a reduced body, with the static correction for the modes left out."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -89,6 +90,19 @@ class StressRecovery:
         if A is not None:
             A = np.hstack([A[:, :N_FRAME_LOADS], A[:, N_FRAME_LOADS:] @ V])
         return StressRecovery(self.points, self.operator @ V, A)
+
+
+def one_stress(parts: list[Any]) -> StressRecovery | None:
+    """The stress of all parts; None unless every part has it, and so for what is left out."""
+    known = [part for part in parts if part is not None]
+    if len(known) < len(parts):
+        return None
+    inertial = [part.inertial for part in known if part.inertial is not None]
+    return StressRecovery(
+        np.vstack([part.points for part in known]),
+        np.vstack([part.operator for part in known]),
+        np.vstack(inertial) if len(inertial) == len(parts) else None,
+    )
 
 
 def with_elements(model: FEModel, what: str, otherwise: str = "") -> SurfaceMesh:

@@ -20,7 +20,7 @@ from rom.errors import ConfigError, ModelError
 from rom.model import Array
 from rom.names import named
 from rom.plausible import far_doubt
-from rom.rotation import crossed, skew
+from rom.rotation import crossed, skew, skew_tensor
 
 # The frame of Tisserand carries no momentum of the deformation, that of Buckens keeps its mean
 # square smallest; linearised, both say that the shapes are orthogonal to rigid motion in the mass.
@@ -142,8 +142,3 @@ def second_moment(body: BodyData) -> Array:
 def turns_of(X: Array) -> Array:
     """(3, 3, k) W of rigid motions X (6, k), for which W[:, :, k] @ x = w_k x x."""
     return np.einsum("abc,ck->abk", skew_tensor(), X[3:])
-
-
-def skew_tensor() -> Array:
-    """(3, 3, 3): skew(w)_ab = sum_c tensor[a, b, c] w_c."""
-    return np.stack([skew(e) for e in np.eye(3)], axis=-1)

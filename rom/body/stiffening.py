@@ -34,13 +34,12 @@ from rom.body.reference import (
     moved_marker,
     reference_motion,
     second_moment,
-    skew_tensor,
     turns_of,
 )
 from rom.errors import ConfigError
 from rom.model import Array
 from rom.names import check_known
-from rom.rotation import crossed
+from rom.rotation import crossed, skew_tensor
 
 ROUND_OFF = 1e-11  # of the largest displacement of second order
 ANGULAR_LOADS = tuple(f"domega_{axis}" for axis in AXIS_NAMES)

@@ -23,6 +23,17 @@ def surface_of(body: BodyData) -> Surface:
     return body.surface
 
 
+def one_surface(parts: list[Surface | None]) -> Surface | None:
+    """All surfaces in one; None unless every part has one."""
+    known = [part for part in parts if part is not None]
+    if len(known) < len(parts):
+        return None
+    first = np.cumsum([0, *(len(part.points) for part in known)])
+    triangles = [part.triangles + n for part, n in zip(known, first[:-1], strict=True)]
+    points, shapes = ([getattr(part, x) for part in known] for x in ("points", "shape"))
+    return Surface(np.vstack(points), np.vstack(triangles), np.vstack(shapes))
+
+
 def point_areas(body: BodyData, where: Where = None) -> Array:
     """(s,) a third of the area of the chosen triangles around each point of the surface [m^2]."""
     chosen, areas = chosen_triangles(body, where)

@@ -112,10 +112,10 @@ def _fields(line: str, place: Place) -> tuple[str, list[str], str]:
     return line[:PER_LINE].strip(), fields, line[72:80].strip()
 
 
-def grids(found: dict[str, list[Card]]) -> tuple[Index, Array, Index]:
-    """Labels (k,), positions (k, 3) in the basic system, and (k,) systems of displacements.
+def grids(found: dict[str, list[Card]]) -> tuple[Index, Array, Array]:
+    """Labels (k,), positions (k, 3), and axes of displacements (k, 3, 3), in the basic system.
 
-    Of the cards of `POINTS` by their names.
+    Of the cards of `POINTS` by their names; axes are columns.
     """
     default = next(iter(found.get("GRDSET", ())), Card("GRDSET", [], (Path(), 0)))
     own, turned = default.whole(1, 0), default.whole(5, 0)
@@ -150,10 +150,13 @@ def grids(found: dict[str, list[Card]]) -> tuple[Index, Array, Index]:
             raise by.wrong(f"node {label} is not defined")
         return resolved(grid[label][0], by).basic(np.array([grid[label][1]]))
 
-    used = np.array([row[0] for row in grid.values()], dtype=np.int64)
+    used, moved = np.array([row[::2] for row in grid.values()], np.int64).reshape(-1, 2).T
     x = np.array([row[1] for row in grid.values()]).reshape(-1, 3)
+    moves = np.tile(np.eye(3), (len(x), 1, 1))
     for number in np.unique(used):
         here = used == number
         x[here] = resolved(int(number), found["GRID"][int(here.argmax())]).basic(x[here])
-    labels = np.array(list(grid), dtype=np.int64)
-    return labels, x, np.array([row[2] for row in grid.values()], dtype=np.int64)
+    for number in np.unique(moved[moved > 0]):
+        here = moved == number
+        moves[here] = resolved(int(number), found["GRID"][int(here.argmax())]).axes_at(x[here])
+    return np.array(list(grid), dtype=np.int64), x, moves

@@ -28,6 +28,31 @@ class System:
             x = np.column_stack([away * np.cos(two), away * np.sin(two), r * np.cos(one)])
         return self.origin + x @ self.axes.T
 
+    def axes_at(self, x: Array) -> Array:
+        """(k, 3, 3) directions of the coordinates, columns, at basic points (k, 3).
+
+        Around an axis or a centre they are those of the point; on the axis, of the system itself.
+        """
+        inner = (x - self.origin) @ self.axes
+        away = np.hypot(inner[:, 0], inner[:, 1])
+        one = np.where(away > 0.0, np.arctan2(inner[:, 1], inner[:, 0]), 0.0)
+        around_z = _turns(one, 2)
+        if self.kind == "R":
+            return np.tile(self.axes, (len(x), 1, 1))
+        if self.kind == "C":
+            return self.axes @ around_z
+        tilt = _turns(np.arctan2(away, inner[:, 2]), 1)
+        return self.axes @ around_z @ tilt @ np.array([[0.0, 1, 0], [0, 0, 1], [1, 0, 0]])
+
+
+def _turns(angle: Array, axis: int) -> Array:
+    """(k, 3, 3) rotations by angles (k,) about y (1) or z (2)."""
+    turn = np.tile(np.eye(3), (angle.size, 1, 1))
+    a, b = (2, 0) if axis == 1 else (0, 1)
+    turn[:, a, a] = turn[:, b, b] = np.cos(angle)
+    turn[:, b, a], turn[:, a, b] = np.sin(angle), -np.sin(angle)
+    return turn
+
 
 BASIC_SYSTEM = System(np.zeros(3), np.eye(3))
 

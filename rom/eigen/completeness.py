@@ -52,7 +52,8 @@ def gaussian_block(ops: Searched, k: int, n_before: int = 0) -> Array:
     bits ^= bits >> np.uint64(31)
     u = (bits >> np.uint64(11)).astype(float) * 2.0**-53 + 2.0**-54
     normal = np.sqrt(-2.0 * np.log(u[:, :k])) * np.cos(2.0 * np.pi * u[:, k:])  # Box and Muller
-    return normal / np.sqrt(np.maximum(ops.mass_diagonal, np.finfo(float).tiny))[:, None]
+    mass = ops.mass_diagonal[:, None]
+    return np.where(mass > 0.0, normal / np.sqrt(np.where(mass > 0.0, mass, 1.0)), 0.0)
 
 
 def miss_probability(T: Array, start: Array, residual: Array, m: int) -> float:

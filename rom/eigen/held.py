@@ -31,8 +31,8 @@ class HeldBody:
         self.ops: Any = ops
         self.held, self.shift = held, shift
         self.mine = np.flatnonzero(~held_rows(ops, held))
-        self.n_free = ops.n - held.size
-        self.inner: Any = ops.part(self.mine) if self.n_free else None
+        self.inner: Any = ops.part(self.mine) if ops.n > held.size else None
+        self.n_free = 0 if self.inner is None else self.inner.n_massive
         self.factor: Any = None
 
     def __call__(self, F: Array) -> Array:

@@ -73,7 +73,7 @@ class HeldSciPy(HeldBody):
 
     def __init__(self, ops: "SciPyOperators", held: Index, shift: float = 0.0):
         super().__init__(ops, held, shift)
-        if self.n_free:
+        if self.inner is not None:
             self.make()
             if not shift:
                 self._refuse_negative(RIGID_RTOL)
@@ -119,12 +119,20 @@ class SciPyOperators(ModeSearch):
         self.K, self.M = _symmetric("K", K), _symmetric("M", M)
         if self.K.shape != self.M.shape:
             raise ConfigError(f"K is {self.K.shape} and M is {self.M.shape}; they must be equal.")
-        diagonal = self.M.diagonal()
-        if (massless := np.flatnonzero(diagonal <= 0.0)).size:
-            text = f"M has {diagonal[massless[0]]:.3g} on the diagonal of dof {massless[0]}"
-            raise QualityGateError(f"{text}; condense dofs without mass before you reduce.")
         self.n = self.n_local = self.K.shape[0]
+        self._check_mass()
         self.rigid, self.T, self.fixed = rigid, T, np.sin(1.0 + np.arange(self.n))
+
+    def _check_mass(self) -> None:
+        """Dofs may have no mass, as rotations of lumped models, where they have stiffness."""
+        diagonal, whole = self.M.diagonal(), abs(self.M).sum(axis=1).A1
+        bad = (diagonal <= 0.0) & ((whole > 0.0) | (self.K.diagonal() <= 0.0))
+        if bad.any() or not (diagonal > 0.0).any():
+            at = int(np.flatnonzero(bad | (diagonal <= 0.0))[0])
+            text = f"M has {diagonal[at]:.3g} on the diagonal of dof {at}"
+            raise QualityGateError(
+                f"{text}; without mass it needs stiffness, and no coupling in M."
+            )
 
     def comparison_pays(self, n_supports: int, n_interface: int, n_modes: int) -> bool:
         """Always: matrices whose origin is unknown are compared in every support."""
@@ -188,7 +196,8 @@ class SciPyOperators(ModeSearch):
 
     def refuse_wrong_mass(self) -> None:
         """Say so where a motion has no inertia."""
-        if n_negative := negative_count(self.M):
+        massive = np.flatnonzero(self.mass_diagonal > 0.0)
+        if n_negative := negative_count(self.M[massive][:, massive]):
             raise indefinite("M", n_negative, NO_INERTIA)
 
     def signed(self, Phi: Array) -> Array:

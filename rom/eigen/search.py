@@ -43,6 +43,7 @@ CLUSTER_RTOL = 1e-7  # distance of eigenvalues whose modes are only defined as a
 ESTIMATE_SHIFT = 1e-6  # of the largest eigenvalue, below zero, with which the first is estimated
 ESTIMATE_STEPS = 4  # of inverse iteration, on eight columns
 ALL_LOOSE_RATIO = 1e5  # estimate over round-off where all columns have found motions at rest
+MASSLESS_RTOL = 1e-14  # of the largest scaled mass, below which a motion has none
 NO_INERTIA = "some motion would have no inertia"
 Seek = Callable[[int, Array], tuple[Array, Array, bool]]
 
@@ -87,8 +88,14 @@ class ModeSearch(Searched):
 
     def largest(self) -> float:
         """Estimate of the largest eigenvalue from the diagonals."""
-        ratio = self.stiffness_diagonal / self.mass_diagonal
+        massive = self.mass_diagonal > 0.0
+        ratio = self.stiffness_diagonal[massive] / self.mass_diagonal[massive]
         return float(max(self.from_all(ratio.max(initial=0.0))))
+
+    @property
+    def n_massive(self) -> int:
+        """Number of dofs that have mass, and thereby of modes."""
+        return sum(self.from_all(int(np.count_nonzero(self.mass_diagonal > 0.0))))
 
     def modes(
         self, held: Any, m: int, sigma: float | None = None, *, finished: bool = False
@@ -254,7 +261,9 @@ class ModeSearch(Searched):
         E = own_rows(self, np.eye(self.n))
         K, M = (every_row(self, apply(E)) for apply in (self.apply_K, self.apply_M))
         try:
-            lam, Phi = eigh(K, M)
+            follow = _without_mass(K, M)
+            lam, Phi = eigh(follow.T @ K @ follow, follow.T @ M @ follow)
+            Phi = follow @ Phi
         except LinAlgError as error:
             n_negative = int(np.count_nonzero(eigvalsh(M) <= 0.0))
             raise indefinite("M", n_negative, NO_INERTIA) from error
@@ -283,6 +292,21 @@ class ModeSearch(Searched):
             lam = refined(self, lam, Phi)
             order = np.argsort(lam, kind="stable")
             return lam[order], Phi[:, order], proven
+
+
+def _without_mass(K: Array, M: Array) -> Array:
+    """(n, m) motions of a body in which what has no mass follows what has, as its stiffness asks.
+
+    Small matrices (n, n); the identity where every motion has mass.
+    """
+    scale = np.sqrt(np.maximum(np.diag(M), 0.0))
+    scale = 1.0 / np.where(scale > 0.0, scale, 1.0)
+    mu, Q = np.linalg.eigh(scale[:, None] * M * scale)
+    N = scale[:, None] * Q[:, np.abs(mu) <= MASSLESS_RTOL * mu[-1]]
+    if not N.shape[1]:
+        return np.eye(len(K))
+    W = scale[:, None] * Q[:, np.abs(mu) > MASSLESS_RTOL * mu[-1]]
+    return W - N @ np.linalg.solve(N.T @ K @ N, N.T @ K @ W)
 
 
 def refined(ops: Searched, lam: Array, Phi: Array) -> Array:

@@ -17,6 +17,7 @@ Fixed = tuple[str, ...] | Mapping[str, str]
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 DIRECTION_PATTERN = re.compile(r"r?[xyz]")
 SIX_KINDS = ("rbe2", "rbe3")  # coordinates: three translations, three rotations
+FULL_TURNING = "full:"  # and the number of nodes, behind whose displacements rotations come
 BY_AXIS = ("full", "polynomial", "fourier")  # coordinates: x, y, z of each node or function
 WHOLE_WORD = "wholly"
 LOOSE_RTOL = 1e-10  # square of a motion of what is held, below which the motion is free
@@ -62,12 +63,19 @@ def held_coordinates(name: str, kind: str, n: int, directions: tuple[str, ...]) 
     if kind in SIX_KINDS:
         return np.array([DIRECTIONS.index(direction) for direction in directions])
     turns = [direction for direction in directions if direction not in "xyz"]
-    if turns or not kind.startswith(BY_AXIS):
+    n_displaced = 3 * int(kind.partition(":")[2]) if kind.startswith(FULL_TURNING) else n
+    if (turns and n != 2 * n_displaced) or not kind.startswith(BY_AXIS):
         what = f"no rotation {turns[0]}" if turns else "coordinates without direction"
         text = f"interface {name!r} has the kind {kind!r} and {what} to hold"
         raise InterfaceError(f'{text}; give it the kind "rbe2" or "rbe3".')
-    axis = ["xyz".index(direction) for direction in directions]
-    return np.flatnonzero(np.isin(np.arange(n) % 3, axis))
+    axis = np.array([DIRECTIONS.index(direction) for direction in directions])
+    turning = 3 * (np.arange(n) >= n_displaced)
+    return np.flatnonzero(np.isin(np.arange(n) % 3 + turning, axis))
+
+
+def full_kind(interface: Interface) -> str:
+    """The kind of an interface that keeps all its dofs."""
+    return "full" if interface.rotations is None else f"{FULL_TURNING}{interface.nodes.size}"
 
 
 Springs = Mapping[str, Any]  # {interface: (3,), (6,) or (6, 6) stiffness to the ground}
@@ -99,8 +107,8 @@ def held_dofs(interfaces: Mapping[str, Interface], fixed: Fixed) -> Index:
     """Ascending dofs of a model, node by node, that supports hold."""
     found = [np.zeros(0, dtype=np.int64)]
     for name, directions in supports(fixed, interfaces).items():
-        dofs = interfaces[name].dofs
-        found.append(dofs[held_coordinates(name, "full", dofs.size, directions)])
+        one = interfaces[name]
+        found.append(one.dofs[held_coordinates(name, full_kind(one), one.dofs.size, directions)])
     return np.unique(np.concatenate(found))
 
 

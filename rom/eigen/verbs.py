@@ -14,6 +14,7 @@ from scipy.sparse import csr_matrix, identity, kron
 
 from rom.errors import InterfaceError, ModelError
 from rom.model import Array, Index, Interface, Mask
+from rom.model import rigid_motions as rigid_motions
 
 Value = TypeVar("Value")
 Product = Callable[[Array, Array], Array]
@@ -175,6 +176,10 @@ class Searched(Operators, Protocol):
     where: Callable[..., str]
     all_finite: Callable[[Array], bool]
     largest: Callable[[], float]
+
+    @property
+    def n_massive(self) -> int:
+        """Number of dofs of the whole body that have mass, and thereby of modes."""
 
     @property
     def stiffness_diagonal(self) -> Array:
@@ -354,17 +359,6 @@ def dofs_of(nodes: Index) -> Index:
     return (3 * nodes[:, None] + np.arange(3)).ravel()
 
 
-def rigid_motions(points: Array) -> Array:
-    """(3k, 6) motions of points (k, 3) [m]: unit translations [1], rotations about zero [m]."""
-    R = np.zeros((points.shape[0], 3, 6))
-    R[:, :, :3] = np.eye(3)
-    x, y, z = points.T
-    R[:, 1, 3], R[:, 2, 3] = -z, y
-    R[:, 0, 4], R[:, 2, 4] = z, -x
-    R[:, 0, 5], R[:, 1, 5] = -y, x
-    return R.reshape(-1, 6)
-
-
 def modes_within(N: Array, K: Array, M: Array) -> tuple[Array, Array]:
     """Eigenvalues (m,) [rad^2/s^2], ascending, and modes (k, m) of small matrices (k, k).
 
@@ -372,6 +366,13 @@ def modes_within(N: Array, K: Array, M: Array) -> tuple[Array, Array]:
     """
     lam, V = eigh(N.T @ K @ N, N.T @ M @ N)
     return lam, N @ V
+
+
+def massless(of: str) -> ModelError:
+    """The error of a motion that has stiffness and no mass."""
+    hint = "Give its nodes an inertia, or let the interface move as a whole, as rbe2 and rbe3 do."
+    text = f"a motion of {of} has stiffness and no mass"
+    return ModelError(f"{text}: it would be infinitely fast.", hint=hint)
 
 
 def pins(motions: Array) -> Index:
@@ -392,23 +393,38 @@ def on_a_line(interface: Interface) -> InterfaceError:
 
 
 def mean_motion(interface: Interface) -> Array:
-    """(6, 3k) translation [1] and rotation [1/m] of a surface, least squares over its area.
+    """(6, 3k + t) translation [1] and rotation [1/m] of a surface, least squares over its area.
 
     C = (R^T S R)^-1 R^T S with R the rigid motions about the origin of the interface and S the
-    surface mass: the rigid motion c = C u leaves the smallest integral of |u - R c|^2.
+    surface mass: the rigid motion c = C u leaves the smallest integral of |u - R c|^2. Rotations of
+    nodes count where these lie on a line or in one point, each as a displacement at their mean
+    distance from the origin.
 
     Raises:
         InterfaceError: if the nodes lie on a line, whose rotation about itself no node feels.
+
+    Source:
+        MSC Nastran Quick Reference Guide, RBE3, for the length that weighs rotations.
     """
     x = interface.points - interface.origin
     size = np.linalg.norm(x, axis=1).max(initial=0.0) or 1.0
-    R = rigid_motions(x / size)
-    SR = kron(interface.surface_mass, identity(3)) @ R
+    R = interface.rigid_motions(interface.origin) / np.r_[np.ones(3), np.full(3, size)]
+    area = np.asarray(interface.surface_mass.sum(axis=1)).ravel()
+    SR, n = np.zeros(R.shape), x.size
+    SR[:n] = kron(interface.surface_mass, identity(3)) @ R[:n]
     gram = R.T @ SR
-    spectrum = np.linalg.eigvalsh(gram)
-    if not spectrum[0] > ON_A_LINE * spectrum[-1]:
+    if _undetermined(gram) and (turning := interface.rotations) is not None:
+        arm = float(area @ np.linalg.norm(x, axis=1) / area.sum()) or size
+        SR[n:] = (arm**2 * area[turning.nodes])[:, None] * R[n:]
+        gram = R.T @ SR
+    if _undetermined(gram):
         raise on_a_line(interface)
     return np.linalg.solve(gram, SR.T) / np.r_[np.ones(3), np.full(3, size)][:, None]
+
+
+def _undetermined(gram: Array) -> bool:
+    spectrum = np.linalg.eigvalsh(gram)
+    return not spectrum[0] > ON_A_LINE * spectrum[-1]
 
 
 def mac(ops: Operators, Phi: Array, Psi: Array) -> Array:

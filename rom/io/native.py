@@ -282,5 +282,6 @@ def _marker_misfits(m: Marker, r: int) -> Iterator[str]:
         yield f"the covariance of marker {m.name!r} does not fit {r} coordinates"
     if m.patch is not None:
         dofs, shapes = 3 * len(m.patch.points), m.patch.shapes
-        if (n_c != dofs) if shapes is None else (shapes.shape != (dofs, n_c)):
+        most = 2 * dofs if m.kind.startswith("full:") else dofs
+        if not dofs <= n_c <= most if shapes is None else shapes.shape != (dofs, n_c):
             yield f"the surface of marker {m.name!r} does not fit {n_c} coordinates"

@@ -10,7 +10,12 @@ from rom.eigen.attachments import added_mass
 from rom.eigen.band import modes_up_to
 from rom.eigen.scipy import SciPyOperators
 from rom.eigen.supports import Fixed, Springs, refuse_loose, spring_matrices, supports
-from rom.eigen.verbs import Operators, column_blocks, held_rows, own_points, rigid_motions
+from rom.eigen.verbs import (
+    Operators,
+    column_blocks,
+    given_rigid_motions,
+    held_rows,
+)
 from rom.model import Array, FEModel, Index, Modes
 from rom.process.progress import MANY_DOFS, stages
 from rom.reduction.interfaces.connection import connect
@@ -21,7 +26,7 @@ def mesh_operators(model: FEModel) -> Operators:
     """The operator verbs on the finite elements of a model, attachments left out."""
     if model.operators is not None:
         return model.operators
-    return SciPyOperators(model.K, model.M, rigid_motions(model.points))
+    return SciPyOperators(model.K, model.M, model.rigid_motions())
 
 
 def operators(model: FEModel) -> Operators:
@@ -54,7 +59,7 @@ def mass_properties(model: FEModel) -> MassProperties:
         1.0
     """
     ops = operators(model)
-    R = rigid_motions(own_points(ops, model.points))
+    R = given_rigid_motions(ops)
     M = ops.gram(R, ops.apply_M(R))
     mass, first = float(np.trace(M[:3, :3])) / 3, 0.5 * (M[:3, 3:] - M[:3, 3:].T)
     centre = np.array([first[1, 2], first[2, 0], first[0, 1]]) / mass

@@ -68,7 +68,7 @@ def project(draft: Draft) -> None:
     draft.watch.begin("energies")
     with at_work(draft, f"energies of {draft.basis.Psi.shape[1]} shapes", 1):
         draft.Psi = draft.connection.ops.expand(draft.basis.Psi)
-        draft.elastic = elastic_part(draft.ops, draft.Psi)
+        draft.elastic = elastic_part(draft.ops, draft.Psi, draft.basis.labels)
 
 
 def make_body(draft: Draft) -> None:

@@ -115,7 +115,7 @@ def test_a_body_goes_to_abaqus_and_comes_back(tmp_path):
         assert_allclose(found.A.toarray(), np.tril(A), rtol=1e-13)
         assert_array_equal(found.dofs, np.where(form.dofs == 0, 1, form.dofs))
     refuses(ConfigError, "Name one", read_matrix, path)
-    labels, points = read_nodes(path)
+    labels, points, _ = read_nodes(path)
     assert_array_equal(labels, [1, 2, 1001, 1002, 1003])
     assert_allclose(points[:2], [form.points[1], form.points[2]], atol=1e-15)
     lines = path.read_text().splitlines()

@@ -49,7 +49,7 @@ mbs.analysis: local_equations rotors few_modes tangent equilibrium linearize cam
 mbs.elements: field family law_calls joint_forces springs loads laws formulas motors contact
   joint_laws bushings nonlinear solids
 components.gear_mesh: gears compliance tooth_elements contact tooth_loads symbols keys field
-components.wheels: faces sector rotation modes travelling reduced blades prestress field
+components.wheels: faces sector rotation modes travelling reduced wheel_body blades prestress field
 components.updating: frf_data measured responses airframe models methods family_model
   normal_equations verdict estimate comparison placement observers pictures verb field
 components.journal_bearing: films closed_forms oil_film statics record keys field

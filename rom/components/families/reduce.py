@@ -326,7 +326,7 @@ def certify(draft: FamilyDraft) -> None:
             elif table["estimated"]:
                 label = f"{words}: estimated error of {len(table['reduced'])} frequencies"
                 found.append(row(label, max(table["estimated"]), draft.tol))
-        found += rigid_rows(ops, body, elastic_part(ops, draft.Psi))
+        found += rigid_rows(ops, body, elastic_part(ops, draft.Psi, draft.basis.labels))
         rows += [replace(line, quantity=f"{where}: {line.quantity}") for line in found]
     report = Report(f"certificate of the family {family.body.name}", tuple(rows))
     attach(draft, report, comparison, f"family {draft.name!r}")

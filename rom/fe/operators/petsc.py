@@ -43,7 +43,7 @@ class HeldPETSc(HeldBody):
     def __init__(self, ops: "PETScOperators", held: Index, shift: float = 0.0):
         super().__init__(ops, held, shift)
         self.factorable = not ops.solver.out_of_core
-        if self.n_free:
+        if self.inner is not None:
             R = ops.rigid if ops.solver.iterative else None  # which would only run on
             if R is not None and np.linalg.matrix_rank(ops.rows(R, held), tol=1e-9) < R.shape[1]:
                 raise self.singular(np.zeros((self.mine.size, 1)))

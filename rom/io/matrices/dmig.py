@@ -15,7 +15,7 @@ from rom.decks.lines import at, real, whole
 from rom.errors import FileFormatError
 from rom.io.files import check_last_line, damaged, need, write_lines
 from rom.model import Array, Index
-from rom.names import ORIGIN_MARK, named
+from rom.names import ORIGIN_MARK
 
 SYMMETRIC_FORM, SQUARE_FORM = 6, 1
 Dofs = Index  # (n, 2) label and component, 1 to 6, or 0 for a scalar point
@@ -44,25 +44,19 @@ def read_dmig(path: str | Path) -> dict[str, tuple[csr_matrix, Dofs]]:
     return {name: labelled(rows) for name, rows in entries.items()}
 
 
-def read_grids(path: str | Path) -> tuple[Index, Array]:
-    """Labels (k,) and positions (k, 3) of GRID cards in the basic system, in units of the file.
+def read_grids(path: str | Path) -> tuple[Index, Array, Array]:
+    """Labels (k,), positions (k, 3) in the basic system, and axes (k, 3, 3) of GRID cards.
+
+    The axes, which are columns, are those of field 7, along which a grid point moves.
 
     Raises:
-        FileFormatError: naming the line, for a damaged card, or nodes that move in another system.
+        FileFormatError: naming the line, for a damaged card.
     """
     found: dict[str, list[Card]] = {}
     for card in cards(path):
         if card.name in POINTS:
             found.setdefault(card.name, []).append(card)
-    labels, points, turned = grids(found)
-    if (other := labels[turned != 0]).size:
-        raise FileFormatError(
-            f"the nodes {named(other.tolist())} move along axes of their own, and with them the "
-            "rows of the matrices.",
-            where=str(path),
-            hint="Leave field 7 of GRID empty and write the matrices again.",
-        )
-    return labels, points
+    return grids(found)
 
 
 def write_dmig(

@@ -1,6 +1,7 @@
 """Nodes, and sets of nodes, in the files of other finite element programs."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,34 +15,45 @@ from rom.model import Array, Index
 from rom.names import named, offered
 
 CARDS = (".bdf", ".dat")
+AXES_TOL = 1e-6  # of axes that are orthonormal
+Placed = tuple[Index, Array, Array]
 # keywords that make nodes in ways that are not read, or turn the rows of matrices
 REFUSED_KEYWORDS = ("NGEN", "NFILL", "NCOPY", "NMAP", "TRANSFORM", "PARAMETER")
 
 
-def read_nodes(nodes: str | Path | tuple[npt.ArrayLike, npt.ArrayLike]) -> tuple[Index, Array]:
-    """Ascending labels (k,) and positions (k, 3), in units of the file.
+def read_nodes(nodes: str | Path | tuple[npt.ArrayLike, ...]) -> Placed:
+    """Ascending labels (k,), positions (k, 3), in units of the file, and axes (k, 3, 3).
+
+    Along the axes, which are columns, the rows of matrices move the nodes.
 
     Args:
-        nodes: both, (k,) and (k, 3); or a file: ``.inp``, ``.bdf``, ``.dat`` or ``.csv``.
+        nodes: these, the axes only where they are not those of the body; or a file: ``.inp``,
+            ``.bdf``, ``.dat`` or ``.csv``.
 
     Raises:
         ConfigError: for another ending.
         FileFormatError: naming the line, if a file is missing or damaged, or a label occurs twice.
     """
     if isinstance(nodes, str | Path):
-        where, (labels, points) = str(nodes), _node_file(Path(nodes))
+        where, (labels, points, *axes) = str(nodes), _node_file(Path(nodes))
     else:
-        where, (labels, points) = "nodes", (np.asarray(part) for part in nodes)
+        where, (labels, points, *axes) = "nodes", (np.asarray(part) for part in nodes)
     if points.shape != (labels.size, 3) or not labels.size or not np.isfinite(points).all():
         raise FileFormatError(f"{labels.size} labels and positions {points.shape}.", where=where)
+    turned = axes[0] if axes else np.tile(np.eye(3), (labels.size, 1, 1))
+    if (
+        turned.shape != (labels.size, 3, 3)
+        or np.abs(turned.swapaxes(1, 2) @ turned - np.eye(3)).max() > AXES_TOL
+    ):
+        raise FileFormatError("axes of nodes are (k, 3, 3), orthonormal columns.", where=where)
     order = np.argsort(labels)
     labels = labels[order].astype(np.int64)
     if (same := labels[1:] == labels[:-1]).any():
         raise FileFormatError(f"the node {labels[1:][same][0]} occurs twice.", where=where)
-    return labels, points[order].astype(float)
+    return labels, points[order].astype(float), np.asarray(turned, dtype=float)[order]
 
 
-def _node_file(path: Path) -> tuple[Index, Array]:
+def _node_file(path: Path) -> tuple[npt.NDArray[Any], ...]:
     ending = path.suffix.lower()
     if ending in CARDS:
         return read_grids(path)

@@ -1,11 +1,12 @@
 """A finite element model from matrices and nodes of another program."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
-from scipy.sparse import csr_matrix, identity, kron
+from scipy.sparse import block_diag, bsr_matrix, csr_matrix, diags, identity, kron
 from scipy.spatial import cKDTree
 
 from rom.arguments import symmetric, typed
@@ -20,11 +21,12 @@ from rom.errors import (
 from rom.io.matrices.dmig import Dofs
 from rom.io.matrices.matrix_files import NamedMatrix, read_matrix
 from rom.io.matrices.node_files import read_node_sets, read_nodes
-from rom.model import Array, FEModel, Index, Interface
+from rom.model import Array, FEModel, Index, Interface, Rotations
 from rom.plausible import DENSITY, MATRIX_SPEED, SIZE, warn_outside
 from rom.units import unit_system
 
 ASYMMETRY_RTOL, MIXED_MASS_RTOL, RIGID_RTOL = 1e-6, 1e-6, 1e-6
+UNFELT_RTOL = 1e-14  # square of what a rotation feels, of the most at its node, that is nothing
 MORE_NODES = 5
 # sqrt(K_ii / M_ii) times the distance of the next node over sqrt(E/rho); 1.6 to 3.3 for blocks,
 # beams, rods and phalanges of bricks and tetrahedra of either degree
@@ -37,29 +39,38 @@ def read_model(
     K: str | Path | tuple[str | Path, str],
     M: str | Path | tuple[str | Path, str],
     *,
-    nodes: str | Path | tuple[npt.ArrayLike, npt.ArrayLike],
+    nodes: str | Path | tuple[npt.ArrayLike, ...],
     interfaces: Mapping[str, npt.ArrayLike] | Sequence[str],
     units: str = "SI",
+    modal: npt.ArrayLike = (),
+    hold_drilling: bool = False,
 ) -> FEModel:
-    """A free solid body from the matrices of another program, to be reduced here.
+    """A free body from the matrices of another program, to be reduced here.
+
+    Solids, structures whose nodes turn, and superelements: bodies that are reduced already.
 
     Args:
         K: stiffness of the body without supports: file, or (file, name), see
             `rom.io.matrices.matrix_files.read_matrix`.
-        M: mass, likewise; the same along x, y and z, as that of solid elements.
-        nodes: (k,) labels and (k, 3) positions, in units of the files; or a file: ``.inp`` with
+        M: mass, likewise; of solids the same along x, y and z. Rotations may have none.
+        nodes: (k,) labels and (k, 3) positions, in units of the files, and where the rows of
+            nodes follow axes of their own (k, 3, 3), these as columns; or a file: ``.inp`` with
             ``*NODE``, ``.bdf`` or ``.dat`` with GRID cards, ``.csv`` with lines ``label, x, y, z``.
             Rows of matrices without labels are those of the nodes in ascending order, 3 or 6 for
             each; where all rows have labels, nodes without a row are left out.
         interfaces: {name: (m,) labels of its nodes}, or names of ``*NSET`` in the
             ``.inp`` of the nodes; all nodes of an interface weigh the same.
         units: unit system of the files; the model is in SI.
+        modal: labels whose rows are amplitudes of modes; scalar points are that anyway.
+        hold_drilling: leave out rotations without stiffness and mass, as flat shells have about
+            their normals.
 
     Raises:
         ConfigError: for unknown endings, names or units.
         FileFormatError: if a file is missing, damaged, or does not fit the others.
-        InterfaceError: if an interface has no nodes, or unknown ones.
-        ModelError: if nodes turn, as those of beams and shells, or the mass is not that of a solid.
+        InterfaceError: if an interface names no nodes, or unknown ones.
+        ModelError: if a node does not move along three axes, naming rotations without stiffness,
+            and if the mass is not that of a body.
         QualityGateError: if a matrix is not symmetric, or the body is not free.
         UnsafeFileError: if a file asks for more memory than its size can mean.
 
@@ -67,72 +78,153 @@ def read_model(
         RomWarning: if size, density or speed of sound are those of no solid: wrong units.
     """
     unit = unit_system(units)
-    labels, points = read_nodes(nodes)
+    labels, points, axes = read_nodes(nodes)
     if not isinstance(interfaces, Mapping):
         names = (interfaces,) if isinstance(interfaces, str) else tuple(interfaces)
         if not isinstance(nodes, str | Path):
             raise ConfigError("names of interfaces need nodes from an .inp file, with its sets.")
         interfaces = read_node_sets(nodes, names)
     found = [read_matrix(source) for source in (K, M)]
-    labels, points = _used(labels, points, found)
-    stiffness, mass = (_placed(A, labels) for A in found)
-    points = points * unit.length
+    layout = _layout(found, labels, points, axes, np.atleast_1d(modal))
+    stiffness, mass = (layout.placed(A) for A in found)
+    kept = layout.rotations(stiffness, mass, hold=hold_drilling)
+    T, rotations, points = kept[0], kept[1], layout.points * unit.length
+    scale = diags(np.where(np.arange(T.shape[1]) < points.size, 1.0, unit.length))
     model = FEModel(
-        stiffness * (unit.force / unit.length),
-        mass * unit.mass,
+        scale @ (T.T @ stiffness @ T) @ scale * (unit.force / unit.length),
+        scale @ (T.T @ mass @ T) @ scale * unit.mass,
         points,
-        {name: _interface(name, own, labels, points) for name, own in interfaces.items()},
+        {n: _interface(n, own, layout.labels, points, rotations) for n, own in interfaces.items()},
         provenance={"K": _name(K), "M": _name(M), "units": units},
+        rotations=rotations,
+        n_scalars=layout.scalars.size,
     )
-    _check_mass(model)
     _check_free(model)
+    _check_mass(model)
     _doubt_units(model)
     return model
 
 
-def _used(labels: Index, points: Array, found: list[NamedMatrix]) -> tuple[Index, Array]:
-    """Nodes without those in no row, as decks carry them for loads and pictures."""
-    rows = [A.dofs[:, 0] for A in found if A.dofs is not None]
-    if len(rows) < len(found):
-        return labels, points
-    used = np.isin(labels, np.concatenate(rows))
-    return labels[used], points[used]
+@dataclass(frozen=True, slots=True)
+class _Layout:
+    """Rows of a model before rotations are chosen: 3 k displacements, 3 k rotations, scalars."""
 
+    labels: Index  # (k,) ascending
+    points: Array  # (k, 3) in units of the files
+    axes: Array  # (k, 3, 3) along which rows move, as columns
+    scalars: Index  # (s,) ascending labels
 
-def _placed(found: NamedMatrix, labels: Index) -> csr_matrix:
-    """(3 k, 3 k) symmetric matrix in the order of the nodes."""
-    with in_file(found.where):
-        A = _completed(found.A)
-        place = _rows(A, found.dofs, labels)
-    moving = place >= 0
-    pick = csr_matrix(
-        (np.ones(moving.sum()), (place[moving], np.flatnonzero(moving))),
-        shape=(3 * labels.size, A.shape[0]),
-    )
-    return (pick @ A @ pick.T).tocsr()
+    def placed(self, found: NamedMatrix) -> csr_matrix:
+        """(6 k + s, 6 k + s) symmetric matrix, its rows along the axes of the body."""
+        with in_file(found.where):
+            A = _completed(found.A)
+            place = self._rows(_labelled(A, found.dofs, self.labels))
+        n = 6 * self.labels.size + self.scalars.size
+        rows = np.ones(place.size), (place, np.arange(place.size))
+        pick = csr_matrix(rows, shape=(n, A.shape[0]))
+        if (self.axes != np.eye(3)).any():
+            both, k = np.concatenate([self.axes, self.axes]), np.arange(2 * self.labels.size + 1)
+            Q = bsr_matrix((both, k[:-1], k))
+            pick = block_diag([Q, identity(self.scalars.size)]) @ pick
+        return (pick @ A @ pick.T).tocsr()
 
+    def _rows(self, dofs: Dofs) -> Index:
+        """Row in this layout of each row of a matrix."""
+        k, component = self.labels.size, dofs[:, 1] - 1
+        scalar = np.isin(dofs[:, 0], self.scalars)
+        node, strange = _places(self.labels, dofs[~scalar, 0])
+        if strange:
+            raise FileFormatError(f"rows belong to nodes that are not given: {strange}.")
+        place = 6 * k + np.searchsorted(self.scalars, dofs[:, 0])
+        turn = component[~scalar] >= 3
+        place[~scalar] = 3 * node + component[~scalar] + (3 * k - 3) * turn
+        return place
 
-def _rows(A: csr_matrix, dofs: Dofs | None, labels: Index) -> Index:
-    """Row in the model of each row of a matrix; -1 for rotations, which must be empty."""
-    if dofs is None:
-        per_node, remainder = divmod(A.shape[0], labels.size)
-        if remainder or per_node not in (3, 6):
-            raise FileFormatError(
-                f"{A.shape[0]} rows are neither 3 nor 6 for each of {labels.size} nodes."
+    def rotations(
+        self, K: csr_matrix, M: csr_matrix, *, hold: bool
+    ) -> tuple[csr_matrix, Rotations | None]:
+        """Which combinations of the rows are dofs of the model, and those that turn nodes."""
+        k, n = self.labels.size, K.shape[0]
+        turning = slice(3 * k, 6 * k)
+        nodes, axes, loose = _felt(K[turning], M[turning])
+        if loose.size and not hold:
+            named = ", ".join(map(str, self.labels[loose[:MORE_NODES]]))
+            raise ModelError(
+                f"{loose.size} nodes turn about an axis without stiffness and mass (nodes {named}"
+                f"{', …' if loose.size > MORE_NODES else ''}), as those of flat shells about their "
+                "normals.",
+                hint="Give hold_drilling=True to leave these rotations out; nothing feels them.",
             )
-        nodes = np.repeat(labels, per_node)
-        dofs = np.column_stack([nodes, np.tile(np.arange(1, per_node + 1), labels.size)])
-    node, strange = _places(labels, dofs[:, 0])
-    if strange:
-        raise FileFormatError(f"rows belong to nodes that are not given: {strange}.")
-    turning = (dofs[:, 1] < 1) | (dofs[:, 1] > 3)
-    if np.abs(A[turning]).sum() > 0:
-        label, component = dofs[np.flatnonzero(turning)[0]]
+        t = nodes.size
+        row = (3 * (k + nodes)[:, None] + np.arange(3)).ravel()
+        column = np.repeat(3 * k + np.arange(t), 3)
+        rest = np.r_[np.arange(3 * k), np.arange(6 * k, n)]
+        to = np.r_[np.arange(3 * k), 3 * k + t + np.arange(n - 6 * k)]
+        entries = np.r_[axes.ravel(), np.ones(rest.size)], (np.r_[row, rest], np.r_[column, to])
+        T = csr_matrix(entries, shape=(n, n - 3 * k + t))
+        return T, Rotations(nodes, axes, 3 * k + np.arange(t)) if t else None
+
+
+def _felt(K: csr_matrix, M: csr_matrix) -> tuple[Index, Array, Index]:
+    """Nodes (t,) and axes (t, 3) of rotations that stiffness or mass feels, of 3 rows a node.
+
+    Also nodes that turn about some axes and not about others. Whole triples keep x, y and z.
+    """
+    squares = [_squares(A) for A in (K, M)]
+    G = sum(S / max(S.max(initial=0.0), 1e-300) for S in squares)
+    size, V = np.linalg.eigh(G)
+    felt = size > UNFELT_RTOL * size[:, -1:].clip(1e-300)
+    felt &= size[:, -1:] > UNFELT_RTOL * size.max(initial=0.0)
+    V[felt.all(axis=1)] = np.eye(3)
+    node, column = np.nonzero(felt)
+    return node, V[node, :, column], np.flatnonzero(felt.any(axis=1) & ~felt.all(axis=1))
+
+
+def _squares(A: csr_matrix) -> Array:
+    """(k, 3, 3) products of the rows of one node with each other, of 3 rows a node."""
+    found = np.zeros((A.shape[0] // 3, 3, 3))
+    for a in range(3):
+        for b in range(a, 3):
+            found[:, a, b] = found[:, b, a] = A[a::3].multiply(A[b::3]).sum(axis=1).A1
+    return found
+
+
+def _layout(
+    found: list[NamedMatrix], labels: Index, points: Array, axes: Array, modal: Index
+) -> _Layout:
+    """Nodes and scalars of labelled rows; nodes in no row, for loads and pictures, are left out."""
+    scalars = np.zeros(0, dtype=np.int64)
+    if any(A.dofs is None for A in found):
+        return _Layout(labels, points, axes, scalars)
+    dofs = np.unique(np.concatenate([A.dofs for A in found if A.dofs is not None]), axis=0)
+    own, n_rows = np.unique(dofs[:, 0], return_counts=True)
+    sole = own[n_rows == 1]  # of modes that other programs put on nodes of their own
+    scalars = np.unique(np.r_[dofs[dofs[:, 1] == 0, 0], sole, modal]).astype(np.int64)
+    dofs = dofs[~np.isin(dofs[:, 0], scalars)]
+    used = np.isin(labels, dofs[:, 0])
+    own, n_rows = np.unique(dofs[dofs[:, 1] <= 3, 0], return_counts=True)
+    halves = np.union1d(own[n_rows < 3], np.setdiff1d(dofs[:, 0], own))
+    if halves.size:
+        has = dofs[dofs[:, 0] == halves[0], 1].tolist()
         raise ModelError(
-            f"node {label} has the component {component}: nodes that turn are those of beams and "
-            "shells; this body has to be a solid."
+            f"{halves.size} nodes do not move along three axes: node {halves[0]} has the "
+            f"components {has} alone.",
+            hint="Write K and M without supports; give labels of modes as modal=.",
         )
-    return np.where(turning, -1, 3 * node + dofs[:, 1] - 1)
+    return _Layout(labels[used], points[used], axes[used], scalars)
+
+
+def _labelled(A: csr_matrix, dofs: Dofs | None, labels: Index) -> Dofs:
+    """(n, 2) node and component of each row; 3 or 6 rows a node where the file has no labels."""
+    if dofs is not None:
+        return dofs
+    per_node, remainder = divmod(A.shape[0], labels.size)
+    if remainder or per_node not in (3, 6):
+        raise FileFormatError(
+            f"{A.shape[0]} rows are neither 3 nor 6 for each of {labels.size} nodes."
+        )
+    nodes = np.repeat(labels, per_node)
+    return np.column_stack([nodes, np.tile(np.arange(1, per_node + 1), labels.size)])
 
 
 def _places(labels: Index, wanted: Index) -> tuple[Index, list[int]]:
@@ -152,7 +244,9 @@ def _completed(A: csr_matrix) -> csr_matrix:
     return csr_matrix(0.5 * (A + A.T))
 
 
-def _interface(name: str, wanted: npt.ArrayLike, labels: Index, points: Array) -> Interface:
+def _interface(
+    name: str, wanted: npt.ArrayLike, labels: Index, points: Array, rotations: Rotations | None
+) -> Interface:
     try:
         own = np.unique(np.asarray(wanted, dtype=np.int64))
     except (TypeError, ValueError, OverflowError):
@@ -164,12 +258,22 @@ def _interface(name: str, wanted: npt.ArrayLike, labels: Index, points: Array) -
         raise InterfaceError(f"interface {name!r} needs nodes of the model; unknown are {strange}.")
     node = node[np.lexsort(points[node].T[::-1])]
     weights = identity(node.size, format="csr") / node.size
-    return Interface(name, node, points[node], weights, points[node].mean(axis=0))
+    turning = None if rotations is None else rotations.of(node)
+    return Interface(
+        name, node, points[node], weights, points[node].mean(axis=0), rotations=turning
+    )
 
 
 def _check_mass(model: FEModel) -> None:
-    scalar = model.M[::3][:, ::3]
-    if abs(model.M - kron(scalar, identity(3))).max() > MIXED_MASS_RTOL * abs(model.M).max():
+    """The mass of solids is the same along x, y and z at each node, of other bodies as a whole."""
+    if model.n_dofs == model.points.size:
+        scalar = model.M[::3][:, ::3]
+        apart = abs(model.M - kron(scalar, identity(3))).max() / abs(model.M).max()
+    else:
+        R = _motions(model)[:, :3]
+        rigid = R.T @ model.M @ R
+        apart = np.abs(rigid - np.eye(3) * rigid[0, 0]).max() / np.abs(rigid).max()
+    if apart > MIXED_MASS_RTOL:
         raise ModelError(
             "the mass is not the same along x, y and z, or couples them: it is not that of solid "
             "elements.",
@@ -177,13 +281,17 @@ def _check_mass(model: FEModel) -> None:
         )
 
 
+def _motions(model: FEModel) -> Array:
+    """(n, 6) rigid motions, rotations about the middle of the nodes, as large as translations."""
+    centre = model.points.mean(axis=0)
+    R = model.rigid_motions(centre)
+    R[:, 3:] /= max(np.abs(model.points - centre).max(), 1e-300)
+    return R
+
+
 def _check_free(model: FEModel) -> None:
     """Rigid motions must be free of force; supports and rows left out are seen here."""
-    X = model.points - model.points.mean(axis=0)
-    size = max(np.abs(X).max(), 1e-300)
-    turns = [np.cross(axis, X / size) for axis in np.eye(3)]
-    R = np.column_stack([*(np.tile(axis, len(X)) for axis in np.eye(3)), *map(np.ravel, turns)])
-    residual = np.abs(model.K @ R).max() / abs(model.K).max()
+    residual = np.abs(model.K @ _motions(model)).max() / abs(model.K).max()
     if not residual < RIGID_RTOL:
         raise QualityGateError(
             f"a rigid motion meets the stiffness {residual:.2g} of its largest entry: the body is "
@@ -198,6 +306,8 @@ def _doubt_units(model: FEModel) -> None:
     box = np.ptp(model.points, axis=0)
     of = f"the body of {model.provenance['K']}"
     warn_outside(SIZE, float(np.linalg.norm(box)), of)
+    if model.n_dofs > model.points.size:
+        return  # where nodes turn, wrong lengths already meet stiffness
     if box.min() > 0.0:
         warn_outside(DENSITY, model.mass() / float(box.prod()), of)
     warn_outside(MATRIX_SPEED, _speed_of_sound(model), of)

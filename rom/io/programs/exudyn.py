@@ -24,12 +24,12 @@ from pathlib import Path
 import numpy as np
 
 from rom.body.flexible import FlexibleBody
-from rom.body.reference import skew_tensor
 from rom.errors import warn
 from rom.io.files import write_whole
 from rom.io.sid.body import invariants
 from rom.model import Array, Index
 from rom.names import ORIGIN_MARK
+from rom.rotation import skew_tensor
 
 STAR_POINTS = np.vstack([np.eye(3), -np.eye(3)])  # nodes around an interface
 MOMENTUM_RTOL = 1e-9  # share of what the momentum of a shape could be

@@ -6,12 +6,12 @@ from scipy.linalg import eigh
 from rom.body.flexible import FlexibleBody
 from rom.body.records import Marker
 from rom.body.recovery import CENTRIFUGAL_LOADS, PRODUCTS
-from rom.body.reference import skew_tensor
 from rom.body.stiffening import ANGULAR_LOADS, LINEAR_LOADS, SecondOrder, interface_loads
 from rom.errors import ConfigError
 from rom.io.sid.dialect import by_mode, first
 from rom.io.sid.format import StandardInput, Taylor
 from rom.model import Array
+from rom.rotation import skew_tensor
 
 EPS = -skew_tensor()  # of Levi-Civita
 PRODUCT_NAMES = ("xx", "yy", "zz", "xy", "yz", "xz")  # of angular velocities: columns of Oe

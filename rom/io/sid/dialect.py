@@ -14,11 +14,11 @@ from pathlib import Path
 import numpy as np
 
 from rom.arguments import one_of, typed
-from rom.body.reference import skew_tensor
 from rom.errors import FileFormatError, warn
 from rom.io.sid.format import BLOCKS, DIALECTS, TENSOR_ENTRIES, StandardInput, Taylor, repacked
 from rom.io.sid.reading import RawBlock, RawFile, read_raw, values
 from rom.model import Array, Report, Row
+from rom.rotation import skew_tensor
 
 RESIDUAL_RTOL = 1e-8  # files have twelve digits
 GE_FORMS = ("antisymmetric", "as_written")

@@ -4,9 +4,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import eigh
+from scipy.linalg import LinAlgError, eigh
 
-from rom.eigen.verbs import Held, Operators
+from rom.eigen.verbs import Held, Operators, massless
 from rom.model import Array, Index
 from rom.reduction.bases.fixed_interface import projected, residual_shapes
 from rom.rows import N_COMPARED
@@ -92,6 +92,11 @@ def truncation_errors(
 
 def reduced_modes(K: Array, M: Array) -> tuple[Array, Array]:
     """All eigenvalues of a reduced body and its mass-normalised modes."""
+    if not np.diag(M).min() > 0.0:
+        raise massless("the interfaces")
     scale = 1 / np.sqrt(np.diag(M))
-    lam, V = eigh(scale[:, None] * K * scale, scale[:, None] * M * scale)
+    try:
+        lam, V = eigh(scale[:, None] * K * scale, scale[:, None] * M * scale)
+    except LinAlgError as error:
+        raise massless("the interfaces") from error
     return lam, scale[:, None] * V

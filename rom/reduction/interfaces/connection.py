@@ -12,7 +12,7 @@ import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 
 from rom.eigen.connection import Connection, Tie
-from rom.eigen.verbs import Operators, given_rigid_motions, held_rows, owned, rigid_motions
+from rom.eigen.verbs import Operators, given_rigid_motions, held_rows, owned
 from rom.errors import InterfaceError
 from rom.model import FEModel, Index, Interface
 from rom.names import check_all_known, named
@@ -80,7 +80,7 @@ def _transform(
     rigid = [given_rigid_motions(ops)[stays]]
     if ops.last:
         moved = [i for i in chosen if ties[i.name].n_masters]
-        rigid += [ties[i.name].coordinates @ rigid_motions(i.points) for i in moved]
+        rigid += [ties[i.name].coordinates @ i.rigid_motions() for i in moved]
     return ops.transform(T, np.vstack(rigid)), numbers
 
 

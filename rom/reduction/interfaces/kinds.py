@@ -8,8 +8,9 @@ from scipy.linalg import qr
 from scipy.sparse import identity, kron
 
 from rom.eigen.connection import Tie
-from rom.eigen.verbs import mean_motion, rigid_motions
-from rom.errors import ConfigError, ResourceError
+from rom.eigen.supports import full_kind
+from rom.eigen.verbs import mean_motion
+from rom.errors import ConfigError, InterfaceError, ResourceError
 from rom.model import Array, Interface
 from rom.names import is_whole
 from rom.reduction.interfaces.characteristic import CharacteristicFunctions
@@ -30,14 +31,17 @@ def tie(interface: Interface, kind: Any) -> Tie:
     """The tie of an interface of that kind."""
     kind = parsed(interface.name, kind)
     if kind == "full":
-        names = tuple(f"node {k // 3} u{'xyz'[k % 3]}" for k in range(interface.dofs.size))
+        names = _full_names(interface)
         itself, nothing = identity(interface.dofs.size, format="csr"), np.zeros((0, 0))
-        return Tie("full", names, itself, NO_DOFS, nothing, NO_DOFS, nothing)
+        return Tie(full_kind(interface), names, itself, NO_DOFS, nothing, NO_DOFS, nothing)
     if kind == "rbe2":
-        R = rigid_motions(interface.points - interface.origin)
+        R = interface.rigid_motions(interface.origin)
         return _stiff(interface, "rbe2", SIX_LABELS, mean_motion(interface), R)
     if kind == "rbe3":
         return _averaged(interface)
+    if interface.rotations is not None:
+        text = f"interface {interface.name!r} has nodes that turn, and functions only displace"
+        raise InterfaceError(f'{text}; give it "rbe2", "rbe3" or "full".')
     if isinstance(kind, Snapshots):
         return _found(interface, "snapshots", snapshot_functions(kind, interface))
     if isinstance(kind, CharacteristicFunctions):
@@ -49,6 +53,14 @@ def tie(interface: Interface, kind: Any) -> Tie:
     if isinstance(kind, FourierLegendre):
         label = f"fourier:{kind.harmonics},{kind.order}"
     return _stiff(interface, label, names, L, kron(Q, identity(3), format="csr"))
+
+
+def _full_names(interface: Interface) -> tuple[str, ...]:
+    names = [f"node {k // 3} u{'xyz'[k % 3]}" for k in range(interface.points.size)]
+    if (turning := interface.rotations) is not None:
+        of_node = np.arange(turning.nodes.size) - np.searchsorted(turning.nodes, turning.nodes)
+        names += [f"node {k} r{j + 1}" for k, j in zip(turning.nodes, of_node, strict=True)]
+    return tuple(names)
 
 
 def _stiff(

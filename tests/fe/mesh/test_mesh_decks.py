@@ -259,7 +259,7 @@ def test_random_decks_are_read_whole_or_refused_by_card(form, seed, tmp_path):
     (root,) = (arrays[f"facets {k}"] for k, name in enumerate(notes["facet_names"])
                if name.upper() in ("SPC_7", "ROOT"))  # fmt: skip
     assert_allclose(local[root, 0], 0.0, atol=rtol)
-    _, points = read_nodes(path)  # with matrices of another program
+    _, points, _ = read_nodes(path)  # with matrices of another program
     assert_allclose(np.sort(points, axis=0), np.sort(arrays["points"], axis=0))
 
 
@@ -288,7 +288,7 @@ def test_systems_lead_where_the_manuals_say(tmp_path):
     """Degrees of a sphere, from z, then around it; blank fields are those of GRDSET."""
     # at (1, 0, 0) 101 lies on y, 102 on -x, 103 on z; their system has z = -(1, 1, 0) / sqrt(2)
     (tmp_path / "s.bdf").write_text(SPHERE + "GRID,1,,1.,0.,2.\nGRID,2,0,1.,0.,2.\n")
-    labels, points = read_nodes(tmp_path / "s.bdf")
+    labels, points, _ = read_nodes(tmp_path / "s.bdf")
     found = dict(zip(labels.tolist(), points, strict=True))
     assert_allclose(found[101], [1, 2, 0], atol=1e-14)
     assert_allclose(found[102], [-1, 0, 0], atol=1e-14)

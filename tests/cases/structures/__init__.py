@@ -1,0 +1,1 @@
+"""Structures whose nodes turn."""
