@@ -17,7 +17,7 @@ from rom.io.matrices.dmig import Dofs, read_grids
 from rom.model import Array, Index
 from rom.names import named, offered
 
-CARDS = (".bdf", ".dat", ".pch", ".asm")
+CARDS = (".bdf", ".dat", ".pch", ".asm", ".dmig")
 COMPONENTS = {"UX": 1, "UY": 2, "UZ": 3, "ROTX": 4, "ROTY": 5, "ROTZ": 6}  # of Ansys
 AXES_TOL = 1e-6  # of axes that are orthonormal
 Placed = tuple[Index, Array, Array]
@@ -32,7 +32,7 @@ def read_nodes(nodes: str | Path | tuple[npt.ArrayLike, ...]) -> Placed:
 
     Args:
         nodes: these, the axes only where they are not those of the body; or a file: ``.inp``,
-            ``.bdf``, ``.dat``, ``.pch``, ``.asm`` or ``.csv``.
+            ``.csv``, or bulk data with GRID cards.
 
     Raises:
         ConfigError: for another ending.
@@ -62,7 +62,7 @@ def _node_file(path: Path) -> tuple[npt.NDArray[Any], ...]:
     if ending in CARDS:
         return read_grids(path)
     if ending not in (".inp", ".csv"):
-        raise ConfigError(f"{path}: nodes must come from .inp, .bdf, .dat, .pch, .asm or .csv.")
+        raise ConfigError(f"{path}: nodes must come from .inp, .csv, {', '.join(CARDS)}.")
     return _deck(path).placed() if ending == ".inp" else _table(path)
 
 

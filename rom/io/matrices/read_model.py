@@ -58,8 +58,8 @@ def read_model(  # noqa: PLR0913  one keyword per choice
         M: mass, likewise; of solids the same along x, y and z. Rotations may have none.
         nodes: (k,) labels and (k, 3) positions, in units of the files, and where the rows of
             nodes follow axes of their own (k, 3, 3), these as columns; or a file: ``.inp`` with
-            ``*NODE``, ``.bdf``, ``.dat``, ``.pch`` or ``.asm`` with GRID cards, ``.csv`` with lines
-            ``label, x, y, z``. Where all rows have labels, nodes without a row are left out.
+            ``*NODE``, ``.bdf``, ``.dat``, ``.pch``, ``.asm`` or ``.dmig`` with GRID cards, ``.csv``
+            with lines ``label, x, y, z``. Nodes without a row are left out where rows have labels.
         interfaces: {name: (m,) labels of its nodes}, or names of ``*NSET`` in the
             ``.inp`` of the nodes; all nodes of an interface weigh the same.
         D: damping, likewise, which bodies then have; it may not resist motions as a whole.
