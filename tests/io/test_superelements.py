@@ -7,7 +7,7 @@ held. Its span is that of the reduction in rom, so that both bodies are the same
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scipy.io import mmwrite
+from scipy.io import hb_write, mmwrite
 from scipy.linalg import eigh
 from scipy.sparse import csc_matrix, csr_matrix, tril
 
@@ -262,7 +262,7 @@ def test_what_no_superelement_has_is_named(reduced, tmp_path):
         (ModelError, "1 entries on the diagonal of the mass are negative", {"M": negative}),
         (ModelError, "1 rows .* as those of Lagrange multipliers.* hybrid",
          {"K": tied, "M": heavy, "dofs": more}),
-        (QualityGateError, "check nodes, units and labels of modes",
+        (QualityGateError, "check nodes, their axes, units, and labels of modes",
          {"modal": [20], "interfaces": {"root": [10]}}),
         (ModelError, r"modal names \[7\], which no row", {"modal": [7]}),
         (QualityGateError, "meets the stiffness", {"nodes": (e.placed[0], 1e3 * e.points)}),
@@ -305,9 +305,11 @@ def test_boeing_files_that_are_damaged(tmp_path):
     A = rng.normal(size=(5, 5))
     path = boeing(tmp_path / "a.hb", A, kind="RUA", per=(3, 4, 2), rhs=True)
     assert_allclose(read_matrix(path).A.toarray(), A, rtol=1e-14)
+    hb_write(str(tmp_path / "b.hb"), csc_matrix(A))
+    assert_allclose(read_matrix(tmp_path / "b.hb").A.toarray(), A, rtol=1e-14)
     lines = path.read_text().splitlines()
     for change, words in (
-        ({2: lines[2].replace("RUA", "CUA")}, "a matrix CUA is not real and assembled"),
+        ({2: lines[2].replace("RUA", "CUA")}, "a matrix CUA is not real, square and assembled"),
         ({2: lines[2].replace(f"{25:14d}", f"{10**9:14d}")}, "1000000000 entries do not fit"),
         ({2: lines[2].replace(f"{25:14d}", f"{24:14d}")}, "25 numbers where 24 are announced"),
         ({5: lines[5].replace(" 6", "16")}, "columns do not ascend"),

@@ -266,7 +266,7 @@ def read_boeing(path: str | Path) -> csr_matrix:
         counts = [int(word) for word in file.readline().split()]
         kind, *sizes = file.readline().split()
         rows, columns, n = map(int, sizes[:3])
-        need(kind.upper() in ("RSA", "RUA"), f"a matrix {kind} is not real and assembled")
+        need(kind.upper() in ("RSA", "RUA"), f"a matrix {kind} is not real, square and assembled")
         if max(rows, columns) > MOST_ROWS or 2 * max(n, columns) > path.stat().st_size:
             raise UnsafeFileError(f"sizes {rows} x {columns}, {n} entries do not fit the file.")
         formats = FIELD_PATTERN.findall(file.readline().upper())
