@@ -262,7 +262,7 @@ def test_what_no_superelement_has_is_named(reduced, tmp_path):
         (ModelError, "1 entries on the diagonal of the mass are negative", {"M": negative}),
         (ModelError, "1 rows .* as those of Lagrange multipliers.* hybrid",
          {"K": tied, "M": heavy, "dofs": more}),
-        (QualityGateError, "check nodes, their axes, units, and labels of modes",
+        (QualityGateError, "check nodes, axes, units and labels of modes",
          {"modal": [20], "interfaces": {"root": [10]}}),
         (ModelError, r"modal names \[7\], which no row", {"modal": [7]}),
         (QualityGateError, "meets the stiffness", {"nodes": (e.placed[0], 1e3 * e.points)}),
@@ -303,7 +303,7 @@ def test_tables_of_dofs_that_do_not_fit(tmp_path):
 def test_boeing_files_that_are_damaged(tmp_path):
     rng = np.random.default_rng(3)
     A = rng.normal(size=(5, 5))
-    path = boeing(tmp_path / "a.hb", A, kind="RUA", per=(3, 4, 2), rhs=True)
+    path = boeing(tmp_path / "a.hb", A, (3, 3, 22), (3, 4, 2), rhs=True, kind="RUA")
     assert_allclose(read_matrix(path).A.toarray(), A, rtol=1e-14)
     hb_write(str(tmp_path / "b.hb"), csc_matrix(A))
     assert_allclose(read_matrix(tmp_path / "b.hb").A.toarray(), A, rtol=1e-14)

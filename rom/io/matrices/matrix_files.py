@@ -283,9 +283,11 @@ def read_boeing(path: str | Path) -> csr_matrix:
 
 
 def _fields(file: IO[str], n_lines: int, width: int, n: int) -> Array:
-    """(n,) numbers of lines of Fortran, in fields of one width."""
-    lines = [file.readline().rstrip("\n") for _ in range(n_lines)]
-    words = [line[k : k + width] for line in lines for k in range(0, len(line.rstrip()), width)]
+    """(n,) numbers of lines of Fortran, between blanks or else in fields of one width."""
+    lines = [file.readline().rstrip() for _ in range(n_lines)]
+    words = " ".join(lines).split()  # SciPy 1.10 announces fields wider than it writes them
+    if len(words) != n:
+        words = [line[k : k + width] for line in lines for k in range(0, len(line), width)]
     need(len(words) == n, f"{len(words)} numbers where {n} are announced")
     return np.array([number(word) for word in words])
 

@@ -336,7 +336,7 @@ def _check_free(what: str, A: csr_matrix, model: FEModel) -> None:
     """Rigid motions must be free of force; supports and rows left out are seen here."""
     residual = np.abs(A @ _motions(model)).max() / max(abs(A).max(), 1e-300)
     if not residual < RIGID_RTOL:
-        hint = "Write K without boundary conditions, and check nodes, their axes, units, and labels of modes."
+        hint = "Write K without boundary conditions; check nodes, axes, units and labels of modes."
         if what == "damping":
             hint = "Leave D out; rom.Rayleigh damps the deformation in proportion to the mass."
         raise QualityGateError(

@@ -20,8 +20,8 @@ LONG_DEMOS = {
         "flexible_arm flexure forming hand isotropy large_deflection large_mesh lost_tip masonry "
         "mistuning oil_inlet parameters pendulum_chain periodic planetary robot_arm rockfall "
         "rolling_wheel rotating_blade rotor satellite sheet slider_crank snap_through spin_up "
-        "study transmission two_stage updating virtual_sensing whole_turbine wind_power "
-        "wind_turbine"
+        "study superelement transmission two_stage updating virtual_sensing whole_turbine "
+        "wind_power wind_turbine"
     ).split()
 }
 OUTPUT = re.compile(r'\bout / "([\w.]+)"')  # what a demo names in the folder of its results
