@@ -199,6 +199,7 @@ class FEModel:
         regions: {name: share of the region}, for parameters; empty when they are not known.
         rotations: which dofs turn nodes; None for solids.
         n_scalars: number of coordinates without a place.
+        D: (n, n) damping [N s/m] of the deformation, which bodies get; None for none.
     """
 
     K: Any
@@ -213,6 +214,7 @@ class FEModel:
     regions: Mapping[str, "Region"] = field(default_factory=dict)
     rotations: Rotations | None = None
     n_scalars: int = 0
+    D: Any = None
 
     def __repr__(self) -> str:
         return (

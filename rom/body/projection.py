@@ -101,7 +101,7 @@ def flexible_body(
         name=name,
         **fields_of(sum(carried_integrals(model, ops, E), integrals)),
         K=np.diag(omega**2),
-        D=np.zeros((omega.size, omega.size)),
+        D=np.zeros((omega.size, omega.size)) if model.D is None else E.T @ model.D @ E,
         markers={n: _marker(ops, model.interfaces[n], tie, E) for n, tie in ties.items()},
         omega=omega,
         labels=mode_labels(omega.size, "mean-axis"),
