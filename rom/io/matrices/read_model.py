@@ -57,7 +57,8 @@ def read_model(
         nodes: (k,) labels and (k, 3) positions, in units of the files, and where the rows of
             nodes follow axes of their own (k, 3, 3), these as columns; or a file: ``.inp`` with
             ``*NODE``, ``.bdf`` or ``.dat`` with GRID cards, ``.csv`` with lines ``label, x, y, z``.
-            Rows of matrices without labels are those of the nodes in ascending order, 3 or 6 for
+            Masses, springs and rigid elements of such a file are in the matrices already, and
+            none is added. Rows of matrices without labels are those of the nodes in ascending order, 3 or 6 for
             each; where all rows have labels, nodes without a row are left out.
         interfaces: {name: (m,) labels of its nodes}, or names of ``*NSET`` in the
             ``.inp`` of the nodes; all nodes of an interface weigh the same.

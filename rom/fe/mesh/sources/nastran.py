@@ -120,7 +120,7 @@ def _rigid(card: Card) -> Rigid | str:
         if set(card.text(2 + a)) != ALL or card.text(2 + b) or card.text(4 + a):
             return "RBAR of which no end leads"
     if not set(moved) >= DISPLACED:
-        return f"{card.name} of the components {moved}"
+        return f"{card.name} of the components {moved or None}"
     return Rigid(*_named(card), lead, [card.whole(k) for k in nodes], set(moved) == ALL)
 
 
@@ -129,7 +129,7 @@ def _averaged(card: Card) -> Average | str:
     weights, weight, components = dict[int, float](), 0.0, True
     words = {card.text(k) for k in range(4, len(card.fields))}
     if "UM" in words or set(card.text(3)) != ALL:
-        return "RBE3 with UM" if "UM" in words else f"RBE3 of the components {card.text(3)}"
+        return "RBE3 with UM" if "UM" in words else f"RBE3 of the components {card.text(3) or None}"
     for k in (k for k in range(4, len(card.fields)) if card.text(k)):
         if card.text(k) == "ALPHA":
             break
