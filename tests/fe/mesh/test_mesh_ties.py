@@ -148,6 +148,9 @@ CARDS = {
         BODY[0].replace(MASS, repr(2 * float(WEIGHTS.sum()))),
         "," + ",".join(repr(2 * float(w)) for w in BODY[1].split(",")[1:])),
         "MAT1,1,2.1+11,,.3,15700."],
+    "points": [RBE2, *(
+        f"CONM2,{80 + k},900,,{float(m)!r},{','.join(repr(float(v)) for v in x)}"
+        for k, (m, x) in enumerate(zip(WEIGHTS, CLOUD, strict=True)))],
     "displacements": [RBE2.replace("123456", "123"), *BODY],
     "expansion": [f"{RBE2},1.2-5", *BODY],
     "RBAR": [*SPIDER, *BODY],

@@ -57,8 +57,9 @@ def read(path: str) -> Read:
     found, ties, remarks = _sorted(Path(path))
     ids, points, _, system = grids(found)
     solids = [card for name in SOLIDS for card in found.get(name, ())]
-    cell_type = only_type(_type(card) for card in solids)
-    raw = np.array([_nodes(card, 2) for card in solids], dtype=np.int64)
+    nodes = [_nodes(card) for card in solids]
+    cell_type = only_type(_type(*solid) for solid in zip(solids, nodes, strict=True))
+    raw = np.array(nodes, dtype=np.int64)
     properties = np.array([_property(card) for card in solids], dtype=np.int64)
     numbers = np.array([card.whole(0) for card in solids], dtype=np.int64)
     positions(numbers, numbers[:1], "element")  # refuses a number given twice
@@ -194,19 +195,19 @@ def _per_weight(found: dict[str, list[Card]]) -> float:
     return factors.pop() if factors else 1.0
 
 
-def _type(card: Card) -> str:
-    nodes, known = _nodes(card, 2), SOLIDS[card.name]
+def _type(card: Card, nodes: list[int]) -> str:
+    known = SOLIDS[card.name]
     if len(nodes) not in known:
         raise card.wrong(f"it has {len(nodes)} nodes, not {' or '.join(map(str, known))}")
     return known[len(nodes)]
 
 
-def _nodes(card: Card, start: int) -> list[int]:
-    """Labels from a field on, up to the last that is not empty or zero."""
-    words = card.fields[start:]
-    while words and not words[-1].strip("0"):
-        words = words[:-1]
-    return [card.whole(k) for k in range(start, start + len(words))]
+def _nodes(card: Card) -> list[int]:
+    """Nodes of a solid, up to the last that is not empty or zero."""
+    n = len(card.fields)
+    while n > 2 and not card.fields[n - 1].strip("0"):
+        n -= 1
+    return [card.whole(k) for k in range(2, n)]
 
 
 def _property(card: Card) -> int:
