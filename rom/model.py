@@ -191,6 +191,8 @@ class FEModel:
         points: (k, 3) reference coordinates in the body frame [m], the same on all ranks.
         interfaces: interfaces by name.
         attachments: point masses and rigid bodies carried by interfaces.
+        kinds: {interface: its kind} of those that the model ties by itself, as rigid elements of
+            a deck do; where nobody names another kind.
         surface: outer surface for pictures; None when there is none.
         provenance: how the model was made: geometry file, parameters, material, versions.
         operators: the five verbs on this model when K and M are not SciPy matrices.
@@ -215,6 +217,7 @@ class FEModel:
     rotations: Rotations | None = None
     n_scalars: int = 0
     D: Any = None
+    kinds: Mapping[str, str] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         return (

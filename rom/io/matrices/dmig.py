@@ -60,7 +60,7 @@ def read_grids(path: str | Path) -> tuple[Index, Array, Array]:
     for card in cards(path):
         if card.name in POINTS:
             found.setdefault(card.name, []).append(card)
-    return grids(found)
+    return grids(found)[:3]
 
 
 def write_dmig(

@@ -59,6 +59,7 @@ def read_model(  # noqa: PLR0913  one keyword per choice
             nodes follow axes of their own (k, 3, 3), these as columns; or a file: ``.inp`` with
             ``*NODE``, ``.bdf``, ``.dat``, ``.pch``, ``.asm`` or ``.dmig`` with GRID cards, ``.csv``
             with lines ``label, x, y, z``. Nodes without a row are left out where rows have labels.
+            Masses, springs and rigid elements of a deck are in the matrices, and none is added.
         interfaces: {name: (m,) labels of its nodes}, or names of ``*NSET`` in the
             ``.inp`` of the nodes; all nodes of an interface weigh the same.
         D: damping, likewise, which bodies then have; it may not resist motions as a whole.
