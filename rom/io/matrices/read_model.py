@@ -84,6 +84,12 @@ def read_model(  # noqa: PLR0913  one keyword per choice
 
     Warns:
         RomWarning: if size, density or speed of sound are those of no solid: wrong units.
+
+    Example:
+        >>> file = rom.export(rom.load("beam.rom.npz"), "beam.dmig")  # 2 rigid ends, 4 modes
+        >>> ends = {"root": [1], "tip": [2]}
+        >>> rom.read_model((file, "KAAX"), (file, "MAAX"), nodes=file, interfaces=ends)
+        FEModel(16 dofs, regions none, interfaces root, tip)
     """
     unit = unit_system(units)
     labels, points, axes = read_nodes(nodes)
