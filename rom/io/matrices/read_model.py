@@ -216,7 +216,8 @@ def _listed(A: NamedMatrix, table: Dofs) -> NamedMatrix:
     more = np.arange(1, A.A.shape[0] - len(table) + 1)
     if A.A.shape[0] < len(table):
         text = f"it has {A.A.shape[0]} rows; the table of dofs has {len(table)}"
-        raise FileFormatError(f"{text}.", where=A.where)
+        hint = "Nastran writes one row for a matrix that is none; leave it out."
+        raise FileFormatError(f"{text}.", where=A.where, hint=hint)
     behind = np.column_stack([table[:, 0].max(initial=0) + more, np.zeros_like(more)])
     return replace(A, dofs=np.concatenate([table, behind]))
 
