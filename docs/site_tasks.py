@@ -141,7 +141,7 @@ FILE_NAMES = {name: f"{name}-function" for name in NAMES if name in CLASSES}
 
 SUBJECTS = {
     "Reduce a body": """beam assembly compressor_blade reference_conditions parameters large_mesh
-    exchange""",
+    exchange superelement""",
     "Mechanisms": """slider_crank robot_arm flexible_arm satellite pendulum_chain hand rolling_wheel
     periodic isotropy best_matching study""",
     "Large deflection and metal forming": """large_deflection flexure snap_through spin_up sheet

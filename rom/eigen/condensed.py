@@ -46,7 +46,7 @@ class Condensed:
         alone, S, R = self.alone[free], self.S[np.ix_(free, free)], np.zeros((0, 6))
         if not dofs.size and self.ops.rigid is not None:
             R = self.ops.rows(self.ops.rigid, self.boundary)
-            size = np.linalg.norm(R, axis=1)
+            size = np.linalg.norm(R, axis=1).clip(1e-300)
             if np.linalg.matrix_rank(R / size[:, None]) == len(R):  # alone it may be without
                 alone, S = size**-2, np.zeros_like(S)  # stiffness: it moves as a whole
         scale = 1.0 / np.sqrt(alone)

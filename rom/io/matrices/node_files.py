@@ -41,7 +41,10 @@ def read_nodes(nodes: str | Path | tuple[npt.ArrayLike, ...]) -> Placed:
     if isinstance(nodes, str | Path):
         where, (labels, points, *axes) = str(nodes), _node_file(Path(nodes))
     else:
-        where, (labels, points, *axes) = "nodes", (np.asarray(part) for part in nodes)
+        where = "nodes"
+        if len(nodes) not in (2, 3):
+            raise ConfigError("nodes are labels, positions and perhaps axes, or a file.")
+        labels, points, *axes = (np.asarray(part) for part in nodes)
     if points.shape != (labels.size, 3) or not labels.size or not np.isfinite(points).all():
         raise FileFormatError(f"{labels.size} labels and positions {points.shape}.", where=where)
     turned = axes[0] if axes else np.tile(np.eye(3), (labels.size, 1, 1))

@@ -84,6 +84,12 @@ def read_model(  # noqa: PLR0913  one keyword per choice
 
     Warns:
         RomWarning: if size, density or speed of sound are those of no solid: wrong units.
+
+    Example:
+        >>> file = rom.export(rom.load("beam.rom.npz"), "beam.dmig")  # 2 rigid ends, 4 modes
+        >>> ends = {"root": [1], "tip": [2]}
+        >>> rom.read_model((file, "KAAX"), (file, "MAAX"), nodes=file, interfaces=ends)
+        FEModel(16 dofs, regions none, interfaces root, tip)
     """
     unit = unit_system(units)
     labels, points, axes = read_nodes(nodes)
@@ -210,7 +216,8 @@ def _listed(A: NamedMatrix, table: Dofs) -> NamedMatrix:
     more = np.arange(1, A.A.shape[0] - len(table) + 1)
     if A.A.shape[0] < len(table):
         text = f"it has {A.A.shape[0]} rows; the table of dofs has {len(table)}"
-        raise FileFormatError(f"{text}.", where=A.where)
+        hint = "Nastran writes one row for a matrix that is none; leave it out."
+        raise FileFormatError(f"{text}.", where=A.where, hint=hint)
     behind = np.column_stack([table[:, 0].max(initial=0) + more, np.zeros_like(more)])
     return replace(A, dofs=np.concatenate([table, behind]))
 
