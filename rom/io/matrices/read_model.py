@@ -58,8 +58,8 @@ def read_model(
             nodes follow axes of their own (k, 3, 3), these as columns; or a file: ``.inp`` with
             ``*NODE``, ``.bdf`` or ``.dat`` with GRID cards, ``.csv`` with lines ``label, x, y, z``.
             Masses, springs and rigid elements of such a file are in the matrices already, and
-            none is added. Rows of matrices without labels are those of the nodes in ascending order, 3 or 6 for
-            each; where all rows have labels, nodes without a row are left out.
+            none is added. Rows of matrices without labels are those of the nodes in ascending
+            order, 3 or 6 for each; where all rows have labels, nodes without a row are left out.
         interfaces: {name: (m,) labels of its nodes}, or names of ``*NSET`` in the
             ``.inp`` of the nodes; all nodes of an interface weigh the same.
         units: unit system of the files; the model is in SI.
