@@ -115,7 +115,7 @@ TASKS: dict[str, tuple[str, str]] = {
     "Rotations and units": (
         "Quaternions, and quantities as text.",
         """rotation.skew rotation.axial rotation.matrix rotation.quaternion rotation.multiply
-        rotation.continuous rotation.crossed rotation.spatial_tangent
+        rotation.continuous rotation.crossed rotation.skew_tensor rotation.spatial_tangent
         rotation.exp rotation.log units.in_si units.unit units.Unit units.unit_system
         units.UnitSystem units.fits units.dimension_name""",
     ),

@@ -108,9 +108,9 @@ class Interface:
             displacements if self.rotations is None else np.r_[displacements, self.rotations.dofs]
         )
 
-    def rigid_motions(self, about: Array | float = 0.0) -> Array:
+    def rigid_motions(self, about: Point = (0.0, 0.0, 0.0)) -> Array:
         """(3k + t, 6) motions of its dofs while it is rigid, turning about a point (3,) [1, m]."""
-        return rigid_motions(self.points - about, self.rotations, self.dofs.size)
+        return rigid_motions(self.points - np.asarray(about), self.rotations, self.dofs.size)
 
     @property
     def area(self) -> float:
@@ -243,9 +243,9 @@ class FEModel:
         """Names of the interfaces."""
         return tuple(self.interfaces)
 
-    def rigid_motions(self, about: Array | float = 0.0) -> Array:
+    def rigid_motions(self, about: Point = (0.0, 0.0, 0.0)) -> Array:
         """(n, 6) rigid motions of all its dofs, rotations about a point (3,) [1, m]."""
-        return rigid_motions(self.points - about, self.rotations, self.n_dofs)
+        return rigid_motions(self.points - np.asarray(about), self.rotations, self.n_dofs)
 
     def mass(self) -> float:
         """Total mass with attachments [kg]; under mpirun to be called on all ranks.

@@ -12,9 +12,9 @@ from scipy.linalg import eigh
 from scipy.sparse import csc_matrix, csr_matrix, tril
 
 import rom
-from cases.frames import Section, frame
 from cases.refusals import refuses
 from cases.solid import block
+from cases.structures.frames import Section, frame
 from rom.errors import ConfigError, FileFormatError, ModelError, QualityGateError
 from rom.io.matrices.dmig import write_dmig
 from rom.io.matrices.matrix_files import read_matrix, write_abaqus_matrix
