@@ -17,7 +17,7 @@ from rom.errors import InterfaceError, MeshError, TagError, in_file, warn
 from rom.fe.compat import MeshTags, assemble_matrix, cell_name, geometry_degree, lagrange, versions
 from rom.fe.costs import LEAST_SHARED_DOFS, reduction_seconds
 from rom.fe.forms.material import by_region, coefficients, described, doubts
-from rom.fe.forms.nodes import all_points, interface, outer_surface, tied
+from rom.fe.forms.nodes import all_points, interface, outer_surface
 from rom.fe.forms.region import Regions, forms
 from rom.fe.forms.stress import Stresses
 from rom.fe.jit import compiling
@@ -25,7 +25,7 @@ from rom.fe.mesh.cad import Axis
 from rom.fe.mesh.curving import without_middles
 from rom.fe.mesh.quality import layer_doubt
 from rom.fe.mesh.solid import Notes, SolidMesh, Tie
-from rom.fe.mesh.ties import of_degree
+from rom.fe.mesh.ties import of_degree, tied
 from rom.fe.operators.aij import symmetric, without_zeros, wrapped
 from rom.fe.operators.foreseen import COUPLED_NODES, automatic, check_indices
 from rom.fe.operators.memory import give_back

@@ -1,6 +1,5 @@
 """Interfaces and outer surface of a distributed model, the same on all ranks and any number."""
 
-from dataclasses import replace
 from itertools import pairwise
 
 from mpi4py import MPI
@@ -9,7 +8,7 @@ import numpy as np
 import ufl
 from dolfinx import fem
 from dolfinx.mesh import exterior_facet_indices
-from scipy.sparse import csr_matrix, diags
+from scipy.sparse import csr_matrix
 
 from rom.errors import InterfaceError
 from rom.fe.compat import (
@@ -21,8 +20,6 @@ from rom.fe.compat import (
     sub_entities,
     to_global,
 )
-from rom.fe.mesh.solid import Tie
-from rom.fe.mesh.ties import nodes_at
 from rom.model import Array, Index, Integers, Interface, Numbers, SurfaceMesh
 
 COINCIDENT_RTOL = 1e-8  # of the size, when nodes are sorted
@@ -58,18 +55,6 @@ def interface(name: str, tags: MeshTags, V: fem.FunctionSpace, points: Array) ->
         text = f"the interface {name!r} lies inside the solid and has no outer surface"
         raise InterfaceError(f"{text}; interfaces are parts of the outer boundary.")
     return Interface(name, nodes, points[nodes], S, weights @ points[nodes] / weights.sum())
-
-
-def tied(name: str, tie: Tie, points: Array, surface: Interface | None) -> Interface:
-    """The interface of nodes that a deck ties; the surface of its name where it has these nodes."""
-    nodes, place = np.unique(nodes_at(points, tie.points, name), return_inverse=True)
-    if surface is not None and not tie.weights.size:
-        if tie.kind == "rbe3" or np.array_equal(np.sort(surface.nodes), nodes):
-            return replace(surface, origin=tie.origin)
-    weights = np.bincount(place, tie.weights) if tie.weights.size else np.ones(nodes.size)
-    order = by_position(points[nodes], np.ptp(points, axis=0).max())
-    nodes, S = nodes[order], diags(weights[order] / weights.sum(), format="csr")
-    return Interface(name, nodes, points[nodes], S, tie.origin)
 
 
 def _nodes(V: fem.FunctionSpace, facets: Integers) -> Index:

@@ -1,12 +1,16 @@
 """Nodes that a deck ties or loads with masses, found again in a mesh and in its model."""
 
+from dataclasses import replace
+
 import numpy as np
+from scipy.sparse import diags
 from scipy.spatial import cKDTree
 
 from rom.errors import MeshError
+from rom.fe.forms.nodes import by_position
 from rom.fe.mesh.cell_types import CELL_TYPES, READ_TYPES
 from rom.fe.mesh.solid import SolidMesh, Tie
-from rom.model import Array, Index
+from rom.model import Array, Index, Interface
 
 MATCH_RTOL = 1e-8  # of the size, up to which two nodes are at one place
 OF_DEGREE = {"tetrahedron": ("tet4", "tet10"), "hexahedron": ("hex8", "hex27")}
@@ -29,6 +33,18 @@ def nodes_at(points: Array, wanted: Array, name: str) -> Index:
             hint="Merge nodes at one place; nodes amid edges need degree=2.",
         )
     return np.array([rows[0] for rows in there], dtype=np.int64)
+
+
+def tied(name: str, tie: Tie, points: Array, surface: Interface | None) -> Interface:
+    """The interface of nodes that a deck ties; the surface of its name where it has these nodes."""
+    nodes, place = np.unique(nodes_at(points, tie.points, name), return_inverse=True)
+    if surface is not None and not tie.weights.size:
+        if tie.kind == "rbe3" or np.array_equal(np.sort(surface.nodes), nodes):
+            return replace(surface, origin=tie.origin)
+    weights = np.bincount(place, tie.weights) if tie.weights.size else np.ones(nodes.size)
+    order = by_position(points[nodes], np.ptp(points, axis=0).max())
+    nodes, S = nodes[order], diags(weights[order] / weights.sum(), format="csr")
+    return Interface(name, nodes, points[nodes], S, tie.origin)
 
 
 def of_degree(mesh: SolidMesh, degree: int) -> dict[str, Tie]:
