@@ -77,8 +77,7 @@ say(f"at {30 * TOP / np.pi:.0f} 1/min  forward and backward [Hz]")
 for n in (1, 2, 3):
     ahead, back = (waves[n, label][-1] for label in ("forward", "backward"))
     say(f"{n:9d}", *(f"{f:9.2f} {b:9.2f}" for f, b in zip(ahead, back, strict=True)))
-whole = rom.travelling_modes(full, 2, 4, speed=TOP)
-small = rom.travelling_modes(sector, 2, 4, speed=TOP)
+whole, small = (rom.travelling_modes(one, 2, 4, speed=TOP) for one in (full, sector))
 spinning = np.abs(small.omega / whole.omega - 1).max()
 
 # ## Interference

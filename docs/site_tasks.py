@@ -115,7 +115,7 @@ TASKS: dict[str, tuple[str, str]] = {
     "Rotations and units": (
         "Quaternions, and quantities as text.",
         """rotation.skew rotation.axial rotation.matrix rotation.quaternion rotation.multiply
-        rotation.continuous rotation.crossed rotation.spatial_tangent
+        rotation.continuous rotation.crossed rotation.skew_tensor rotation.spatial_tangent
         rotation.exp rotation.log units.in_si units.unit units.Unit units.unit_system
         units.UnitSystem units.fits units.dimension_name""",
     ),
@@ -141,7 +141,7 @@ FILE_NAMES = {name: f"{name}-function" for name in NAMES if name in CLASSES}
 
 SUBJECTS = {
     "Reduce a body": """beam assembly compressor_blade reference_conditions parameters large_mesh
-    exchange""",
+    exchange superelement""",
     "Mechanisms": """slider_crank robot_arm flexible_arm satellite pendulum_chain hand rolling_wheel
     periodic isotropy best_matching study""",
     "Large deflection and metal forming": """large_deflection flexure snap_through spin_up sheet

@@ -108,9 +108,9 @@ class Interface:
             displacements if self.rotations is None else np.r_[displacements, self.rotations.dofs]
         )
 
-    def rigid_motions(self, about: Array | float = 0.0) -> Array:
+    def rigid_motions(self, about: Point = (0.0, 0.0, 0.0)) -> Array:
         """(3k + t, 6) motions of its dofs while it is rigid, turning about a point (3,) [1, m]."""
-        return rigid_motions(self.points - about, self.rotations, self.dofs.size)
+        return rigid_motions(self.points - np.asarray(about), self.rotations, self.dofs.size)
 
     @property
     def area(self) -> float:
@@ -191,6 +191,8 @@ class FEModel:
         points: (k, 3) reference coordinates in the body frame [m], the same on all ranks.
         interfaces: interfaces by name.
         attachments: point masses and rigid bodies carried by interfaces.
+        kinds: {interface: its kind} of those that the model ties by itself, as rigid elements of
+            a deck do; where nobody names another kind.
         surface: outer surface for pictures; None when there is none.
         provenance: how the model was made: geometry file, parameters, material, versions.
         operators: the five verbs on this model when K and M are not SciPy matrices.
@@ -199,6 +201,7 @@ class FEModel:
         regions: {name: share of the region}, for parameters; empty when they are not known.
         rotations: which dofs turn nodes; None for solids.
         n_scalars: number of coordinates without a place.
+        D: (n, n) damping [N s/m] of the deformation, which bodies get; None for none.
     """
 
     K: Any
@@ -213,6 +216,8 @@ class FEModel:
     regions: Mapping[str, "Region"] = field(default_factory=dict)
     rotations: Rotations | None = None
     n_scalars: int = 0
+    D: Any = None
+    kinds: Mapping[str, str] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         return (
@@ -238,9 +243,9 @@ class FEModel:
         """Names of the interfaces."""
         return tuple(self.interfaces)
 
-    def rigid_motions(self, about: Array | float = 0.0) -> Array:
+    def rigid_motions(self, about: Point = (0.0, 0.0, 0.0)) -> Array:
         """(n, 6) rigid motions of all its dofs, rotations about a point (3,) [1, m]."""
-        return rigid_motions(self.points - about, self.rotations, self.n_dofs)
+        return rigid_motions(self.points - np.asarray(about), self.rotations, self.n_dofs)
 
     def mass(self) -> float:
         """Total mass with attachments [kg]; under mpirun to be called on all ranks.

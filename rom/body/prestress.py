@@ -154,6 +154,8 @@ class UnitLoads:
         return total
 
     def _rotation(self, interface: Interface, E: Array) -> Array:
+        if interface.nodes.size == 1:  # what it carries has no arm
+            return np.zeros((3, E.shape[1]))
         return mean_motion(interface)[3:] @ self.mesh.rows(E, interface.dofs)
 
 

@@ -53,7 +53,9 @@ class Elastic:
 def elastic_part(ops: Operators, Psi: Array, labels: Sequence[str]) -> Elastic:
     """Split the span of Psi into rigid motions and mass-normalised free-free modes."""
     M, K = quadratic(ops, ops.apply_M, Psi), quadratic(ops, ops.apply_K, Psi)
-    scale = 1 / np.sqrt(np.diag(M))
+    if not (least := np.diag(M)).min() > 0.0:
+        raise massless(repr(labels[int(least.argmin())]))
+    scale = 1 / np.sqrt(least)
     M, K = (scale[:, None] * A * scale for A in (M, K))
     M, K = (0.5 * (A + A.T) for A in (M, K))
     mu, V = np.linalg.eigh(M)
@@ -99,7 +101,7 @@ def flexible_body(
         name=name,
         **fields_of(sum(carried_integrals(model, ops, E), integrals)),
         K=np.diag(omega**2),
-        D=np.zeros((omega.size, omega.size)),
+        D=np.zeros((omega.size, omega.size)) if model.D is None else E.T @ model.D @ E,
         markers={n: _marker(ops, model.interfaces[n], tie, E) for n, tie in ties.items()},
         omega=omega,
         labels=mode_labels(omega.size, "mean-axis"),

@@ -88,6 +88,11 @@ def certify(draft: Draft) -> None:
     rows += [*static, *rigid, *_matrix_rows(connection, basis, body, matrices)]
     rows += _effective_mass(body, tuple(connection.parts)) if statics else []
     rows += damping_rows(body, N_COMPARED)
+    if (n := draft.model.n_scalars) > 0:  # then the full model is itself reduced
+        shares = draft.E * draft.bare.apply_M(draft.E)
+        words = "full is the superelement given; most of a mode's mass without a place"
+        share = float((shares[-n:].sum(axis=0) / shares.sum(axis=0)).max(initial=0.0))
+        rows.append(Row(words, share, "information", True))
     report = Report(f"certificate of {body.name}", (*rows, *draft.rows))
     attach(draft, report, comparison, f"body {draft.name!r}")
 

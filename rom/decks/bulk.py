@@ -112,10 +112,13 @@ def _fields(line: str, place: Place) -> tuple[str, list[str], str]:
     return line[:PER_LINE].strip(), fields, line[72:80].strip()
 
 
-def grids(found: dict[str, list[Card]]) -> tuple[Index, Array, Array]:
+def grids(
+    found: dict[str, list[Card]],
+) -> tuple[Index, Array, Array, Callable[[int, Card], System]]:
     """Labels (k,), positions (k, 3), and axes of displacements (k, 3, 3), in the basic system.
 
-    Of the cards of `POINTS` by their names; axes are columns.
+    Of the cards of `POINTS` by their names; axes are columns. Last comes what finds the system of a
+    number that a card names.
     """
     default = next(iter(found.get("GRDSET", ())), Card("GRDSET", [], (Path(), 0)))
     own, turned = default.whole(1, 0), default.whole(5, 0)
@@ -159,4 +162,4 @@ def grids(found: dict[str, list[Card]]) -> tuple[Index, Array, Array]:
     for number in np.unique(moved[moved > 0]):
         here = moved == number
         moves[here] = resolved(int(number), found["GRID"][int(here.argmax())]).axes_at(x[here])
-    return np.array(list(grid), dtype=np.int64), x, moves
+    return np.array(list(grid), dtype=np.int64), x, moves, resolved

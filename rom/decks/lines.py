@@ -14,9 +14,10 @@ MOST_INCLUDED = 20  # files in files
 Place = tuple[Path, int]  # file and line
 CURES = {  # words of cards that are not read -> what to do instead
     r"\bR(BE|BAR|ROD)|MPC|COUPLING|EQUATION|TIE|RIGID|\bC[EP]|ET, (17\d|184)\b": "Ties: "
-    "interfaces={...} makes rigid (rbe2) and distributing (rbe3) ones; take them out.",
-    r"CONM|MASS|NSM|INERTIA|ET, 21\b": "Masses: rom.Attachment adds them to the "
-    "model; take them out.",
+    "rigid and averaging elements of all directions are read from .bdf and .inp; take others out, "
+    "and interfaces={...} makes rigid (rbe2) and distributing (rbe3) ones.",
+    r"CONM|MASS|NSM|INERTIA|ET, 21\b": "Masses: point masses are read from .bdf and .inp; take "
+    "others out, and rom.Attachment adds them to the model.",
     r"CBUSH|CELAS|CDAMP|SPRING|DASHPOT|COMBIN|ET, (14|39|40)\b": "Springs stand between "
     "bodies, in the mechanism.",
     r"PSHELL|PCOMP|SHELL SECTION": "Shells without this card only name faces of the solid.",

@@ -45,7 +45,14 @@ class Carried:
 
 
 def carried_displacements(attachment: Attachment, model: FEModel) -> Carried:
-    """Six point masses, and how they move with the dofs of the interface."""
+    """Six point masses, and how they move with the dofs of the interface.
+
+    One node that cannot turn carries one point mass.
+
+    Raises:
+        InterfaceError: if the interface is unknown or does not know its rotation.
+        MaterialError: if the mass is not positive or no body has the inertia.
+    """
     name = attachment.interface
     text = f"an attachment names the interface {name!r}; the model has"
     check_known(name, model.interfaces, text, InterfaceError)
@@ -53,6 +60,11 @@ def carried_displacements(attachment: Attachment, model: FEModel) -> Carried:
     points, masses = point_masses(attachment, interface.origin)
     reach, size = np.abs(points - interface.origin).max(), np.ptp(model.points, axis=0).max()
     warn_outside(REACH, float(reach / size), f"the attachment on {interface.name!r}")
+    if interface.nodes.size == 1 and interface.rotations is None:
+        if np.abs(points - interface.points).max() > 0.0:
+            text = f"the one node of {name!r} cannot turn, so it carries no inertia and no offset"
+            raise InterfaceError(f"{text}; hang them on an interface of several nodes.")
+        return Carried(interface, interface.points, np.array([attachment.mass]), np.eye(3))
     N = rigid_motions(points - interface.origin) @ mean_motion(interface)
     return Carried(interface, points, masses, N)
 
@@ -61,9 +73,11 @@ def added_mass(model: FEModel, first: int, n_local: int) -> csr_matrix | None:
     """Sparse (n_local, n) mass of all attachments, the rows of this process; None without any."""
     if not model.attachments:
         return None
-    dM = csr_matrix((n_local, model.n_dofs))
-    for attachment in model.attachments:
-        c = carried_displacements(attachment, model)
-        block = c.N.T @ (np.repeat(c.masses, 3)[:, None] * c.N)
-        dM = dM + coupled(dM.shape, first, c.interface.dofs, block)
-    return dM
+    shape = (n_local, model.n_dofs)
+    carried = (carried_displacements(attachment, model) for attachment in model.attachments)
+    blocks = ((c, c.N.T @ (np.repeat(c.masses, 3)[:, None] * c.N)) for c in carried)
+    parts = [coupled(shape, first, c.interface.dofs, block).tocoo() for c, block in blocks]
+    row, column, value = (
+        np.concatenate([getattr(part, name) for part in parts]) for name in ("row", "col", "data")
+    )
+    return csr_matrix((value, (row, column)), shape=shape)

@@ -43,10 +43,16 @@ class Condensed:
         Refused where a motion other than the six of the free body has no stiffness.
         """
         free = np.flatnonzero(~np.isin(self.boundary, dofs))
-        scale = 1.0 / np.sqrt(self.alone[free])
-        S = scale[:, None] * self.S[np.ix_(free, free)] * scale
+        alone, S, R = self.alone[free], self.S[np.ix_(free, free)], np.zeros((0, 6))
         if not dofs.size and self.ops.rigid is not None:
-            R = self.ops.rows(self.ops.rigid, self.boundary) / scale[:, None]
+            R = self.ops.rows(self.ops.rigid, self.boundary)
+            size = np.linalg.norm(R, axis=1).clip(1e-300)
+            if np.linalg.matrix_rank(R / size[:, None]) == len(R):  # alone it may be without
+                alone, S = size**-2, np.zeros_like(S)  # stiffness: it moves as a whole
+        scale = 1.0 / np.sqrt(alone)
+        S = scale[:, None] * S * scale
+        if R.size:
+            R = R / scale[:, None]
             U, size, _ = np.linalg.svd(R, full_matrices=False)
             U = U[:, size > LEAST_PART * size[0]]
             S = S + U @ U.T  # rigid motions cost nothing; loads in balance do not feel this

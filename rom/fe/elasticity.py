@@ -12,8 +12,8 @@ import numpy as np
 from dolfinx.mesh import Mesh
 
 from rom.arguments import one_of, typed, whole
-from rom.eigen.verbs import rigid_motions
-from rom.errors import InterfaceError, MeshError, TagError, warn
+from rom.eigen.verbs import mean_motion, rigid_motions
+from rom.errors import InterfaceError, MeshError, TagError, in_file, warn
 from rom.fe.compat import MeshTags, assemble_matrix, cell_name, geometry_degree, lagrange, versions
 from rom.fe.costs import LEAST_SHARED_DOFS, reduction_seconds
 from rom.fe.forms.material import by_region, coefficients, described, doubts
@@ -24,7 +24,8 @@ from rom.fe.jit import compiling
 from rom.fe.mesh.cad import Axis
 from rom.fe.mesh.curving import without_middles
 from rom.fe.mesh.quality import layer_doubt
-from rom.fe.mesh.solid import Notes, SolidMesh
+from rom.fe.mesh.solid import Notes, SolidMesh, Tie
+from rom.fe.mesh.ties import of_degree, tied
 from rom.fe.operators.aij import symmetric, without_zeros, wrapped
 from rom.fe.operators.foreseen import COUPLED_NODES, automatic, check_indices
 from rom.fe.operators.memory import give_back
@@ -32,7 +33,7 @@ from rom.fe.operators.petsc import PETScOperators
 from rom.fe.operators.solver import DIRECT_SOLVER, parsed
 from rom.fe.parallel import collective, install_abort_hook, on_root
 from rom.model import Attachment, FEModel, Index, Material, Orthotropic
-from rom.names import check_known
+from rom.names import check_known, named
 
 log = logging.getLogger("rom")
 Solids = Material | Orthotropic | Mapping[str, Material | Orthotropic]
@@ -62,7 +63,7 @@ def model(
             its own, whose place it takes.
         degree: polynomial degree of the displacement, 1 to 3; 2 unless you know better.
         parameters: {name: value} of the geometry's parameters, in the units of the geometry.
-        attachments: point masses and rigid bodies carried by interfaces.
+        attachments: point masses and rigid bodies carried by interfaces, beside those of a deck.
         solver: how equations are solved. "auto": the first of "direct", "out-of-core" and
             "iterative" that fits into memory, named in ``provenance["solver"]``; "direct": a
             MUMPS factor, the fastest when it fits; "low-rank" or "low-rank:1e-8": the same with
@@ -154,7 +155,14 @@ def pieces(  # noqa: PLR0913  those of `model`, and how to cut
     from rom.fe.mesh.cut import cut
 
     options = _Options(path, material, degree, parameters, tuple(attachments), solver, comm)
-    return _models(options, mesh_options, lambda mesh: cut(mesh, n, axis))
+
+    def division(mesh: SolidMesh) -> dict[str, SolidMesh]:
+        if mesh.ties:
+            text = f"the deck ties or loads nodes of the whole, {named(mesh.ties)}"
+            raise MeshError(f"{text}; use rom.fe.model, or take them out.")
+        return cut(mesh, n, axis)
+
+    return _models(options, mesh_options, division)
 
 
 @dataclass(frozen=True)
@@ -189,7 +197,8 @@ def _models(
         if options.degree == 1 and mesh_options.get("order") is None and is_geometry(options.path):
             mesh_options["order"] = 1
         mesh = read_mesh(options.path, parameters=options.parameters, **mesh_options)
-        mesh = without_middles(mesh)
+        with in_file(options.path):
+            mesh = without_middles(replace(mesh, ties=of_degree(mesh, options.degree)))
         if doubt := layer_doubt(mesh, options.degree):
             warn(doubt)
             mesh = replace(mesh, warnings=(*(mesh.warnings or ()), doubt))
@@ -197,7 +206,7 @@ def _models(
         if options.material is not None and mesh.materials:
             log.warning("material= takes the place of the materials that %s says.", options.path)
         by_region(material, {name: tag for tag, name in mesh.region_names.items()})
-        _check_attachments(options.attachments, mesh.facets)
+        _check_attachments(options.attachments, mesh.facets.keys() | mesh.ties.keys())
         for name, part in division(mesh).items():
             parts[name] = part if part.warnings is not None else checked(part)
         return {name: _Head.of(part, material) for name, part in parts.items()}
@@ -216,13 +225,14 @@ class _Head:
     origin: Notes
     axes: dict[str, Axis]
     material: Solids
+    ties: dict[str, Tie]
+    carried: tuple[Attachment, ...]
 
     @classmethod
     def of(cls, mesh: SolidMesh, material: Solids) -> "_Head":
         regions = {name: tag for tag, name in mesh.region_names.items()}
-        return cls(
-            regions, tuple(mesh.facets), mesh.warnings or (), mesh.provenance, mesh.axes, material
-        )
+        told = regions, tuple(mesh.facets), mesh.warnings or (), mesh.provenance, mesh.axes
+        return cls(*told, material, mesh.ties, mesh.carried)
 
 
 def _model(options: _Options, part: SolidMesh | None, head: _Head) -> FEModel:
@@ -241,7 +251,6 @@ def _model(options: _Options, part: SolidMesh | None, head: _Head) -> FEModel:
         material=material,
         degree=options.degree,
         regions=head.regions,
-        attachments=[x for x in options.attachments if x.interface in head.facets],
     )
     remarks = [*head.warnings, *made.provenance["warnings"]]
     method = parsed(options.solver)
@@ -252,10 +261,19 @@ def _model(options: _Options, part: SolidMesh | None, head: _Head) -> FEModel:
     for key in head.axes.keys() & interfaces.keys():  # of the CAD, which knows these
         point, along = np.array(head.axes[key].point), np.array(head.axes[key].direction)
         interfaces[key] = replace(interfaces[key], origin=point, axis=along)
-    provenance = head.origin | made.provenance | {"warnings": remarks, "solver": why}
-    return replace(
-        made, operators=made.operators.solved_by(how), provenance=provenance, interfaces=interfaces
+    for key, tie in head.ties.items():
+        interfaces[key] = tied(key, tie, made.points, interfaces.get(key))
+    made = replace(
+        made,
+        interfaces=interfaces,
+        kinds={key: tie.kind for key, tie in head.ties.items() if tie.kind == "rbe2"},
+        attachments=(*(x for x in options.attachments if x.interface in interfaces), *head.carried),
+        operators=made.operators.solved_by(how),
+        provenance=head.origin | made.provenance | {"warnings": remarks, "solver": why},
     )
+    for name in [key for key, tie in head.ties.items() if tie.kind]:
+        mean_motion(interfaces[name])  # refuses those on a line
+    return made
 
 
 @typed
@@ -303,11 +321,11 @@ def assemble(
         M = without_zeros(assemble_matrix(mass)) if shared else symmetric(assemble_matrix(mass))
         K = assemble_matrix(stiffness) if shared else symmetric(assemble_matrix(stiffness))
         interfaces = {key: interface(key, value, V, points) for key, value in facet_tags.items()}
-    named = {region: solids[tag] for region, tag in regions.items()}
-    remarks = list(doubts(named, float(np.ptp(points, axis=0).max()), name, degree))
+    made_of = {region: solids[tag] for region, tag in regions.items()}
+    remarks = list(doubts(made_of, float(np.ptp(points, axis=0).max()), name, degree))
     for remark in remarks if mesh.comm.rank == 0 else ():
         warn(remark)
-    doubts_found = list(dict.fromkeys(solid.doubt for solid in named.values() if solid.doubt))
+    doubts_found = list(dict.fromkeys(solid.doubt for solid in made_of.values() if solid.doubt))
     give_back()
     A, B = (K, M) if shared else (wrapped(K), wrapped(M))
     first, end = A.getOwnershipRange()
@@ -322,7 +340,7 @@ def assemble(
         stresses=Stresses(V, numbers, degree, (tags, regions)),
         regions=Regions(V, tags, solids, regions, degree),
         provenance={
-            "material": described(named),
+            "material": described(made_of),
             "degree": degree,
             "degree of the geometry": geometry_degree(mesh),
             "cells": {name: mesh.topology.index_map(3).size_global},

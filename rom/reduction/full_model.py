@@ -114,7 +114,7 @@ def modes(
         whole("n", n, 1)
     kinds = by_name(interfaces or {})
     stiffness = spring_matrices(springs, model.interfaces, "the model")
-    kinds = dict.fromkeys(stiffness, "rbe3") | kinds
+    kinds = dict.fromkeys(stiffness, "rbe3") | dict(model.kinds) | kinds
     kinds |= {f: "full" for f in supports(fixed, model.interfaces) if f not in kinds}
     connection = connect(operators(model), model, kinds)
     held = connection.held(fixed)

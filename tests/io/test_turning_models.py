@@ -17,6 +17,7 @@ from scipy.sparse import block_diag, csr_matrix, diags
 import rom
 from cases.refusals import refuses
 from cases.structures.frames import Section, cantilever, frame, interface, plate
+from rom.eigen.verbs import mean_motion
 from rom.errors import FileFormatError, ModelError, QualityGateError
 from rom.io.matrices.dmig import write_dmig
 from rom.io.matrices.matrix_files import write_abaqus_matrix
@@ -92,20 +93,20 @@ def test_matrices_of_six_rows_a_node_are_the_model_they_came_from(angle, kind, t
 
 def test_grid_points_that_move_along_axes_of_their_own(angle, tmp_path):
     """Cylindrical and spherical systems; rows follow the directions at each point."""
-    p, q = BENT - [0.1, -0.2, 0.0], BENT - [-0.5, 0.1, 0.3]
-    phi, r = np.arctan2(p[:, 1], p[:, 0]), np.linalg.norm(q, axis=1)
+    p, q = BENT - [0.1, -0.2, -0.3], BENT - [-0.5, 0.1, 0.3]
+    phi, r = np.arctan2(p[:, 2], p[:, 1]), np.linalg.norm(q, axis=1)
     theta, psi = np.arccos(q[:, 2] / r), np.arctan2(q[:, 1], q[:, 0])
     axes = np.tile(np.eye(3), (5, 1, 1))
-    for k in (1, 2):  # radial, tangential, along the axis
+    for k in (1, 2):  # radial, tangential, along an axis that is x
         c, s = np.cos(phi[k]), np.sin(phi[k])
-        axes[k] = [[c, -s, 0], [s, c, 0], [0, 0, 1]]
+        axes[k] = [[0, 0, 1], [c, -s, 0], [s, c, 0]]
     for k in (3, 4):  # away from the centre, down from the pole, around it
         c, s, a, b = np.cos(theta[k]), np.sin(theta[k]), np.cos(psi[k]), np.sin(psi[k])
         axes[k] = np.array([[s * a, s * b, c], [c * a, c * b, -s], [-b, a, 0]]).T
     K, M = written("dmig", *six_rows(angle, axes), tmp_path)
     grids = [f"GRID,{n},,{x!r},{y!r},{z!r},{cd}" for n, (x, y, z), cd in
              zip(LABELS.tolist(), BENT.tolist(), ("", 5, 5, 6, 6), strict=True)]  # fmt: skip
-    systems = ["CORD2C,5,,.1,-.2,0.,.1,-.2,1.", ",1.1,-.2,0."]
+    systems = ["CORD2C,5,,.1,-.2,-.3,1.1,-.2,-.3", ",.1,.8,-.3"]
     systems += ["CORD2S,6,,-.5,.1,.3,-.5,.1,1.3", ",.5,.1,.3"]
     (tmp_path / "a.bdf").write_text("\n".join([*systems, *grids, ""]))
     read = [read_model(K, M, nodes=nodes, interfaces=SIDES)
@@ -230,12 +231,84 @@ def test_rotations_without_inertia_are_condensed():
     dense = rom.modes(small, 5, fixed=("root",)).frequencies
     assert_allclose(body.frequencies(5, fixed=("root",)), dense, rtol=1e-3)
     bare = replace(small, M=csr_matrix(diags(np.r_[_tenth(masses), np.zeros(63)])))
-    refuses(ModelError, "has stiffness and no mass", rom.reduce, bare, interfaces=RIGID)
+    leaning = replace(cantilever(20, section=Section(0.03, 0.05), axis=(1, 2, 0.5)), M=bare.M)
+    refuses(ModelError, "'tip rbe2 ry' has stiffness and no mass", rom.reduce, leaning,
+            interfaces=RIGID, method=rom.CraigBampton(8))  # fmt: skip
+    for how in ({}, {"method": rom.CraigBampton(8)}):
+        refuses(ModelError, "has stiffness and no mass", rom.reduce, bare, interfaces=RIGID, **how)
 
 
 def _tenth(values):
     """Of nodal values (3 k,) every tenth node, with ten times the mass."""
     return 10 * values.reshape(-1, 3)[::10].ravel()
+
+
+def test_the_mean_motion_of_nodes_on_a_line_weighs_their_rotations():
+    """As displacements at their mean distance L: (sum x v + L^2 sum theta) / sum (x^2 + L^2)."""
+    beam = cantilever(2, length=0.4)
+    line = interface("line", np.arange(3), beam.points, beam.rotations)
+    v, theta = np.array([0.3, -0.1, 0.7]), np.array([0.2, 0.5, -0.4])
+    u = np.zeros(18)
+    u[1:9:3], u[9 + 2 :: 3] = v, theta
+    x, L = np.array([-0.2, 0.0, 0.2]), 0.4 / 3
+    turn = (x @ v + L**2 * theta.sum()) / (x**2 + L**2).sum()
+    assert_allclose(mean_motion(line) @ u, [0, v.mean(), 0, 0, 0, turn], atol=1e-12)
+    twist = np.zeros(18)
+    twist[9::3] = theta
+    assert_allclose(mean_motion(line) @ twist, [0, 0, 0, theta.mean(), 0, 0], atol=1e-12)
+
+
+def ladder(x, backwards=False):
+    """Two rails with rungs at x, its ends the interfaces "root" and "tip"."""
+    points = np.array([[at, y, 0.1 * y] for at in x for y in (0.0, 0.2)])
+    m = len(points)
+    rails = [(k, k + 2) for k in range(m - 2)] + [(k, k + 1) for k in range(0, m, 2)]
+    number = np.arange(m)[::-1] if backwards else np.arange(m)
+    ends = {"root": number[[0, 1]], "tip": number[[m - 2, m - 1]]}
+    return frame(points[number], number[np.array(rails)], Section(0.02, 0.03), ends)
+
+
+def test_full_interfaces_couple_rotations_too():
+    """Two ladders whose nodes are numbered from either end are one that is twice as long.
+
+    Where they meet both have a rung: the whole has two, as thick as the other rungs.
+    """
+    x = np.linspace(0.0, 0.6, 4)
+    whole, rung = ladder(np.linspace(0.0, 1.2, 7)), ladder(x[:1])
+    n = whole.points.size
+    at = np.r_[18:24, n + 18 : n + 24]
+    for name in "KM":
+        A = getattr(whole, name).tolil()
+        A[np.ix_(at, at)] += getattr(rung, name).toarray()
+        whole = replace(whole, **{name: csr_matrix(A)})
+    kinds = {"root": "full", "tip": "full"}
+    right = ladder(x + 0.6, backwards=True)
+    root = right.interfaces["root"]
+    root = replace(root, nodes=root.nodes[::-1], points=root.points[::-1],
+                   rotations=right.rotations.of(root.nodes[::-1]))  # fmt: skip
+    right.interfaces["root"] = root
+    low, high = (rom.reduce(m, method=rom.CraigBampton(20), interfaces=kinds, certify=False)
+                 for m in (ladder(x), right))  # fmt: skip
+    assert low.markers["tip"].kind == "full:2" and low.n_modes == 24 + 20 - 6
+    both = rom.Assembly({"low": low, "high": high}, ((("low", "tip"), ("high", "root")),))
+    assert both.n_conditions == (12,)
+    assert_allclose(both.frequencies(16)[6:], rom.modes(whole, 16).frequencies[6:], rtol=1e-4)
+    held = both.frequencies(4, fixed=(("low", "root"),))
+    assert_allclose(held, rom.modes(whole, 4, fixed=("root",)).frequencies, rtol=1e-5)
+    mm = low.in_units("mm-t-s")
+    for rows, columns in ((slice(0, 6), slice(0, 3)), (slice(6, 12), slice(3, 6))):
+        own = [body.markers["tip"].hold[rows, columns] for body in (mm, low)]
+        assert_allclose(*own, atol=1e-12)  # of unit motions, whatever the unit
+    assert_allclose(mm.frequencies(fixed={"root": "xyz rx ry rz"}),
+                    low.frequencies(fixed=("root",)), rtol=1e-9)  # fmt: skip
+
+
+def test_a_body_whose_nodes_turn_is_kept_in_its_file(angle, tmp_path):
+    body = rom.reduce(angle, method=rom.CraigBampton(6), interfaces={"root": "full", "tip": "rbe2"},
+                      certify=False)  # fmt: skip
+    again = rom.load(rom.save(body, tmp_path / "a.rom.npz"))
+    assert_allclose(again.markers["root"].hold, body.markers["root"].hold, rtol=0)
+    assert_allclose(again.S_kl, body.S_kl, rtol=0)
 
 
 def us3_deck(points, triangles, h):

@@ -39,8 +39,8 @@ cli: answer speech schemas options described matrices output verbs parser main
 fe: costs parallel jit compat operators forms mesh elasticity probe
 fe.operators: solver memory disk aij foreseen factor substructures spectrum iterative workers
   petsc
-fe.mesh: cell_types topology picks cad solid sources child curving quality repair validate cut read
-  summary input_deck
+fe.mesh: cell_types topology picks cad solid ties sources child curving quality repair validate
+  cut read summary input_deck
 io: files archive native fields matrices sid programs fmu bodies history export ours
 mbs: compiler kernels parts connections elements mechanism equations results integrate control
   analysis

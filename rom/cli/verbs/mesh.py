@@ -139,6 +139,8 @@ def _text(data: Data) -> str:
         parts.append(
             "parameters: " + ", ".join(f"{k} = {x:.6g}" for k, x in data["parameters"].items())
         )
+    parts += [f"tie {name}: {n} nodes of the deck" for name, n in data["ties"].items()]
+    parts += [f"mass of {mass:.6g} kg on {name}" for name, mass in data["masses"]]
     if regions:
         parts += ["", table(("region", "cells", "volume [m^3]"), regions)]
     header = ("interface", "facets", "nodes", "middle [m]", "axis")

@@ -18,7 +18,7 @@ from rom.fe.mesh.solid import SolidMesh
 from rom.fe.mesh.sources.abaqus import SIDES
 from rom.fe.mesh.topology import row_ids
 from rom.model import Index, Material, Orthotropic
-from rom.names import ORIGIN_MARK, check_known
+from rom.names import ORIGIN_MARK, check_known, named
 
 STEPS = {"frequencies": "*FREQUENCY\n{n}", "matrices": "*FREQUENCY, SOLVER=MATRIXSTORAGE"}
 ELEMENTS = {"tet4": "C3D4", "tet10": "C3D10"}
@@ -49,6 +49,9 @@ def input_deck(
     for name in fixed:
         text = f"{name!r} cannot be held; there are"
         check_known(name, mesh.facets, text, InterfaceError)
+    if mesh.ties:
+        text = f"the mesh comes from a deck that ties or loads nodes, {named(mesh.ties)}"
+        raise MeshError(f"{text}; these would be lost. Keep the deck.")
     _check_names(mesh.region_names.values())
     _check_names(mesh.facets)
     mesh = _of_degree(mesh, degree)

@@ -30,9 +30,9 @@ from rom.fe.mesh.curving import without_middles
 from rom.fe.mesh.picks import EVERY_FACE, picks
 from rom.fe.mesh.quality import straighten
 from rom.fe.mesh.repair import repair
-from rom.fe.mesh.solid import GEOMETRIES, PROGRAMS, Arrays, Notes, Request, SolidMesh
+from rom.fe.mesh.solid import GEOMETRIES, PROGRAMS, Arrays, Notes, Request, SolidMesh, Tie
 from rom.fe.mesh.validate import checked
-from rom.model import Array, Index
+from rom.model import Array, Attachment, Index
 from rom.names import check_known, check_text
 from rom.readable import check_readable
 from rom.units import UnitSystem, unit_system
@@ -136,7 +136,11 @@ def read_mesh(  # noqa: PLR0913  limits and trust beside what is read
     }
     if scale != 1.0 and "materials" in notes:
         text = f"scale={scale:g} is of lengths alone and says no unit of the materials of the deck."
-        notes["unread"] = {"message": text, "hint": "Give units= instead, as 'mm-t-s', or others."}
+        hint = "Give units= instead, as 'mm-t-s'"
+        notes["unread"] = {"message": text, "hint": f"{hint}, or others."}
+        if notes.get("carried"):
+            text = f"scale={scale:g} is of lengths alone and says no unit of the masses."
+            raise FileFormatError(text, where=str(path), hint=f"{hint}.")
     mesh, remarks = _solid(arrays, notes, provenance, scale, unit), notes["warnings"]
     if reader in GEOMETRIES:
         mesh, straightened = straighten(repair(mesh))
@@ -272,8 +276,22 @@ def _solid(
             for name, (E, nu, rho) in notes.get("materials", {}).items()
         },
         unread=notes.get("unread", {}),
+        ties={name: _tie(tie, scale) for name, tie in notes.get("ties", {}).items()},
+        carried=tuple(_carried(body, scale, unit) for body in notes.get("carried", ())),
         faces=tuple(scaled(from_plain(Face, face), scale) for face in notes.get("faces", ())),
     )
+
+
+def _tie(values: Notes, scale: float) -> Tie:
+    points, weights, origin = (np.array(values[k]) for k in ("points", "weights", "origin"))
+    weights = weights[:0] if values.get("of area") else weights
+    return Tie(points * scale, weights, origin * scale, values["kind"])
+
+
+def _carried(values: Notes, scale: float, unit: UnitSystem) -> Attachment:
+    inertia = np.array(values["inertia"]) * unit.mass * unit.length**2
+    at = np.array(values["at"]) * scale
+    return Attachment(values["interface"], values["mass"] * unit.mass, inertia, at)
 
 
 def _tables(arrays: Arrays, kind: str, names: Sequence[str]) -> dict[str, Index]:

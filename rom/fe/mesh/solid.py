@@ -10,7 +10,7 @@ import numpy.typing as npt
 from rom.errors import ConfigError, FileFormatError, MeshError, in_file
 from rom.fe.mesh.cad import Axis, Face
 from rom.fe.mesh.cell_types import READ_TYPES, CellType
-from rom.model import Array, Index, Integers, Mask, Material
+from rom.model import Array, Attachment, Index, Integers, Mask, Material
 from rom.names import named
 
 MAX_SHOWN = 5  # culprits named in a message
@@ -20,6 +20,16 @@ Arrays = dict[str, npt.NDArray[Any]]
 Notes = dict[str, Any]  # what fits into JSON, by name
 Read = tuple[Arrays, Notes]
 Made = tuple[Notes, Notes]  # parameters used, defaults of some of them
+
+
+@dataclass(frozen=True, slots=True)
+class Tie:
+    """Nodes that a deck ties to a reference node, or one that it loads with a mass."""
+
+    points: Array  # (k, 3) of the nodes [m]
+    weights: Array  # (k,) in a mean motion; none where the surface of the same name weighs
+    origin: Array  # (3,) of the reference node [m]
+    kind: str  # of interface: "rbe2", "rbe3", or "" for one node
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +55,8 @@ class SolidMesh:
     # E [Pa], nu [1] and rho [kg/m^3] of regions by name, as a deck says, or why that is not read
     materials: dict[str, tuple[float, float, float]] = field(default_factory=dict)
     unread: Notes = field(default_factory=dict)
+    ties: dict[str, Tie] = field(default_factory=dict)  # of a deck, by name
+    carried: tuple[Attachment, ...] = ()  # masses of a deck, on surfaces and ties
     faces: tuple[Face, ...] = ()  # all faces of the CAD, where they were asked for
 
     @property

@@ -26,21 +26,25 @@ Entry = tuple[int, int, int, int, float]  # node and component of row and column
 def read_dmig(path: str | Path) -> dict[str, tuple[csr_matrix, Dofs]]:
     """All real square matrices of a file: {name: (sparse (n, n), (n, 2) label and component)}.
 
-    Of symmetric ones only the triangle that is written.
+    Of symmetric ones only the triangle that is written. Loads, recovery and complex matrices beside
+    them, as in punch files of superelements, are left out.
 
     Raises:
-        FileFormatError: naming the line, if the file is missing, cut, or a matrix is complex.
+        FileFormatError: naming the line, if the file is missing or cut, or all are left out.
         UnsafeFileError: if it is larger than 4 GiB.
     """
     path = Path(path)
     check_last_line(path)
     entries: dict[str, list[Entry]] = {}
+    others = set[str]()
     for card in cards(path):
         if card.name == "DMIG":
             with damaged("this is no DMIG card", at(card.place)):
-                _enter(entries, card.fields)
+                _enter(entries, others, card.fields)
     if not entries:
-        raise FileFormatError("the file holds no DMIG matrix.", where=str(path))
+        named = f"; {', '.join(sorted(others))} are not" if others else ""
+        text = f"the file holds no DMIG matrix that is square and real{named}."
+        raise FileFormatError(text, where=str(path))
     return {name: labelled(rows) for name, rows in entries.items()}
 
 
@@ -56,7 +60,7 @@ def read_grids(path: str | Path) -> tuple[Index, Array, Array]:
     for card in cards(path):
         if card.name in POINTS:
             found.setdefault(card.name, []).append(card)
-    return grids(found)
+    return grids(found)[:3]
 
 
 def write_dmig(
@@ -80,13 +84,16 @@ def write_dmig(
     return write_lines(path, lines)
 
 
-def _enter(entries: dict[str, list[Entry]], fields: list[str]) -> None:
+def _enter(entries: dict[str, list[Entry]], others: set[str], fields: list[str]) -> None:
     name = fields[0].upper()
     if fields[1] == "0":  # the header card: form, type
         form, kind = int(fields[2]), int(fields[3])
-        real_square = form in (SYMMETRIC_FORM, SQUARE_FORM) and kind in (1, 2)
-        need(real_square, f"{name} is not square and real (form {form}, type {kind})")
-        entries.setdefault(name, [])
+        if form in (SYMMETRIC_FORM, SQUARE_FORM) and kind in (1, 2):
+            entries.setdefault(name, [])
+        else:
+            others.add(name)
+        return
+    if name in others:
         return
     need(name in entries, f"{name} has no header")
     column = whole(fields[1]), whole(fields[2] or "0")

@@ -11,8 +11,12 @@ for C3D4, four for C3D10. Straight elements have the stiffness of `rom.fe` to ro
 little inertia in short waves: ten frequencies of a coarse beam are up to 0.2 % (C3D10) and 9 %
 (C3D4) above those with exact mass.
 
+Ansys writes its matrices as Harwell-Boeing files (HBMAT) or Matrix Market (*EXPORT).
+
 Source:
     R. F. Boisvert, R. Pozo, K. A. Remington, The Matrix Market Exchange Formats, NISTIR 5935, 1996.
+    I. S. Duff, R. G. Grimes, J. G. Lewis, Users' guide for the Harwell-Boeing sparse matrix
+    collection, 1992.
     CalculiX CrunchiX user's manual, *FREQUENCY; files and matrices of version 2.20.
 """
 
@@ -22,14 +26,23 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import IO, Any
 
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 
 from rom.decks.lines import whole
 from rom.errors import ConfigError, FileFormatError, UnsafeFileError, in_file
-from rom.io.files import check_last_line, check_readable, damaged, lines_of, need, write_lines
-from rom.io.matrices.dmig import Dofs, Entry, labelled, read_dmig
+from rom.io.files import (
+    check_last_line,
+    check_readable,
+    damaged,
+    lines_of,
+    need,
+    number,
+    write_lines,
+)
+from rom.io.matrices.dmig import Dofs, labelled, read_dmig
 from rom.io.matrices.op4 import Matrices, read_op4
 from rom.io.matrices.user_element import read_user_element
 from rom.model import Array, Index
@@ -37,6 +50,8 @@ from rom.names import offered
 
 BANNER_TEXT = b"%%MatrixMarket"
 MOST_ROWS = 10_000_000
+BOEING_PATTERN = re.compile(rb"(?:[^\n]*\n){2}[RCPI][SUZHR][AE] ", re.IGNORECASE)
+FIELD_PATTERN = re.compile(r"(\d*)[IDEFG](\d+)")  # of Fortran formats: how many, how wide
 SIGNS = {"general": 0.0, "symmetric": 1.0, "hermitian": 1.0, "skew-symmetric": -1.0}
 MATRIX_ENDINGS = (".sti", ".mas")
 LABEL_PATTERN = re.compile(r"(\d{1,18})\.([1-6])")
@@ -58,9 +73,10 @@ def read_matrix(source: str | Path | tuple[str | Path, str]) -> NamedMatrix:
 
     Args:
         source: file, or (file, name) where it holds several: ``.mtx`` and ``.mm`` for Matrix Market
-            (told by its first line) or Abaqus text, matrices or a linear user element, the latter
-            also in ``.inp``; ``.sti`` and ``.mas`` for CalculiX, with ``.dof`` beside, ``.op4`` for
-            OUTPUT4, ``.bdf``, ``.dat``, ``.pch``, ``.dmig`` for DMIG cards.
+            or Abaqus text, matrices or a linear user element, the latter also in ``.inp``; ``.sti``
+            and ``.mas`` for CalculiX, with ``.dof`` beside, ``.op4`` for OUTPUT4, ``.bdf``,
+            ``.dat``, ``.pch``, ``.dmig`` for DMIG cards. Matrix Market and Harwell-Boeing are told
+            by their first lines, whatever the ending.
 
     Raises:
         ConfigError: for another ending, or if a name is needed or unknown.
@@ -115,6 +131,12 @@ def _all(path: Path) -> tuple[Matrices, dict[str, Dofs]]:
 
 def _pairs(path: Path) -> Mapping[str, tuple[csr_matrix, Dofs | None]]:
     ending = path.suffix.lower()
+    with path.open("rb") as file:
+        start = file.read(HEAD_BYTES)
+    if start.startswith(BANNER_TEXT):
+        return {"": (_finite(read_market(path), path), None)}
+    if BOEING_PATTERN.match(start):
+        return {"": (read_boeing(path), None)}
     if ending in (".bdf", ".dat", ".pch", ".dmig"):
         return read_dmig(path)
     if ending in MATRIX_ENDINGS:
@@ -123,29 +145,37 @@ def _pairs(path: Path) -> Mapping[str, tuple[csr_matrix, Dofs | None]]:
     if ending not in (".mtx", ".mm", ".inp"):
         raise ConfigError(
             f"{path} has the ending {ending!r}; known: .mtx, .mm, .inp, .sti, .mas, "
-            ".op4, .bdf, .dat, .pch, .dmig."
+            ".op4, .bdf, .dat, .pch, .dmig.",
+            hint="Let Nastran write DMIGPCH, or MATOP4." if ending == ".op2" else "",
         )
-    with path.open("rb") as file:
-        start = file.read(HEAD_BYTES)
     if ending == ".inp" or b"*USER ELEMENT" in start.upper():
         return read_user_element(path)
-    market = start.startswith(BANNER_TEXT)
-    return {"": (_finite(read_market(path), path), None) if market else _abaqus(path)}
+    return {"": _abaqus(path)}
 
 
-def _abaqus(path: Path) -> tuple[csr_matrix, Dofs]:
-    """Lines ``node, component, node, component, value`` of ``*MATRIX GENERATE`` output."""
-    rows = list[Entry]()
+def _abaqus(path: Path) -> tuple[csr_matrix, Dofs | None]:
+    """Lines ``node, component, node, component, value`` of ``*MATRIX GENERATE``.
+
+    Or ``row, column, value``, in its format of coordinates.
+    """
+    rows = list[tuple[Any, ...]]()
     with lines_of(path, "this is no entry", encoding="ascii") as lines:
         for line in lines:
             if line.strip() and not line.startswith("*"):
                 *place, value = line.replace(",", " ").split()
-                i, a, j, b = map(whole, place)
-                rows.append((i, a, j, b, float(value)))
+                rows.append((*map(whole, place), float(value)))
+                need(len(rows[-1]) == len(rows[0]) in (3, 5), f"{line.strip()!r} is none")
+                inside = all(1 <= k <= MOST_ROWS for k in rows[-1][:2])
+                need(len(place) > 2 or inside, f"{place} is no place in a matrix")
     if not rows:
         raise FileFormatError("the file holds no entry.", where=str(path))
-    A, dofs = labelled(rows)
-    return _finite(A, path), dofs
+    if len(rows[0]) > 3:
+        A, dofs = labelled(rows)
+        return _finite(A, path), dofs
+    *place, values = np.array(rows).T
+    i, j = np.array(place, dtype=np.int64) - 1
+    A = coo_matrix((values, (i, j)), shape=(max(i.max(), j.max()) + 1,) * 2)
+    return _finite(A.tocsr(), path), None
 
 
 def _finite(A: csr_matrix, path: Path) -> csr_matrix:
@@ -216,6 +246,50 @@ def _dense(table: Array, sizes: tuple[int, ...], sign: float) -> tuple[Index, In
     need(rows == columns, f"{rows} x {columns} is not square")
     j, i = np.triu_indices(rows, 0 if sign > 0 else 1)
     return i, j, table.ravel()
+
+
+def read_boeing(path: str | Path) -> csr_matrix:
+    """An assembled real matrix, of a symmetric one the triangle that is written.
+
+    Raises:
+        FileFormatError: if the file is no such file, cut, or holds a matrix that is not real.
+        UnsafeFileError: if its head announces more numbers than the file can hold.
+    """
+    path = Path(path)
+    check_last_line(path)
+    with (
+        in_file(path),
+        path.open(encoding="latin1") as file,
+        damaged("this is no Harwell-Boeing file", path),
+    ):
+        file.readline()
+        counts = [int(word) for word in file.readline().split()]
+        kind, *sizes = file.readline().split()
+        rows, columns, n = map(int, sizes[:3])
+        need(kind.upper() in ("RSA", "RUA"), f"a matrix {kind} is not real, square and assembled")
+        if max(rows, columns) > MOST_ROWS or 2 * max(n, columns) > path.stat().st_size:
+            raise UnsafeFileError(f"sizes {rows} x {columns}, {n} entries do not fit the file.")
+        formats = FIELD_PATTERN.findall(file.readline().upper())
+        if counts[4:] > [0]:
+            file.readline()  # of right-hand sides, which come last
+        parts = [columns + 1, n, n]
+        texts = zip(counts[1:4], formats, parts, strict=False)
+        ends, i, values = (_fields(file, k, int(w), m) for k, (_, w), m in texts)
+        place = np.diff(ends.astype(np.int64))
+        need(ends[0] == 1 and (place >= 0).all() and ends[-1] == n + 1, "columns do not ascend")
+        need(((i >= 1) & (i <= rows)).all(), f"a row is none of {rows}")
+    j = np.repeat(np.arange(columns), place)
+    return coo_matrix((values, (i.astype(np.int64) - 1, j)), shape=(rows, columns)).tocsr()
+
+
+def _fields(file: IO[str], n_lines: int, width: int, n: int) -> Array:
+    """(n,) numbers of lines of Fortran, between blanks or else in fields of one width."""
+    lines = [file.readline().rstrip() for _ in range(n_lines)]
+    words = " ".join(lines).split()  # SciPy 1.10 announces fields wider than it writes them
+    if len(words) != n:
+        words = [line[k : k + width] for line in lines for k in range(0, len(line), width)]
+    need(len(words) == n, f"{len(words)} numbers where {n} are announced")
+    return np.array([number(word) for word in words])
 
 
 def read_stored_matrix(path: str | Path) -> tuple[csr_matrix, Dofs]:

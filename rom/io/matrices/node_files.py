@@ -1,20 +1,24 @@
 """Nodes, and sets of nodes, in the files of other finite element programs."""
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from rom.decks.bulk import cards
 from rom.decks.keywords import Block
+from rom.decks.lines import whole
 from rom.decks.nodes import NODE_KEYWORDS, Nodes
 from rom.errors import ConfigError, FileFormatError, InterfaceError, in_file
-from rom.io.files import check_readable
-from rom.io.matrices.dmig import read_grids
+from rom.io.files import check_readable, damaged, lines_of, need
+from rom.io.matrices.dmig import Dofs, read_grids
 from rom.model import Array, Index
 from rom.names import named, offered
 
-CARDS = (".bdf", ".dat")
+CARDS = (".bdf", ".dat", ".pch", ".asm", ".dmig")
+COMPONENTS = {"UX": 1, "UY": 2, "UZ": 3, "ROTX": 4, "ROTY": 5, "ROTZ": 6}  # of Ansys
 AXES_TOL = 1e-6  # of axes that are orthonormal
 Placed = tuple[Index, Array, Array]
 # keywords that make nodes in ways that are not read, or turn the rows of matrices
@@ -28,7 +32,7 @@ def read_nodes(nodes: str | Path | tuple[npt.ArrayLike, ...]) -> Placed:
 
     Args:
         nodes: these, the axes only where they are not those of the body; or a file: ``.inp``,
-            ``.bdf``, ``.dat`` or ``.csv``.
+            ``.csv``, or bulk data with GRID cards.
 
     Raises:
         ConfigError: for another ending.
@@ -37,7 +41,10 @@ def read_nodes(nodes: str | Path | tuple[npt.ArrayLike, ...]) -> Placed:
     if isinstance(nodes, str | Path):
         where, (labels, points, *axes) = str(nodes), _node_file(Path(nodes))
     else:
-        where, (labels, points, *axes) = "nodes", (np.asarray(part) for part in nodes)
+        where = "nodes"
+        if len(nodes) not in (2, 3):
+            raise ConfigError("nodes are labels, positions and perhaps axes, or a file.")
+        labels, points, *axes = (np.asarray(part) for part in nodes)
     if points.shape != (labels.size, 3) or not labels.size or not np.isfinite(points).all():
         raise FileFormatError(f"{labels.size} labels and positions {points.shape}.", where=where)
     turned = axes[0] if axes else np.tile(np.eye(3), (labels.size, 1, 1))
@@ -58,7 +65,7 @@ def _node_file(path: Path) -> tuple[npt.NDArray[Any], ...]:
     if ending in CARDS:
         return read_grids(path)
     if ending not in (".inp", ".csv"):
-        raise ConfigError(f"{path}: nodes must come from .inp, .bdf, .dat or .csv.")
+        raise ConfigError(f"{path}: nodes must come from .inp, .csv, {', '.join(CARDS)}.")
     return _deck(path).placed() if ending == ".inp" else _table(path)
 
 
@@ -86,6 +93,71 @@ def _table(path: Path) -> tuple[Index, Array]:
     rows = range(len(block.rows))
     labels = np.array([block.whole(r, 0) for r in rows], dtype=np.int64)
     return labels, np.array([block.reals(r, 1, 2, 3) for r in rows]).reshape(-1, 3)
+
+
+def read_dofs(dofs: npt.ArrayLike | str | Path) -> Dofs | None:
+    """Label and component (n, 2) of each row; component 0 is a coordinate without a place.
+
+    Args:
+        dofs: these, or a file: ``.csv`` with lines ``label, component``; ``.mapping`` of Ansys,
+            with lines ``row, node, UX``; bulk data with EXTRN cards, None where there are none.
+
+    Raises:
+        ConfigError: for another ending.
+        FileFormatError: naming the line, if the file is missing or damaged, or a row occurs twice.
+
+    Source:
+        Ansys Mechanical APDL command reference, HBMAT; MSC Nastran Quick Reference Guide, EXTRN.
+    """
+    where = str(dofs) if isinstance(dofs, str | Path) else "dofs"
+    if not isinstance(dofs, str | Path):
+        rows = np.asarray(dofs).tolist()
+    elif (ending := Path(dofs).suffix.lower()) in CARDS:
+        rows = list(_retained(Path(dofs)))
+    elif ending in (".csv", ".mapping"):
+        rows = list(_listed(Path(dofs), ending == ".mapping"))
+    else:
+        raise ConfigError(f"{dofs}: dofs must come from .csv, .mapping, or bulk data with EXTRN.")
+    if not rows and isinstance(dofs, str | Path):
+        return None
+    with damaged("dofs are (n, 2) labels and components, 0 to 6, each once", where):
+        found = np.array(rows)
+        fits = found.ndim == 2 and found.shape[1] == 2 and np.issubdtype(found.dtype, np.integer)
+        need(fits, f"these are of shape {found.shape}")
+        need(((found[:, 1] >= 0) & (found[:, 1] <= 6)).all(), "a component is another")
+        own, n = np.unique(found, axis=0, return_counts=True)
+        need(len(own) == len(found), f"{own[n.argmax()].tolist()} comes twice")
+    return found.astype(np.int64)
+
+
+def _retained(path: Path) -> Iterator[tuple[int, int]]:
+    """Those of EXTRN cards, pairs of a grid point and all its components, in ascending order."""
+    found = set[tuple[int, int]]()
+    for card in cards(path):
+        if card.name == "EXTRN":
+            for k in range(0, len(card.fields), 2):
+                if card.text(k):
+                    label = card.whole(k)
+                    found |= {(label, int(c)) for c in str(card.whole(k + 1, 0))}
+    return iter(sorted(found))
+
+
+def _listed(path: Path, mapped: bool) -> Iterator[tuple[int, int]]:
+    """Of lines of text; in a mapping these begin with the number of a row, in any order."""
+    what = "a line is row, node, UX to ROTZ" if mapped else "a line is label, component"
+    found = list[tuple[int, ...]]()
+    with lines_of(path, what) as lines:
+        for line in lines:
+            words = line.partition("#")[0].replace(",", " ").split()
+            if mapped and words and words[0].isdecimal():
+                row, label, name = words
+                found.append((int(row), whole(label), COMPONENTS[name.upper()]))
+            elif words and not mapped:
+                label, component = words
+                found.append((len(found) + 1, whole(label), whole(component)))
+        found.sort()
+        need([row[0] for row in found] == list(range(1, len(found) + 1)), "a row is missing")
+    return ((label, component) for _, label, component in found)
 
 
 def read_node_sets(path: str | Path, names: tuple[str, ...]) -> dict[str, Index]:

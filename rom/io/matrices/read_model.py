@@ -1,7 +1,7 @@
 """A finite element model from matrices and nodes of another program."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +20,7 @@ from rom.errors import (
 )
 from rom.io.matrices.dmig import Dofs
 from rom.io.matrices.matrix_files import NamedMatrix, read_matrix
-from rom.io.matrices.node_files import read_node_sets, read_nodes
+from rom.io.matrices.node_files import CARDS, read_dofs, read_node_sets, read_nodes
 from rom.model import Array, FEModel, Index, Interface, Rotations
 from rom.plausible import DENSITY, MATRIX_SPEED, SIZE, warn_outside
 from rom.units import unit_system
@@ -35,12 +35,14 @@ MOST_SHOWN = 60  # characters of a wrong value
 
 
 @typed
-def read_model(
+def read_model(  # noqa: PLR0913  one keyword per choice
     K: str | Path | tuple[str | Path, str],
     M: str | Path | tuple[str | Path, str],
     *,
     nodes: str | Path | tuple[npt.ArrayLike, ...],
     interfaces: Mapping[str, npt.ArrayLike] | Sequence[str],
+    D: str | Path | tuple[str | Path, str] | None = None,
+    dofs: str | Path | Index | None = None,
     units: str = "SI",
     modal: npt.ArrayLike = (),
     hold_drilling: bool = False,
@@ -55,11 +57,17 @@ def read_model(
         M: mass, likewise; of solids the same along x, y and z. Rotations may have none.
         nodes: (k,) labels and (k, 3) positions, in units of the files, and where the rows of
             nodes follow axes of their own (k, 3, 3), these as columns; or a file: ``.inp`` with
-            ``*NODE``, ``.bdf`` or ``.dat`` with GRID cards, ``.csv`` with lines ``label, x, y, z``.
-            Rows of matrices without labels are those of the nodes in ascending order, 3 or 6 for
-            each; where all rows have labels, nodes without a row are left out.
+            ``*NODE``, ``.bdf``, ``.dat``, ``.pch``, ``.asm`` or ``.dmig`` with GRID cards, ``.csv``
+            with lines ``label, x, y, z``. Nodes without a row are left out where rows have labels.
+            Masses, springs and rigid elements of a deck are in the matrices, and none is added.
         interfaces: {name: (m,) labels of its nodes}, or names of ``*NSET`` in the
             ``.inp`` of the nodes; all nodes of an interface weigh the same.
+        D: damping, likewise, which bodies then have; it may not resist motions as a whole.
+        dofs: what the rows of matrices without labels are: (n, 2) labels and components 1 to 6, 0
+            without a place; or a file: ``.csv`` with lines ``label, component``, ``.mapping`` of
+            Ansys, or the cards of a superelement, ``.pch`` or ``.asm`` with EXTRN, which need not
+            be named again where they are the nodes. Rows behind them are amplitudes of modes. If
+            missing, rows are those of the nodes in ascending order, 3 or 6 for each.
         units: unit system of the files; the model is in SI.
         modal: labels whose rows are amplitudes of modes; scalar points are that anyway.
         hold_drilling: leave out rotations without stiffness and mass, as flat shells have about
@@ -70,12 +78,18 @@ def read_model(
         FileFormatError: if a file is missing, damaged, or does not fit the others.
         InterfaceError: if an interface names no nodes, or unknown ones.
         ModelError: if a node does not move along three axes, naming rotations without stiffness,
-            and if the mass is not that of a body.
+            if the mass is not that of a body, or ``modal`` names no row.
         QualityGateError: if a matrix is not symmetric, or the body is not free.
         UnsafeFileError: if a file asks for more memory than its size can mean.
 
     Warns:
         RomWarning: if size, density or speed of sound are those of no solid: wrong units.
+
+    Example:
+        >>> file = rom.export(rom.load("beam.rom.npz"), "beam.dmig")  # 2 rigid ends, 4 modes
+        >>> ends = {"root": [1], "tip": [2]}
+        >>> rom.read_model((file, "KAAX"), (file, "MAAX"), nodes=file, interfaces=ends)
+        FEModel(16 dofs, regions none, interfaces root, tip)
     """
     unit = unit_system(units)
     labels, points, axes = read_nodes(nodes)
@@ -84,22 +98,29 @@ def read_model(
         if not isinstance(nodes, str | Path):
             raise ConfigError("names of interfaces need nodes from an .inp file, with its sets.")
         interfaces = read_node_sets(nodes, names)
-    found = [read_matrix(source) for source in (K, M)]
+    found = [read_matrix(source) for source in (K, M, D) if source is not None]
+    if dofs is None and isinstance(nodes, str | Path) and Path(nodes).suffix.lower() in CARDS:
+        dofs = nodes
+    if dofs is not None and (table := read_dofs(dofs)) is not None:
+        found = [A if A.dofs is not None else _listed(A, table) for A in found]
     layout = _layout(found, labels, points, axes, np.atleast_1d(modal))
-    stiffness, mass = (layout.placed(A) for A in found)
+    stiffness, mass, *damping = (layout.placed(A) for A in found)
     kept = layout.rotations(stiffness, mass, hold=hold_drilling)
     T, rotations, points = kept[0], kept[1], layout.points * unit.length
-    scale = diags(np.where(np.arange(T.shape[1]) < points.size, 1.0, unit.length))
+    T = T @ diags(np.where(np.arange(T.shape[1]) < points.size, 1.0, unit.length))
     model = FEModel(
-        scale @ (T.T @ stiffness @ T) @ scale * (unit.force / unit.length),
-        scale @ (T.T @ mass @ T) @ scale * unit.mass,
+        T.T @ stiffness @ T * (unit.force / unit.length),
+        T.T @ mass @ T * unit.mass,
         points,
         {n: _interface(n, own, layout.labels, points, rotations) for n, own in interfaces.items()},
         provenance={"K": _name(K), "M": _name(M), "units": units},
         rotations=rotations,
-        n_scalars=layout.scalars.size,
+        n_scalars=len(layout.scalars),
+        D=T.T @ damping[0] @ T * (unit.mass / unit.time) if damping else None,
     )
-    _check_free(model)
+    _check_free("stiffness", model.K, model)
+    if D is not None:
+        _check_free("damping", model.D, model)
     _check_mass(model)
     _doubt_units(model)
     return model
@@ -112,30 +133,31 @@ class _Layout:
     labels: Index  # (k,) ascending
     points: Array  # (k, 3) in units of the files
     axes: Array  # (k, 3, 3) along which rows move, as columns
-    scalars: Index  # (s,) ascending labels
+    scalars: Dofs  # (s, 2) label and component, ascending
 
     def placed(self, found: NamedMatrix) -> csr_matrix:
         """(6 k + s, 6 k + s) symmetric matrix, its rows along the axes of the body."""
         with in_file(found.where):
             A = _completed(found.A)
             place = self._rows(_labelled(A, found.dofs, self.labels))
-        n = 6 * self.labels.size + self.scalars.size
+        n = 6 * self.labels.size + len(self.scalars)
         rows = np.ones(place.size), (place, np.arange(place.size))
         pick = csr_matrix(rows, shape=(n, A.shape[0]))
         if (self.axes != np.eye(3)).any():
             both, k = np.concatenate([self.axes, self.axes]), np.arange(2 * self.labels.size + 1)
             Q = bsr_matrix((both, k[:-1], k))
-            pick = block_diag([Q, identity(self.scalars.size)]) @ pick
+            pick = block_diag([Q, identity(len(self.scalars))]) @ pick
         return (pick @ A @ pick.T).tocsr()
 
     def _rows(self, dofs: Dofs) -> Index:
         """Row in this layout of each row of a matrix."""
         k, component = self.labels.size, dofs[:, 1] - 1
-        scalar = np.isin(dofs[:, 0], self.scalars)
+        scalars = {row: 6 * k + i for i, row in enumerate(map(tuple, self.scalars.tolist()))}
+        place = np.array([scalars.get((i, c), -1) for i, c in dofs.tolist()], dtype=np.int64)
+        scalar = place >= 0
         node, strange = _places(self.labels, dofs[~scalar, 0])
         if strange:
             raise FileFormatError(f"rows belong to nodes that are not given: {strange}.")
-        place = 6 * k + np.searchsorted(self.scalars, dofs[:, 0])
         turn = component[~scalar] >= 3
         place[~scalar] = 3 * node + component[~scalar] + (3 * k - 3) * turn
         return place
@@ -189,18 +211,32 @@ def _squares(A: csr_matrix) -> Array:
     return found
 
 
+def _listed(A: NamedMatrix, table: Dofs) -> NamedMatrix:
+    """With a table of its rows; those behind it are coordinates without a place."""
+    more = np.arange(1, A.A.shape[0] - len(table) + 1)
+    if A.A.shape[0] < len(table):
+        text = f"it has {A.A.shape[0]} rows; the table of dofs has {len(table)}"
+        hint = "Nastran writes one row for a matrix that is none; leave it out."
+        raise FileFormatError(f"{text}.", where=A.where, hint=hint)
+    behind = np.column_stack([table[:, 0].max(initial=0) + more, np.zeros_like(more)])
+    return replace(A, dofs=np.concatenate([table, behind]))
+
+
 def _layout(
     found: list[NamedMatrix], labels: Index, points: Array, axes: Array, modal: Index
 ) -> _Layout:
     """Nodes and scalars of labelled rows; nodes in no row, for loads and pictures, are left out."""
-    scalars = np.zeros(0, dtype=np.int64)
     if any(A.dofs is None for A in found):
-        return _Layout(labels, points, axes, scalars)
+        return _Layout(labels, points, axes, np.zeros((0, 2), dtype=np.int64))
     dofs = np.unique(np.concatenate([A.dofs for A in found if A.dofs is not None]), axis=0)
+    if (unknown := np.setdiff1d(modal, dofs[:, 0])).size:
+        raise ModelError(f"modal names {unknown[:MORE_NODES].tolist()}, which no row belongs to.")
     own, n_rows = np.unique(dofs[:, 0], return_counts=True)
     sole = own[n_rows == 1]  # of modes that other programs put on nodes of their own
-    scalars = np.unique(np.r_[dofs[dofs[:, 1] == 0, 0], sole, modal]).astype(np.int64)
-    dofs = dofs[~np.isin(dofs[:, 0], scalars)]
+    placed = labels[points.any(axis=1)]  # at zero, where nodes of modes are
+    scalar = (dofs[:, 1] == 0) | np.isin(dofs[:, 0], np.setdiff1d(sole, placed))
+    scalar |= np.isin(dofs[:, 0], modal)
+    scalars, dofs = dofs[scalar], dofs[~scalar]
     used = np.isin(labels, dofs[:, 0])
     own, n_rows = np.unique(dofs[dofs[:, 1] <= 3, 0], return_counts=True)
     halves = np.union1d(own[n_rows < 3], np.setdiff1d(dofs[:, 0], own))
@@ -266,6 +302,19 @@ def _interface(
 
 def _check_mass(model: FEModel) -> None:
     """The mass of solids is the same along x, y and z at each node, of other bodies as a whole."""
+    loose = (model.K.diagonal() <= 0.0) & (np.diff(model.K.indptr) > 0)
+    if multipliers := np.count_nonzero(loose & (abs(model.K).max(axis=1).toarray().ravel() > 0.0)):
+        raise ModelError(
+            f"{multipliers} rows of the stiffness have entries, but none on their diagonals, as "
+            "those of Lagrange multipliers.",
+            hint="Let ties be eliminated, and leave hybrid elements out.",
+        )
+    diagonal = model.M.diagonal()
+    if diagonal.min() < -MIXED_MASS_RTOL * diagonal.max(initial=0.0):
+        raise ModelError(
+            f"{np.count_nonzero(diagonal < 0.0)} entries on the diagonal of the mass are negative.",
+            hint="Write M consistent, or lumped in another way.",
+        )
     if model.n_dofs == model.points.size:
         scalar = model.M[::3][:, ::3]
         apart = abs(model.M - kron(scalar, identity(3))).max() / abs(model.M).max()
@@ -289,15 +338,18 @@ def _motions(model: FEModel) -> Array:
     return R
 
 
-def _check_free(model: FEModel) -> None:
+def _check_free(what: str, A: csr_matrix, model: FEModel) -> None:
     """Rigid motions must be free of force; supports and rows left out are seen here."""
-    residual = np.abs(model.K @ _motions(model)).max() / abs(model.K).max()
+    residual = np.abs(A @ _motions(model)).max() / max(abs(A).max(), 1e-300)
     if not residual < RIGID_RTOL:
+        hint = "Write K without boundary conditions; check nodes, axes, units and labels of modes."
+        if what == "damping":
+            hint = "Leave D out; rom.Rayleigh damps the deformation in proportion to the mass."
         raise QualityGateError(
-            f"a rigid motion meets the stiffness {residual:.2g} of its largest entry: the body is "
+            f"a rigid motion meets the {what} {residual:.2g} of its largest entry: the body is "
             "supported, or its nodes are not those of the matrix.",
             where=str(model.provenance["K"]),
-            hint="Write K without boundary conditions, and check nodes and units.",
+            hint=hint,
         )
 
 

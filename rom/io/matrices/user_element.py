@@ -87,7 +87,7 @@ def _comment(element: _Element, keyword: str, line: str) -> str:
         element.labels = []
         return NODE_LIST
     if keyword == NODE_LIST:
-        element.labels += [whole(word) for word in re.findall(r"\d+", line)]
+        element.labels += [whole(word) for word in re.findall(r"-?\d+", line)]
     return keyword
 
 

@@ -25,12 +25,17 @@ def connect(ops: Operators, model: FEModel, interfaces: dict[str, Any]) -> Conne
     "full" keeps every dof, "rbe2" makes the surface rigid (six coordinates), "rbe3" adds six
     coordinates that follow the area-weighted mean motion of the surface and leave it deformable;
     `Polynomial`, `FourierLegendre` and `Snapshots` let the surface follow orthogonal functions.
+    Those that the model ties by itself are tied, named or not.
     """
+    interfaces = interfaces | {k: v for k, v in model.kinds.items() if k not in interfaces}
     chosen = found(model, interfaces)
     for other, one in combinations(chosen, 2):
         if shared := np.intersect1d(one.nodes, other.nodes).size:
             text = f"interfaces {other.name!r} and {one.name!r} share {shared} nodes; leave a gap"
-            raise InterfaceError(f"{text} between the surfaces, or make them one physical surface.")
+            hint = "between the surfaces, or make them one physical surface"
+            if own := sorted({one.name, other.name} & model.kinds.keys()):
+                text, hint = text.partition(";")[0], f"; the model ties {own[0]!r}: use that one"
+            raise InterfaceError(f"{text}{hint}." if own else f"{text} {hint}.")
     ties = {i.name: tie(i, interfaces[i.name]) for i in chosen}
     if not any(t.removed.size for t in ties.values()):
         return _connection(ops, ties, [interface.dofs for interface in chosen])

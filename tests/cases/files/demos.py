@@ -20,7 +20,7 @@ LONG_DEMOS = {
         "compressor_blade exchange flexible_arm flexure forming hand isotropy large_deflection "
         "large_mesh lost_tip masonry mistuning oil_inlet parameters pendulum_chain periodic "
         "planetary robot_arm rockfall rolling_wheel rotating_blade rotor satellite sheet "
-        "slider_crank snap_through spin_up study transmission two_stage updating "
+        "slider_crank snap_through spin_up study superelement transmission two_stage updating "
         "virtual_sensing whole_turbine wind_power wind_turbine"
     ).split()
 }

@@ -66,9 +66,7 @@ def test_a_frame_of_beams_swings_as_a_rod_does():
     The rod errs by the square of its segments, by 6e-4 of its length; extrapolated it is nearer.
     """
     s = Section(0.02, 0.03, E=70e9, rho=2700.0)
-    y = np.cross(
-        [0.1, 0.2, 1.0], [1.0, 0.0, 0.0]
-    )  # along the breadth, as of its frames
+    y = np.cross([0.1, 0.2, 1.0], [1.0, 0.0, 0.0])  # along the breadth, as of its frames
     y /= np.linalg.norm(y)
     axes = rotation.quaternion(np.column_stack([y, np.cross([1.0, 0.0, 0.0], y), [1.0, 0.0, 0.0]]))
     second = np.array(s.second_moments)

@@ -3,13 +3,16 @@
 Regions are the element sets of ``*SOLID SECTION``, made of its ``*ELASTIC`` and ``*DENSITY``, or
 without any the ``ELSET`` of ``*ELEMENT``.
 Interfaces are ``*SURFACE`` of element faces or nodes, sets of skin elements (S3, S4, M3D3, CPS3,
-...), and each ``*NSET`` that contains whole facets of the outer surface. Every keyword is read,
-left aside because a free body does not need it, or refused by name.
+...), and each ``*NSET`` that contains whole facets of the outer surface. ``*RIGID BODY``,
+``*COUPLING`` and ``*MPC`` of beams make interfaces too, by the names of their sets and surfaces,
+and ``*MASS`` and ``*ROTARY INERTIA`` what these and nodes carry. Every keyword is read, left aside
+because a free body does not need it, or refused by name.
 
 Source:
     Abaqus Keywords Reference Guide; CalculiX CrunchiX user's manual.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import chain, product
@@ -20,17 +23,18 @@ import numpy as np
 from rom.decks.keywords import Block, Sets
 from rom.decks.lines import Unread
 from rom.decks.nodes import NODE_KEYWORDS, SET_OPTIONS, Nodes, Table
+from rom.decks.rigid import ALL, DISPLACED, Average, PointMass, Rigid
 from rom.errors import FileFormatError
 from rom.fe.mesh.cell_types import READ_TYPES
 from rom.fe.mesh.solid import Read, packed
 from rom.fe.mesh.sources.deck import (
     facets_of_nodes,
+    hung_on,
     of_materials,
     only_type,
     positions,
     regions_of,
     to_gmsh,
-    unused,
 )
 from rom.model import Index
 from rom.names import is_whole, named
@@ -38,6 +42,10 @@ from rom.names import is_whole, named
 SOLIDS = {4: "tet4", 10: "tet10", 8: "hex8", 20: "hex20"}
 SKIN_TYPES = tuple("S3 S4 S6 S8 STRI3 STRI65 M3D3 M3D4 M3D6 M3D8 SFM3D CPS".split())
 LINE_TYPES = ("T3D2", "T3D3")  # without a section, as gmsh writes curves
+COUPLINGS = ("KINEMATIC", "DISTRIBUTING")  # what follows *COUPLING
+BODY_SETS = ("NSET", "TIE NSET", "PIN NSET")  # of nodes of a *RIGID BODY
+USUAL = {"WEIGHTING METHOD": "UNIFORM", "COUPLING": "CONTINUUM"}
+POINT_TYPES = {"MASS": "MASS", "ROTARYI": "ROTARY INERTIA"}  # and what says their numbers
 MOST_GENERATED = 10_000_000  # elements by a row
 # corners of the faces S1, S2, ... of a cell
 SIDES = {
@@ -50,13 +58,16 @@ SIDES = {
 class Deck(Nodes):
     """What a deck says, in its own numbers.
 
-    Solids are {number: (cell type, nodes)}, skin {number: nodes}, surfaces {name: (type, rows)};
-    own are names of the element sets of ``*ELEMENT``, laws what is said of materials.
+    Solids are {number: (cell type, nodes)}, skin {number: nodes}, at_nodes {number: (type, node)},
+    surfaces {name: (type, rows)}; rigid has what ties nodes and hangs on them, own are names of the
+    element sets of ``*ELEMENT``, laws what is said of materials.
     """
 
     aside: Unread = field(default_factory=Unread)
     solids: dict[int, tuple[str, list[int]]] = field(default_factory=dict)
     skin: dict[int, list[int]] = field(default_factory=dict)
+    at_nodes: dict[int, tuple[str, int]] = field(default_factory=dict)
+    rigid: list[Block] = field(default_factory=list)
     cell_sets: Sets = field(default_factory=lambda: Sets("elements"))
     surfaces: dict[str, tuple[str, list[list[str]]]] = field(default_factory=dict)
     own: list[str] = field(default_factory=list)
@@ -75,6 +86,7 @@ def read(path: str) -> Read:
         elif block.keyword not in HARMLESS_KEYWORDS:
             counted = deck.aside if block.keyword in LOAD_KEYWORDS else deck.unread
             counted.add(f"*{block.keyword}", block.place)
+    ties = _ties(deck)
     deck.unread.refuse()
     cell_type = only_type(kind for kind, _ in deck.solids.values())
     ids = np.array(list(deck.solids), dtype=np.int64)
@@ -83,8 +95,13 @@ def read(path: str) -> Read:
     cells = to_gmsh(positions(node_ids, raw, "node"), cell_type)
     names, regions = _regions(deck, ids)
     facets, remarks = _facets(deck, ids, cells, cell_type, node_ids)
-    remarks = [*deck.aside.remark(), *remarks, *unused(node_ids, cells)]
-    told = {"region_names": names, "warnings": remarks, "provenance": {"parameters": {}}}
+    labels = {name: node_ids[np.unique(rows)].tolist() for name, rows in facets.items()}
+    elements = [*_masses(deck), *(one for tie in ties for one in _tied(deck, *tie, labels))]
+    turned = (b.options["ROT NODE"] for b in deck.rigid if "ROT NODE" in b.options)
+    rotating = [node for word in turned for node in _members(deck.node_sets, word).tolist()]
+    told, more = hung_on(elements, node_ids, points, cells, rotating)
+    remarks = [*deck.aside.remark(), *remarks, *more]
+    told |= {"region_names": names, "warnings": remarks, "provenance": {"parameters": {}}}
     told |= of_materials(_materials, deck)
     return packed(points, cells, cell_type, regions, ids, facets=facets, **told)
 
@@ -99,6 +116,10 @@ def _element(deck: Deck, block: Block) -> None:
             deck.aside.add(f"*ELEMENT, TYPE={kind}", block.place)
         else:
             deck.skin |= {row[0]: row[1:] for row in rows}
+    elif kind in POINT_TYPES:
+        rows = _numbers(block)
+        deck.cell_sets.add(block.options.get("ELSET", kind), [row[0] for row in rows])
+        deck.at_nodes |= {label: (kind, node) for label, node in rows}
     elif kind.startswith("C3D") and is_whole(digits) and int(digits) in SOLIDS:
         cell_type = SOLIDS[int(digits)]
         _new_cells(deck, block, cell_type, _table(block, 1 + READ_TYPES[cell_type].n_nodes))
@@ -159,6 +180,10 @@ def _surface(deck: Deck, block: Block) -> None:
     rows.extend(block.rows)
 
 
+def _rigid(deck: Deck, block: Block) -> None:
+    deck.rigid.append(block)
+
+
 MESH_KEYWORDS: Table = {
     **NODE_KEYWORDS,
     "ELEMENT": (_element, ("TYPE", "ELSET")),
@@ -168,6 +193,13 @@ MESH_KEYWORDS: Table = {
     "SURFACE": (_surface, ("NAME", "TYPE", "INTERNAL")),
     "SOLID SECTION": (lambda deck, block: deck.sections.append(block),
                       ("ELSET", "MATERIAL", "ORIENTATION", "CONTROLS")),
+    "MASS": (_rigid, ("ELSET",)),
+    "ROTARY INERTIA": (_rigid, ("ELSET",)),
+    "RIGID BODY": (_rigid, (*BODY_SETS, "ELSET", "REF NODE", "ROT NODE")),
+    "COUPLING": (_rigid, ("CONSTRAINT NAME", "REF NODE", "SURFACE")),
+    "KINEMATIC": (_rigid, ()),
+    "DISTRIBUTING": (_rigid, ("WEIGHTING METHOD", "COUPLING")),
+    "MPC": (_rigid, ()),
     "SURFACE SECTION": (lambda deck, block: None, ("ELSET",)),  # without a density
 }  # fmt: skip
 # of materials, with the options of each that may be there
@@ -262,6 +294,122 @@ def _skin_nodes(deck: Deck) -> dict[str, Index]:
 def _members(sets: Sets, word: str) -> Index:
     """Numbers in a set, or the one number."""
     return np.array([int(word)], dtype=np.int64) if is_whole(word) else sets.of(word.strip('"'))
+
+
+def _masses(deck: Deck) -> Iterator[PointMass]:
+    """Of ``*MASS`` and ``*ROTARY INERTIA``, whose products of inertia are entries of the tensor."""
+    open_ = dict(deck.at_nodes)
+    for block in (b for b in deck.rigid if b.keyword in POINT_TYPES.values()):
+        for label in deck.cell_sets.of(block.option("ELSET")).tolist():
+            kind, node = open_.pop(label, ("", 0))
+            if POINT_TYPES.get(kind) != block.keyword:
+                raise block.wrong(f"element {label} is not of its type, or has one already")
+            m, J = block.reals(0, 0)[0] if kind == "MASS" else 0.0, np.zeros((3, 3))
+            if kind != "MASS":
+                xx, yy, zz, xy, xz, yz = block.reals(0, *range(6))
+                J = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+            yield PointMass(f"{kind} {label}", block.place, node, m, np.zeros(3), J)
+    for label, (kind, _) in open_.items():
+        text = f"element {label} of the type {kind} has no *{POINT_TYPES[kind]}."
+        raise FileFormatError(text, where=str(deck.deck))
+
+
+def _ties(deck: Deck) -> list[tuple[Block, Block]]:
+    """Blocks that tie, and those that say how; others are counted as not read."""
+    found, coupling = [], None
+    for block in [*deck.rigid, Block("", {}, (deck.deck, 0))]:
+        if coupling and block.keyword not in COUPLINGS:
+            deck.unread.add("*COUPLING that says no kind", coupling.place)
+        elif block.keyword in COUPLINGS and not coupling:
+            deck.unread.add(f"*{block.keyword} without *COUPLING", block.place)
+        elif odd := _odd(block):
+            deck.unread.add(odd, block.place)
+        elif block.keyword in (*COUPLINGS, "RIGID BODY", "MPC"):
+            found.append((coupling or block, block))
+        coupling = block if block.keyword == "COUPLING" else None
+    return found
+
+
+def _odd(block: Block) -> str:
+    """The keyword with what keeps it from tying whole motions; or nothing."""
+    if block.keyword == "MPC":
+        kinds = [row[0].upper() for row in block.rows if row[0].upper() != "BEAM"]
+        return f"*MPC, {kinds[0]}" if kinds else ""
+    if block.keyword not in COUPLINGS:
+        return ""
+    for name, usual in USUAL.items():
+        if (value := block.options.get(name, usual).upper()) != usual:
+            return f"*{block.keyword}, {name}={value}"
+    held = _components(block)
+    if held >= (ALL if block.keyword == "DISTRIBUTING" else DISPLACED):
+        return ""
+    return f"*{block.keyword} of the components {''.join(sorted(held))}"
+
+
+def _components(block: Block) -> set[str]:
+    """What the rows from one component to another say; all where they say nothing."""
+    ends = [(block.whole(r, 0, 0), block.whole(r, 1, 0)) for r in range(len(block.rows))]
+    found = {c for low, high in ends for c in ALL if low <= int(c) <= (high or low)}
+    return found if any(low for low, _ in ends) else set(ALL)
+
+
+def _tied(
+    deck: Deck, block: Block, how: Block, labels: dict[str, list[int]]
+) -> Iterator[Rigid | Average]:
+    """What a block ties, of surfaces that have these nodes."""
+    if block.keyword == "MPC":
+        leads: dict[int, list[int]] = {}
+        for r, row in enumerate(block.rows):
+            if len(row) != 3:
+                raise block.wrong("a row is BEAM, a node or set that follows, one that leads", r)
+            leads.setdefault(_one(deck, block, row[2]), []).extend(_nodes(deck, row[1]))
+        for node, led in leads.items():
+            yield Rigid(f"MPC {node}", block.place, node, led, turning=True)
+        return
+    lead = _one(deck, block, block.option("REF NODE"))
+    name, nodes = _body(deck, block) if block is how else _coupled(deck, block, labels)
+    if how.keyword == "DISTRIBUTING":
+        of_area = deck.surfaces[name][0] != "NODE"
+        yield Average(name, block.place, lead, dict.fromkeys(nodes, 1.0), of_area)
+    else:
+        led, turning = [n for n in nodes if n != lead], block is how or _components(how) >= ALL
+        yield Rigid(name, block.place, lead, led, turning)
+
+
+def _nodes(deck: Deck, word: str) -> list[int]:
+    return _members(deck.node_sets, word).tolist()
+
+
+def _one(deck: Deck, block: Block, word: str) -> int:
+    """The one node that a word says."""
+    if len(nodes := _nodes(deck, word)) != 1:
+        raise block.wrong(f"{word!r} is {len(nodes)} nodes instead of one")
+    return nodes[0]
+
+
+def _coupled(deck: Deck, block: Block, labels: dict[str, list[int]]) -> tuple[str, list[int]]:
+    """Name and nodes of the surface of a coupling."""
+    names = {name.upper(): name for name in deck.surfaces}
+    if (name := names.get(block.option("SURFACE").upper(), "")) not in deck.surfaces:
+        raise block.wrong(f"the surface {block.option('SURFACE')!r} is unknown")
+    kind, rows = deck.surfaces[name]
+    listed = {node for row in rows if kind == "NODE" for node in _nodes(deck, row[0])}
+    return name, sorted(listed) if kind == "NODE" else labels[name]
+
+
+def _body(deck: Deck, block: Block) -> tuple[str, list[int]]:
+    """Name and nodes of a rigid body of sets of nodes, or of elements."""
+    names = [block.options[key] for key in BODY_SETS if key in block.options]
+    found = {node for name in names for node in deck.node_sets.of(name).tolist()}
+    if "ELSET" in block.options:
+        names.append(block.option("ELSET"))
+        for label in deck.cell_sets.of(names[-1]).tolist():
+            own = deck.solids[label][1] if label in deck.solids else deck.skin.get(label, [])
+            found.update(own)
+    if not names:
+        raise block.wrong("it has no set")
+    known = deck.cell_sets.names | deck.node_sets.names
+    return known[names[0].upper()], sorted(found)
 
 
 def _sides(deck: Deck, row: list[str], ids: Index, cells: Index, cell_type: str) -> Index:

@@ -22,11 +22,11 @@ from rom.errors import FileFormatError, MeshError
 from rom.fe.mesh.solid import Read, packed
 from rom.fe.mesh.sources.deck import (
     facets_of_nodes,
+    hung_on,
     of_materials,
     only_type,
     positions,
     to_gmsh,
-    unused,
 )
 from rom.names import named
 
@@ -102,9 +102,10 @@ def read(path: str) -> Read:
     sets = {name: positions(labels, np.array(rows), "node") for name, rows in deck.sets.items()}
     facets, remarks = facets_of_nodes(cells, sets, cell_type, n)
     names = {int(number): f"material_{number}" for number in np.unique(materials)}
-    told = {"region_names": names, "warnings": [*remarks, *unused(labels, cells)]}
-    told |= {"provenance": {"parameters": {}}} | of_materials(_materials, deck.laws, names)
     points = np.array([*deck.nodes.values()])
+    told, more = hung_on((), labels, points, cells)
+    told |= {"region_names": names, "warnings": [*remarks, *more]}
+    told |= {"provenance": {"parameters": {}}} | of_materials(_materials, deck.laws, names)
     return packed(points, cells, cell_type, materials, ids, facets=facets, **told)
 
 

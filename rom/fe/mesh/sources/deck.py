@@ -4,11 +4,12 @@ from collections.abc import Callable, Iterable, Mapping
 
 import numpy as np
 
+from rom.decks.rigid import Element, hung
 from rom.errors import FileFormatError, MeshError, TagError
 from rom.fe.mesh.cell_types import DECK_EDGES, READ_TYPES
 from rom.fe.mesh.solid import Notes
 from rom.fe.mesh.topology import faces_of
-from rom.model import Index
+from rom.model import Array, Index
 from rom.names import named
 
 Edges = tuple[tuple[int, int], ...]
@@ -97,8 +98,25 @@ def positions(ids: Index, wanted: Index, what: str) -> Index:
     return order[place]
 
 
-def unused(ids: Index, cells: Index) -> list[str]:
-    """A remark on the nodes of a deck that no solid uses."""
-    lonely = np.setdiff1d(np.arange(ids.size), cells)
-    text = f"{lonely.size} nodes belong to no solid and are left out: {named(ids[lonely].tolist())}"
-    return [f"{text}; check that no element is missing."] if lonely.size else []
+def hung_on(
+    elements: Iterable[Element],
+    ids: Index,
+    points: Array,
+    cells: Index,
+    known: Iterable[int] = (),
+) -> tuple[Notes, list[str]]:
+    """Ties and what they carry as notes, of a solid, and a remark on nodes of no known use."""
+    solid = np.zeros(ids.size, dtype=bool)
+    solid[cells] = True
+    row = dict(zip(ids.tolist(), range(ids.size), strict=True))
+
+    def place(node: int) -> Array:
+        if node not in row:
+            raise FileFormatError(f"node {node} is used but not defined.")
+        return points[row[node]]
+
+    found = hung(elements, set(ids[solid].tolist()), place)
+    lonely = ids[~solid & ~np.isin(ids, [*found.nodes, *known])]
+    text = f"{lonely.size} nodes belong to no solid and are left out: {named(lonely.tolist())}"
+    remarks = [f"{text}; check that no element is missing."] if lonely.size else []
+    return {"ties": found.ties, "carried": found.carried}, remarks

@@ -1,0 +1,184 @@
+"""Point masses and rigid elements of decks, and what they make of a solid.
+
+Both dialects come to the same records. What hangs on a reference node becomes a rigid body that an
+interface carries; the interface is made of the nodes of the solid that a rigid element ties.
+"""
+
+from collections.abc import Callable, Iterable, Set
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from rom.decks.lines import Place, at
+from rom.errors import FileFormatError
+from rom.model import Array
+
+DISPLACED, ALL = set("123"), set("123456")
+RIGID_KIND, AVERAGE_KIND, LOOSE_KIND = "rbe2", "rbe3", ""
+
+
+@dataclass(frozen=True, eq=False)
+class Element:
+    """Anything that hangs on a node: its name, as "RBE2 7", where it stands, and the node."""
+
+    name: str
+    place: Place
+    node: int
+
+    def wrong(self, why: str, hint: str = "") -> FileFormatError:
+        """The error of this element."""
+        return FileFormatError(f"{self.name}: {why}.", where=at(self.place), hint=hint)
+
+
+@dataclass(frozen=True, eq=False)
+class PointMass(Element):
+    """A rigid body that hangs on a node."""
+
+    mass: float
+    offset: Array  # (3,) of its mass centre from the node, basic axes
+    inertia: Array  # (3, 3) about its mass centre, basic axes
+
+
+@dataclass(frozen=True, eq=False)
+class Rigid(Element):
+    """Nodes that move with a reference node as one rigid piece."""
+
+    nodes: list[int]
+    turning: bool  # whether they turn with it as well; nodes of solids never turn
+
+
+@dataclass(frozen=True, eq=False)
+class Average(Element):
+    """A reference node that follows the mean motion of nodes, which stay free."""
+
+    weights: dict[int, float]  # by node
+    of_area: bool = False  # each node with its area of the surface of this name
+
+
+@dataclass(frozen=True)
+class Hung:
+    """What the elements of a deck make of the nodes of its solid, in what fits into JSON."""
+
+    # {interface: kind, points (k, 3), weights (k,), origin (3,)}
+    ties: dict[str, dict[str, Any]] = field(default_factory=dict)
+    carried: list[dict[str, Any]] = field(default_factory=list)  # as `rom.Attachment`
+    nodes: set[int] = field(default_factory=set)  # that are of use without an element
+
+
+def hung(elements: Iterable[Element], solid: Set[int], x: Callable[[int], Array]) -> Hung:
+    """Ties between nodes of a solid, by the positions (3,) of all nodes, and what they carry.
+
+    Rigid elements that share a reference node, or of which one leads the other, are one tie, with
+    the name of the first.
+
+    Raises:
+        FileFormatError: naming the element: nodes that depend twice, circles, hinges, masses that
+            hang on nothing, negative ones, inertia without mass.
+    """
+    elements = list(elements)
+    found, turning = Hung(), dict[int, str]()  # node that turns -> its interface
+    pieces = _pieces([e for e in elements if isinstance(e, Rigid)])
+    for lead, parts in pieces.items():
+        followers = {node for part in parts for node in (part.node, *part.nodes)}
+        tied = sorted(followers & solid)
+        if not tied:
+            raise parts[0].wrong("none of its nodes belongs to the solid")
+        _add(found, parts[0], RIGID_KIND, dict.fromkeys(tied, 1.0), lead, x)
+        led = {node for part in parts if part.turning for node in part.nodes if node not in solid}
+        turning |= dict.fromkeys({lead, *led}, parts[0].name)
+        found.nodes.update(followers)
+    dependent = {node for parts in pieces.values() for part in parts for node in part.nodes}
+    for one in (e for e in elements if isinstance(e, Average)):
+        if one.node in solid | turning.keys() | dependent:
+            raise one.wrong(f"its reference node {one.node} moves with something else as well")
+        if strange := sorted(one.weights.keys() - solid):
+            raise one.wrong(f"its node {strange[0]} does not belong to the solid")
+        _add(found, one, AVERAGE_KIND, one.weights, one.node, x)
+        found.ties[one.name] |= {"of area": True} if one.of_area else {}
+        turning[one.node] = one.name
+        found.nodes.add(one.node)
+    masses: dict[int, list[PointMass]] = {}
+    for mass in (e for e in elements if isinstance(e, PointMass)):
+        masses.setdefault(mass.node, []).append(mass)
+    for node, some in masses.items():
+        found.nodes.add(node)
+        if (body := _as_one(some, x(node))) is None:
+            continue
+        if node not in turning:
+            _check_plain(some, node, solid)
+            _add(found, some[0], LOOSE_KIND, {node: 1.0}, node, x)
+        found.carried.append({"interface": turning.get(node, some[0].name)} | body)
+    return found
+
+
+def _pieces(rigid: list[Rigid]) -> dict[int, list[Rigid]]:
+    """Rigid elements by the node that leads all of them."""
+    leaders: dict[int, Rigid] = {}
+    for one in rigid:
+        for node in one.nodes:
+            if (other := leaders.setdefault(node, one)) is not one:
+                raise one.wrong(
+                    f"node {node} depends on {other.name} as well",
+                    "Tie a node once; elements with one reference node are one rigid piece.",
+                )
+    pieces: dict[int, list[Rigid]] = {}
+    for one in rigid:
+        top, passed = one, [one]
+        while top.node in leaders:
+            node, top = top.node, leaders[top.node]
+            if top in passed:
+                raise one.wrong(f"its reference node {one.node} follows itself, in a circle")
+            if not top.turning:
+                raise one.wrong(f"its reference node {node} is a hinge: {top.name} only moves it")
+            passed.append(top)
+        pieces.setdefault(top.node, []).append(one)
+    return pieces
+
+
+def _add(
+    found: Hung,
+    element: Element,
+    kind: str,
+    weights: dict[int, float],
+    origin: int,
+    x: Callable[[int], Array],
+) -> None:
+    """Make an interface of nodes."""
+    if element.name in found.ties:
+        raise element.wrong("another has this name")
+    found.ties[element.name] = {
+        "kind": kind,
+        "points": [x(node).tolist() for node in weights],
+        "weights": list(weights.values()),
+        "origin": x(origin).tolist(),
+    }
+
+
+def _as_one(masses: list[PointMass], x: Array) -> dict[str, Any] | None:
+    """Mass, centre and inertia of what hangs on a node at x (3,); None where that is nothing."""
+    if negative := [one for one in masses if one.mass < 0.0]:
+        raise negative[0].wrong(f"its mass is {negative[0].mass:g}, below zero")
+    total = sum(one.mass for one in masses)
+    inertia = sum((one.inertia for one in masses), np.zeros((3, 3)))
+    if not total:
+        if inertia.any():
+            raise masses[0].wrong("it has inertia and no mass", "Give it the mass it belongs to.")
+        return None
+    centre = sum((one.mass * one.offset for one in masses), np.zeros(3)) / total
+    for one in masses:
+        arm = one.offset - centre
+        inertia = inertia + one.mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+    return {"mass": total, "inertia": inertia.tolist(), "at": (x + centre).tolist()}
+
+
+def _check_plain(masses: list[PointMass], node: int, solid: Set[int]) -> None:
+    """Refuse what a node of a solid, which does not turn, cannot carry."""
+    for one in masses:
+        if node not in solid:
+            raise one.wrong(f"node {node} belongs neither to the solid nor to what turns with it")
+        if one.inertia.any() or one.offset.any():
+            raise one.wrong(
+                f"node {node} of the solid does not turn, so it carries no inertia and no offset",
+                "Hang it on the reference node of a rigid element.",
+            )
