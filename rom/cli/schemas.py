@@ -135,6 +135,11 @@ VERBS: dict[str, Schema] = {
             ),
             "interfaces",
         ),
+        ties=by_name(whole("nodes of the deck"), "rigid and averaging elements of a deck"),
+        masses=each(
+            record("a mass", interface=text("what carries it"), mass=number("[kg]")),
+            "point masses of a deck",
+        ),
         faces=FACES,
         quality=by_name(number("figure"), "figures of quality"),
         parameters=by_name(number("as used"), "those of the geometry that are numbers, e.g. lc"),

@@ -140,7 +140,7 @@ def _text(data: Data) -> str:
             "parameters: " + ", ".join(f"{k} = {x:.6g}" for k, x in data["parameters"].items())
         )
     parts += [f"tie {name}: {n} nodes of the deck" for name, n in data["ties"].items()]
-    parts += [f"mass of {mass:.6g} kg on {name}" for name, mass in data["masses"]]
+    parts += [f"mass of {one['mass']:.6g} kg on {one['interface']}" for one in data["masses"]]
     if regions:
         parts += ["", table(("region", "cells", "volume [m^3]"), regions)]
     header = ("interface", "facets", "nodes", "middle [m]", "axis")

@@ -48,7 +48,7 @@ def summary(mesh: SolidMesh) -> Notes:
             for name, facets in mesh.facets.items()
         },
         "ties": {name: len(tie.points) for name, tie in mesh.ties.items() if tie.kind},
-        "masses": [[body.interface, body.mass] for body in mesh.carried],
+        "masses": [{"interface": body.interface, "mass": body.mass} for body in mesh.carried],
         "quality": {
             "smallest scaled Jacobian": float(scaled_jacobian(mesh).min()),
             "largest aspect ratio": float(aspect_ratio(mesh).max()),

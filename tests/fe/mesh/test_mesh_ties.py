@@ -12,8 +12,10 @@ from scipy.spatial import cKDTree
 import rom
 from cases.files.cells import solid
 from cases.files.damage import changed
+from cases.files.schema import answer
 from cases.refusals import refuses
 from cases.solid import STEEL
+from rom.cli.main import main
 from rom.errors import FileFormatError, InterfaceError, MeshError
 from rom.fe.mesh.input_deck import input_deck
 from rom.fe.mesh.read import read_mesh
@@ -403,3 +405,12 @@ test_what_cannot_be_meant_in_the_other_dialect_is_named = changed(
     ("BEAM, 901, 900", "BEAM, 902, 900", "ROTARYI 802: node 901|MASS 801: node 901"),
     (TIES["RIGID BODY"], TIES["COUPLING"].replace("=FACE", "=gone"), "surface 'gone' is unknown"),
 )  # fmt: skip
+
+
+def test_the_command_line_lists_them(tmp_path, capsys):
+    (tmp_path / "a.bdf").write_text(bulk(RBE2, *BODY, nodes=HUNG))
+    found = answer(capsys, "mesh", tmp_path / "a.bdf", "--units", "SI")
+    assert found["ties"] == {"RBE2 7": TIED.size}
+    assert found["masses"] == [{"interface": "RBE2 7", "mass": pytest.approx(WEIGHTS.sum())}]
+    assert main(["mesh", str(tmp_path / "a.bdf"), "--units", "SI", "-q"]) == 0
+    assert "mass of 2.5 kg on RBE2 7" in capsys.readouterr().out
