@@ -401,6 +401,7 @@ TIP = "*NODE\n9001, .45, .02, .01\n9002, .45, .02, .01\n*RIGID BODY, NSET=tip, R
 TIP += "ROT NODE=9002\n*ELEMENT, TYPE=MASS, ELSET=m\n9001, 9001\n*MASS, ELSET=m\n200.\n"
 
 
+@pytest.mark.fenicsx
 @needs_ccx
 def test_a_cantilever_with_a_tip_mass_vibrates_alike_in_calculix_and_in_the_textbook(tmp_path):
     """The tip mass outweighs that of the elements, for which CalculiX takes fewer Gauss points."""

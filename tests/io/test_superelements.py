@@ -137,7 +137,7 @@ def written(kind, e, folder):
         return path, write_abaqus_matrix(e.M, dofs, folder / "m.mtx"), nodes
     if kind == "coordinates":
         for name, A in (("k", e.K), ("m", e.M)):
-            rows = [f"{i + 1}, {j + 1}, {A[i, j]!r}" for i, j in np.ndindex(A.shape) if j <= i]
+            rows = [f"{i + 1}, {j + 1}, {A[i, j]:.17g}" for i, j in np.ndindex(A.shape) if j <= i]
             (folder / f"{name}.mtx").write_text("\n".join([*rows, ""]))
         table = [f"{label}, {component}" for label, component in e.dofs.tolist()]
         (folder / "dofs.csv").write_text("# label, component\n" + "\n".join([*table, ""]))

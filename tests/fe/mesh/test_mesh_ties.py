@@ -22,6 +22,8 @@ from rom.fe.mesh.read import read_mesh
 from rom.fe.mesh.sources import abaqus, nastran
 from rom.reduction.full_model import mass_properties, operators
 
+pytestmark = pytest.mark.fenicsx
+
 SIZE = (0.4, 0.05, 0.03)
 REFERENCE = np.array([0.45, 0.02, 0.01])
 # points of a rigid body beside the reference node: their masses, centre and tensor
