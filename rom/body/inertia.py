@@ -21,11 +21,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.sparse import coo_matrix, csr_matrix
+from scipy.sparse import coo_matrix, csr_matrix, identity, kron
 
-from rom.eigen.verbs import Operators, column_blocks, given_rigid_motions
+from rom.eigen.verbs import Operators, column_blocks, dofs_of, given_rigid_motions
 from rom.model import Array, FEModel
-from rom.rotation import crossed, skew_tensor
+from rom.rotation import axial, crossed, skew_tensor
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,10 +89,9 @@ def turning_integrals(model: FEModel, ops: Operators, Psi: Array) -> InertiaInte
     rest = ops.gram(Psi, MPsi) - np.einsum("aakl->kl", S_kl)
     Ibar = (model.points.T @ V + Y.reshape(-1, 3, 3 * r).sum(axis=0)).reshape(3, 3, r)
     turning = ops.gram(R[:, 3:], MPsi) - crossed(Ibar)
-    first = 0.5 * (rigid[:3, 3:] - rigid[:3, 3:].T)
     return InertiaIntegrals(
         mass=float(np.trace(rigid[:3, :3])) / 3,
-        first_moment=np.array([first[1, 2], first[2, 0], first[0, 1]]),
+        first_moment=axial(rigid[3:, :3]),
         inertia=0.5 * (rigid[3:, 3:] + rigid[3:, 3:].T),
         S=ops.gram(R[:, :3], MPsi),
         Ibar_kl=Ibar - 0.5 * np.einsum("abc,ck->abk", skew_tensor(), turning),
@@ -105,19 +104,16 @@ def _moments(model: FEModel, Psi: Array) -> tuple[csr_matrix, csr_matrix, Array]
     n, turning = model.points.size, model.rotations
     A = csr_matrix((n, model.n_dofs))  # from dofs to rotation vectors
     if turning is not None:
-        row = (3 * turning.nodes[:, None] + np.arange(3)).ravel()
-        A = csr_matrix(
-            (turning.axes.ravel(), (row, np.repeat(turning.dofs, 3))), shape=(n, model.n_dofs)
-        )
+        place = dofs_of(turning.nodes), np.repeat(turning.dofs, 3)
+        A = csr_matrix((turning.axes.ravel(), place), shape=A.shape)
     C, J = coo_matrix(model.M[:n] @ A.T), coo_matrix(A @ model.M @ A.T)
     (i, a), (j, b) = np.divmod(C.row, 3), np.divmod(C.col, 3)
     sign = np.where((b - a) % 3 == 1, 0.5, -0.5) * (a != b)
     D = csr_matrix((sign * C.data, (i, 3 * j + (3 - a - b) % 3)), shape=(n // 3, n))
     (i, a), (j, b) = np.divmod(J.row, 3), np.divmod(J.col, 3)
-    P = -csr_matrix((J.data, (3 * i + b, 3 * j + a)), shape=(n, n))
-    for axis in range(3):
-        half = 0.5 * J.data * (a == b)
-        P = P + csr_matrix((half, (3 * i + axis, 3 * j + axis)), shape=(n, n))
+    trace = csr_matrix((J.data * (a == b), (i, j)), shape=(n // 3, n // 3))
+    turned = csr_matrix((J.data, (3 * i + b, 3 * j + a)), shape=(n, n))
+    P = csr_matrix(0.5 * kron(trace, identity(3)) - turned)
     return D, P, (A @ Psi).reshape(n // 3, 3, -1)
 
 

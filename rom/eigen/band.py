@@ -12,7 +12,7 @@ from rom.eigen.lanczos import capacity
 from rom.eigen.scipy import SciPyOperators, SymmetricLU
 from rom.eigen.search import dof_set, missed
 from rom.eigen.verbs import Matrix, column_blocks
-from rom.errors import ParallelError, SolverError
+from rom.errors import ModelError, ParallelError, SolverError
 from rom.model import Array, Modes
 from rom.process.memory import check_memory, free_bytes
 
@@ -99,7 +99,11 @@ def modes_up_to(ops: Any, held: Any, f_max: float, tol: float) -> Modes:
 
 def _residual(body: Any, lam: Array, Phi: Array) -> Array:
     """(k, k) scalar products of K x - lambda M x in M^-1 [rad^4/s^4]."""
-    mass = SymmetricLU(body.M if issparse(body.M) else body.gathered(body.M))
+    try:
+        mass = SymmetricLU(body.M if issparse(body.M) else body.gathered(body.M))
+    except RuntimeError as error:
+        text = "some motions have no mass, and bounds of frequencies need that of all"
+        raise ModelError(f"{text}; ask for a number of modes.") from error
     R, MR = np.empty(Phi.shape), np.empty(Phi.shape)
     for some in column_blocks(lam.size):
         R[:, some] = body.apply_K(Phi[:, some]) - body.apply_M(Phi[:, some]) * lam[some]

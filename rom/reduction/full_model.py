@@ -10,16 +10,12 @@ from rom.eigen.attachments import added_mass
 from rom.eigen.band import modes_up_to
 from rom.eigen.scipy import SciPyOperators
 from rom.eigen.supports import Fixed, Springs, refuse_loose, spring_matrices, supports
-from rom.eigen.verbs import (
-    Operators,
-    column_blocks,
-    given_rigid_motions,
-    held_rows,
-)
+from rom.eigen.verbs import Operators, column_blocks, given_rigid_motions, held_rows
 from rom.model import Array, FEModel, Index, Modes
 from rom.process.progress import MANY_DOFS, stages
 from rom.reduction.interfaces.connection import connect
 from rom.reduction.interfaces.kinds import by_name
+from rom.rotation import axial
 
 
 def mesh_operators(model: FEModel) -> Operators:
@@ -61,8 +57,8 @@ def mass_properties(model: FEModel) -> MassProperties:
     ops = operators(model)
     R = given_rigid_motions(ops)
     M = ops.gram(R, ops.apply_M(R))
-    mass, first = float(np.trace(M[:3, :3])) / 3, 0.5 * (M[:3, 3:] - M[:3, 3:].T)
-    centre = np.array([first[1, 2], first[2, 0], first[0, 1]]) / mass
+    mass = float(np.trace(M[:3, :3])) / 3
+    centre = axial(M[3:, :3]) / mass
     steiner = mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
     return MassProperties(mass, centre, 0.5 * (M[3:, 3:] + M[3:, 3:].T) - steiner)
 

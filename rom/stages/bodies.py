@@ -9,7 +9,13 @@ import numpy as np
 
 from rom.body.damping import damped
 from rom.body.prestress import UnitLoads
-from rom.body.projection import canonical_columns, elastic_part, flexible_body, stress_recovery
+from rom.body.projection import (
+    canonical_columns,
+    elastic_part,
+    flexible_body,
+    stress_recovery,
+    stressed_nodes,
+)
 from rom.body.recovery import residual_motion
 from rom.checks.draft import Draft
 from rom.errors import InterfaceError
@@ -82,6 +88,7 @@ def make_body(draft: Draft) -> None:
 
 def recover(draft: Draft) -> None:
     """Make the stress on the surface recoverable, with that of the modes left out."""
+    stressed_nodes(draft.model)  # refuses a model without finite elements
     holds = {name: marker.hold for name, marker in draft.body.markers.items()}
     missing = residual_motion(draft.ops, draft.connection, draft.basis, holds, draft.model.points)
     draft.body = replace(draft.body, stress=stress_recovery(draft.model, draft.E, missing))

@@ -238,6 +238,33 @@ def test_rotations_without_inertia_are_condensed():
         refuses(ModelError, "has stiffness and no mass", rom.reduce, bare, interfaces=RIGID, **how)
 
 
+def test_what_does_not_go_with_nodes_that_turn_is_refused_by_name(angle):
+    beam = cantilever(4, section=Section(0.03, 0.05))
+    lumped = replace(beam, M=csr_matrix(diags(np.r_[np.ones(15), np.zeros(15)])))
+    refuses(ModelError, "some motions have no mass", rom.modes, lumped, f_max=500.0,
+            fixed=("root",))  # fmt: skip
+    for option in ("stress", "stiffening"):
+        refuses(rom.ConfigError, "the model has no finite elements", rom.reduce, beam,
+                interfaces=RIGID, **{option: True})  # fmt: skip
+    refuses(rom.InterfaceError, "functions only displace", rom.reduce, beam,
+            interfaces={"root": rom.Polynomial(1)})  # fmt: skip
+    refuses(rom.ConfigError, "those of the model turn", rom.CyclicSector.from_model, beam,
+            low="root", high="tip")  # fmt: skip
+
+
+def test_a_wire_beside_a_beam_keeps_its_rotations(tmp_path):
+    """However little stiffness they have beside the others: 1e-13 of it here."""
+    points, nodes = BENT[:3], [1, 2, 3]
+    beam = frame(points, [(0, 1)], Section(0.03, 0.05), {"root": 0})
+    wire = frame(points, [(1, 2)], Section(2e-5, 2e-5), {"root": 0})
+    order = np.concatenate([[*(3 * k + np.arange(3)), *(9 + 3 * k + np.arange(3))]
+                            for k in range(3)])  # fmt: skip
+    K, M = ((A + B)[order][:, order] for A, B in ((beam.K, wire.K), (beam.M, wire.M)))
+    path = write_op4({"K": K, "M": M}, tmp_path / "w.op4")
+    model = read_model((path, "K"), (path, "M"), nodes=(nodes, points), interfaces={"root": [1]})
+    assert model.n_dofs == 18
+
+
 def _tenth(values):
     """Of nodal values (3 k,) every tenth node, with ten times the mass."""
     return 10 * values.reshape(-1, 3)[::10].ravel()

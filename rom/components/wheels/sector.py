@@ -129,7 +129,7 @@ class CyclicSector:
             regions: names of regions whose stiffness is kept apart, for blades that differ.
 
         Raises:
-            ConfigError: if a region is unknown.
+            ConfigError: if a region is unknown, or nodes turn.
             InterfaceError: if an interface is unknown, the angle between the faces does not divide
                 the circle, they are no images of each other, or the axis runs through the sector.
             ResourceError: on all ranks, if the sector does not fit on each of them.
@@ -137,6 +137,9 @@ class CyclicSector:
         for name in (low, high):
             text = f"the sector has no interface {name!r}; it has"
             check_known(name, model.interfaces, text, InterfaceError)
+        if model.n_dofs > model.points.size:
+            text = "nodes of a sector only displace; those of the model turn, or it is reduced"
+            raise ConfigError(f"{text} already.")
         e, at = unit_vector("axis", axis), finite("at", at, (3,))
         pair = paired(model.interfaces[low], model.interfaces[high], e, at)
         refuse_all_around(model.points, e, at)

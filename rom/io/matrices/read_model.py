@@ -121,6 +121,7 @@ def read_model(  # noqa: PLR0913  one keyword per choice
     _check_free("stiffness", model.K, model)
     if D is not None:
         _check_free("damping", model.D, model)
+    _refuse_multipliers(model.K)
     _check_mass(model)
     _doubt_units(model)
     return model
@@ -192,11 +193,10 @@ def _felt(K: csr_matrix, M: csr_matrix) -> tuple[Index, Array, Index]:
 
     Also nodes that turn about some axes and not about others. Whole triples keep x, y and z.
     """
-    squares = [_squares(A) for A in (K, M)]
-    G = sum(S / max(S.max(initial=0.0), 1e-300) for S in squares)
+    squares = [_squares(A) for A in (K, M)]  # each over the most at its node
+    G = sum(S / S.max(axis=(1, 2), initial=np.finfo(float).tiny, keepdims=True) for S in squares)
     size, V = np.linalg.eigh(G)
-    felt = size > UNFELT_RTOL * size[:, -1:].clip(1e-300)
-    felt &= size[:, -1:] > UNFELT_RTOL * size.max(initial=0.0)
+    felt = (size > UNFELT_RTOL * size[:, -1:]) & (size[:, -1:] > 0.0)
     V[felt.all(axis=1)] = np.eye(3)
     node, column = np.nonzero(felt)
     return node, V[node, :, column], np.flatnonzero(felt.any(axis=1) & ~felt.all(axis=1))
@@ -300,15 +300,19 @@ def _interface(
     )
 
 
-def _check_mass(model: FEModel) -> None:
-    """The mass of solids is the same along x, y and z at each node, of other bodies as a whole."""
-    loose = (model.K.diagonal() <= 0.0) & (np.diff(model.K.indptr) > 0)
-    if multipliers := np.count_nonzero(loose & (abs(model.K).max(axis=1).toarray().ravel() > 0.0)):
+def _refuse_multipliers(K: csr_matrix) -> None:
+    """Rows that ties or pressure have added are no motions."""
+    felt = abs(K).max(axis=1).toarray().ravel() > 0.0
+    if multipliers := np.count_nonzero((K.diagonal() <= 0.0) & felt):
         raise ModelError(
             f"{multipliers} rows of the stiffness have entries, but none on their diagonals, as "
             "those of Lagrange multipliers.",
             hint="Let ties be eliminated, and leave hybrid elements out.",
         )
+
+
+def _check_mass(model: FEModel) -> None:
+    """The mass of solids is the same along x, y and z at each node, of other bodies as a whole."""
     diagonal = model.M.diagonal()
     if diagonal.min() < -MIXED_MASS_RTOL * diagonal.max(initial=0.0):
         raise ModelError(
