@@ -208,8 +208,11 @@ class Component(Described):
         }
         remaining = tuple(name for name in self.values.get("interfaces", {}) if name not in sets)
         sets |= read_node_sets(m["nodes"], remaining) if remaining else {}
-        sources = (source(m[name], self.document.path.parent) for name in ("stiffness", "mass"))
-        model = read_model(*sources, nodes=m["nodes"], interfaces=sets, units=m["units"])
+        files = {name: m[name] for name in ("stiffness", "mass", "damping") if name in m}
+        K, M, *D = (source(text, self.document.path.parent) for text in files.values())
+        how = {name: m[name] for name in ("nodes", "dofs", "units", "hold_drilling") if name in m}
+        how |= {"modal": [int(x) for x in m["modal"]]}
+        model = read_model(K, M, D=D[0] if D else None, interfaces=sets, **how)
         return replace(model, attachments=tuple(self._attachments()))
 
 

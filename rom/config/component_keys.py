@@ -33,6 +33,7 @@ ORTHOTROPIC = Declared(
     Key("axes", Number("1", (3, 3)), "Rows are the axes 1, 2, 3 in the geometry."),
     about="An orthotropic solid, known by its key G.",
 )
+LABELS = Quantity("1", ((None,),))  # of nodes
 SHAPES = "rom.reduction.interfaces.polynomial"
 
 
@@ -97,9 +98,14 @@ TABLE = Table("A component.", (
     Key("matrices", Table("The solid as matrices of another program, in place of a geometry.", (
         Key("stiffness", Text(), "File, `:NAME` behind it where it holds several.", ...),
         Key("mass", Text(), "Likewise.", ...),
-        Key("nodes", file_path, "`.inp`, `.bdf`, `.dat` or `.csv`.", ...),
+        Key("damping", Text(), "Likewise, where there is one."),
+        Key("nodes", file_path, "`.inp`, `.bdf`, `.dat`, `.pch`, `.asm`, `.dmig` or `.csv`.", ...),
+        Key("dofs", file_path, "What rows without labels are: `.csv` with lines label, component; "
+            "`.mapping` of Ansys; `.pch` or `.asm` with EXTRN."),
         Key("units", Text(tuple(SYSTEMS)), "Unit system of the files.", "SI"),
-        Key("sets", Named(Quantity("1", ((None,),)), "labels"),
+        Key("modal", LABELS, "Labels whose rows are amplitudes of modes.", ()),
+        Key("hold_drilling", Flag(), "Leave out rotations without stiffness and mass.", False),
+        Key("sets", Named(LABELS, "labels"),
             "Labels of the nodes of an interface, where the `.inp` has no set of its name."),
     )), "The solid as matrices of another program."),
     Key("material", Solids(), "What it is made of; by region where there are several. A deck "

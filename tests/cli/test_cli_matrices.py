@@ -55,6 +55,9 @@ FAULTS = {
     "no set": ((*NASTRAN, "--fixed", "root"), "which nodes are the interface 'root'?",
                "--set root=11-14,20"),
     "set of nobody": ((*CALCULIX, "--set", "pin=12"), "--set pin is no interface"),
+    "modes without mass": ((CALCULIX[0], "--modal", "3"), "--modal needs --mass"),
+    "drilling without mass": ((CALCULIX[0], "--hold-drilling"), "--hold-drilling needs --mass"),
+    "modes": ((*CALCULIX, "--modal", "3-"), "--modal: '3-' must be a label"),
     "label": ((*CALCULIX, "--set", "a=3-x", "--fixed", "a"), "'3-x' must be a label"),
     "which": ((DIR / "dense.op4", *NASTRAN[1:]), "Name one, ", "FILE:NAME"),
 }  # fmt: skip
@@ -73,5 +76,5 @@ def test_names_stand_behind_a_colon(tmp_path):
     (tmp_path / "a:b.op4").touch()
     assert source(str(tmp_path / "a:b.op4")) == str(tmp_path / "a:b.op4")
     assert source("a.op4:KAA") == ("a.op4", "KAA") and source("a.mtx") == "a.mtx"
-    assert labels("11-13, 20") == [11, 12, 13, 20]
-    refuses(rom.ConfigError, "at most 10000000 nodes", labels, "1-99999999999")
+    assert labels("--set", "11-13, 20") == [11, 12, 13, 20]
+    refuses(rom.ConfigError, "at most 10000000 nodes", labels, "--modal", "1-99999999999")

@@ -15,6 +15,8 @@ import rom
 from cases.refusals import refuses
 from cases.solid import block
 from cases.structures.frames import Section, frame
+from rom.cli.main import main
+from rom.config.component import read_component
 from rom.errors import ConfigError, FileFormatError, ModelError, QualityGateError
 from rom.io.matrices.dmig import write_dmig
 from rom.io.matrices.matrix_files import read_matrix, write_abaqus_matrix
@@ -215,6 +217,35 @@ def test_what_is_exported_comes_back_as_a_body(bent, to, tmp_path):
     same(back, body, rtol=1e-7 if to == "dmig" else 1e-8)
     damped = body.D if D else np.zeros_like(body.D)
     assert_allclose(np.abs(back.D), np.abs(damped), atol=1e-6 * body.D.max())
+
+
+def test_options_and_keys_of_a_file_say_the_same(bent, reduced, tmp_path, capsys, monkeypatch):
+    """Rows of modes on nodes of their own, which have a place, and damping of the deformation."""
+    monkeypatch.chdir(tmp_path)
+    write_op4({"K": reduced.K, "M": reduced.M, "B": 2e-5 * reduced.K}, tmp_path / "a.op4")
+    dofs = np.where(reduced.dofs == 0, 1, reduced.dofs)
+    (tmp_path / "dofs.csv").write_text("".join(f"{n}, {c}\n" for n, c in dofs))
+    more = [(int(n), np.ones(3)) for n in reduced.modes[:, 0]]
+    rows = [",".join(map(repr, (n, *x.tolist()))) for n, x in [*reduced.nodes.items(), *more]]
+    (tmp_path / "nodes.csv").write_text("\n".join(rows).replace("np.int64", "") + "\n")
+    sides = {name: ",".join(map(str, labels)) for name, labels in reduced.sides.items()}
+    options = "a.op4:K --mass a.op4:M --damping-matrix a.op4:B --nodes nodes.csv --dofs dofs.csv"
+    given = [word for name, text in sides.items()
+             for word in ("--set", f"{name}={text}", "-i", f"{name}=rbe2")]  # fmt: skip
+    how = ["-m", "6", "--no-certificate", "-o", "by_options.rom.npz"]
+    without = ["reduce", *options.split(), *given, *how]
+    assert main(without) == 4 and "do not move along three axes" in capsys.readouterr().err
+    assert main([*without, "--modal", "1001-1006"]) == 0
+    text = """[matrices]\nstiffness = "a.op4:K"\nmass = "a.op4:M"\ndamping = "a.op4:B"
+nodes = "nodes.csv"\ndofs = "dofs.csv"\nmodal = [1001, 1002, 1003, 1004, 1005, 1006]
+[matrices.sets]\n""" + "".join(f"{name} = [{labels}]\n" for name, labels in sides.items())
+    text += '[interfaces]\nroot = "rbe2"\ntip = "rbe2"\n[reduction]\nmodes = 6\n'
+    (tmp_path / "part.toml").write_text(text + "certificate = false\n")
+    bodies = [rom.load("by_options.rom.npz"), read_component("part.toml").body()]
+    direct = rom.reduce(bent, method=rom.CraigBampton(6), interfaces=ENDS, certify=False)
+    for body in bodies:
+        same(body, direct)
+        assert_allclose(body.D, 2e-5 * body.K, atol=1e-9 * body.D.max())
 
 
 def test_damping_is_that_of_the_deformation(bent, reduced, tmp_path):

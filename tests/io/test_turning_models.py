@@ -15,6 +15,7 @@ from scipy.io import mmwrite
 from scipy.sparse import block_diag, csr_matrix, diags
 
 import rom
+from cases.files.schema import answer
 from cases.refusals import refuses
 from cases.structures.frames import Section, cantilever, frame, interface, plate
 from rom.eigen.verbs import mean_motion
@@ -126,7 +127,7 @@ def _sorted(model):
     return model.K[dofs][:, dofs]
 
 
-def test_a_plate_has_the_frequencies_of_kirchhoff(tmp_path):
+def test_a_plate_has_the_frequencies_of_kirchhoff(tmp_path, capsys):
     """Simply supported, pi / 2 sqrt(D / rho h) (m^2 / a^2 + n^2 / b^2); normals do not turn."""
     a, b, h = 0.5, 0.4, 2e-3
     model = plate((a, b), h, (16, 14), up=(0.2, -0.4, 1.0))
@@ -141,6 +142,11 @@ def test_a_plate_has_the_frequencies_of_kirchhoff(tmp_path):
     refuses(ModelError, words, read_model, (path, "K"), (path, "M"), **given)
     held = read_model((path, "K"), (path, "M"), hold_drilling=True, **given)
     assert held.n_dofs == 5 * n and held.mass() == pytest.approx(7850 * a * b * h, rel=1e-9)
+    rows = [f"{k + 1}, {x!r}, {y!r}, {z!r}" for k, (x, y, z) in enumerate(points.tolist())]
+    (tmp_path / "n.csv").write_text("\n".join(rows) + "\n")
+    options = (f"{path}:K", "--mass", f"{path}:M", "--nodes", tmp_path / "n.csv", "-n", 7)
+    loose = answer(capsys, "modes", *options, "--hold-drilling")["frequencies"]
+    assert_allclose(loose[6], rom.modes(held, 7).frequencies[6], rtol=1e-9)
     D = 210e9 * h**3 / 12 / (1 - 0.3**2)
     pairs = np.array([(i, j) for i in range(1, 5) for j in range(1, 5)])
     exact = np.sort(np.pi / 2 * np.sqrt(D / (7850 * h)) * ((pairs / [a, b]) ** 2).sum(axis=1))[:4]
