@@ -12,8 +12,8 @@ TASKS: dict[str, tuple[str, str]] = {
     ),
     "From geometry to matrices": (
         "A STEP file, a geometry or a mesh becomes stiffness and mass.",
-        """Material Orthotropic Layered example fe.model fe.pieces fe.assemble read_component Region
-        Interface Attachment SurfaceMesh FEModel mass_properties modes Modes
+        """Material Orthotropic Layered example fe.model fe.pieces fe.assemble fe.by_mumps
+        read_component Region Interface Attachment SurfaceMesh FEModel mass_properties modes Modes
         eigen.substructured_modes""",
     ),
     "Reduce": (

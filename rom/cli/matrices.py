@@ -63,7 +63,7 @@ def read_model(args: argparse.Namespace) -> FEModel:
 
 def read_matrices(args: argparse.Namespace) -> FEModel:
     """The model of the matrices the options name."""
-    from rom.config.component import source
+    from rom.config.component import quickly_solved, source
 
     parser = verb_parsers(args.parser)[args.verb]
     odd = [name for name in GEOMETRY_OPTIONS if getattr(args, name) != parser.get_default(name)]
@@ -74,7 +74,7 @@ def read_matrices(args: argparse.Namespace) -> FEModel:
         raise ConfigError("--mass needs --nodes, the file with the places of the nodes.")
     held = [word.partition(":")[0] for word in getattr(args, "fixed", ())]
     names = [*unique(args.interface, "-i"), *held]
-    return rom.read_model(
+    model = rom.read_model(
         source(str(args.file)),
         source(args.mass),
         nodes=args.nodes,
@@ -85,6 +85,7 @@ def read_matrices(args: argparse.Namespace) -> FEModel:
         modal=labels("--modal", args.modal) if args.modal else (),
         hold_drilling=args.hold_drilling,
     )
+    return quickly_solved(model)
 
 
 def _option(name: str) -> str:

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field, replace
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     Solid = Material | Orthotropic
 
 
+MANY_FOR_SCIPY = 20_000  # dofs, from where its factor takes longer than MUMPS to start
 COUNTS = {"modes": "n_modes", "shapes": "n_shapes", "steps": "n_steps"}  # key: their name in Python
 
 
@@ -213,7 +215,7 @@ class Component(Described):
         how = {name: m[name] for name in ("nodes", "dofs", "units", "hold_drilling") if name in m}
         how |= {"modal": [int(x) for x in m["modal"]]}
         model = read_model(K, M, D=D[0] if D else None, interfaces=sets, **how)
-        return replace(model, attachments=tuple(self._attachments()))
+        return replace(quickly_solved(model), attachments=tuple(self._attachments()))
 
 
 def source(text: str, folder: Path = Path()) -> str | tuple[str, str]:
@@ -222,6 +224,15 @@ def source(text: str, folder: Path = Path()) -> str | tuple[str, str]:
     if colon and path and not (folder / text).exists():
         return str(folder / path), name
     return str(folder / text)
+
+
+def quickly_solved(model: "FEModel") -> "FEModel":
+    """The same, large matrices by MUMPS where it is installed."""
+    if model.n_dofs < MANY_FOR_SCIPY or find_spec("dolfinx") is None:
+        return model
+    from rom.fe.elasticity import by_mumps
+
+    return by_mumps(model)
 
 
 @contextmanager

@@ -13,7 +13,7 @@ from dolfinx.mesh import Mesh
 
 from rom.arguments import one_of, typed, whole
 from rom.eigen.verbs import mean_motion, rigid_motions
-from rom.errors import InterfaceError, MeshError, TagError, in_file, warn
+from rom.errors import ConfigError, InterfaceError, MeshError, TagError, in_file, warn
 from rom.fe.compat import MeshTags, assemble_matrix, cell_name, geometry_degree, lagrange, versions
 from rom.fe.costs import LEAST_SHARED_DOFS, reduction_seconds
 from rom.fe.forms.material import by_region, coefficients, described, doubts
@@ -29,8 +29,9 @@ from rom.fe.mesh.ties import of_degree, tied
 from rom.fe.operators.aij import symmetric, without_zeros, wrapped
 from rom.fe.operators.foreseen import COUPLED_NODES, automatic, check_indices
 from rom.fe.operators.memory import give_back
-from rom.fe.operators.petsc import PETScOperators
+from rom.fe.operators.petsc import PETScOperators, WholeOperators
 from rom.fe.operators.solver import DIRECT_SOLVER, parsed
+from rom.fe.operators.workers import AllRanks
 from rom.fe.parallel import collective, install_abort_hook, on_root
 from rom.model import Attachment, FEModel, Index, Material, Orthotropic
 from rom.names import check_known, named
@@ -384,3 +385,19 @@ def _check_attachments(attached: Sequence[Attachment], names: Iterable[str]) -> 
     for item in attached:
         text = f"a mass of {item.mass:g} kg hangs on {item.interface!r}; use one of"
         check_known(item.interface, names, text, InterfaceError)
+
+
+@typed
+def by_mumps(model: FEModel) -> FEModel:
+    """A model of matrices, as `rom.read_model` gives, solved by MUMPS in place of SciPy.
+
+    With 100 000 dofs that is about ten times as fast. Under mpirun each rank solves all of it.
+
+    Raises:
+        ConfigError: for a model of finite elements, which MUMPS solves already.
+        QualityGateError: naming a dof without mass and stiffness.
+    """
+    if model.operators is not None:
+        raise ConfigError("the model consists of finite elements, which MUMPS solves already.")
+    ops = AllRanks(1, WholeOperators).operators(model.K, model.M, model.rigid_motions())
+    return replace(model, operators=ops)
