@@ -136,6 +136,7 @@ CASES: dict[str, Callable[[], object]] = {
     "bdf of order 4": lambda: _move(pendulum(), method="bdf", order=4, t_end=6e-4),
     "stabilised": lambda: _move(pendulum(), stabilised=True),
     "dop853": lambda: _move(pendulum(), method="dop853"),
+    "steps": lambda: rom.Stepper(pendulum(), dt=1e-4).step(),
     "elements": _elements,
     "formulas": _formulas,
     "chain": _chain,
