@@ -184,8 +184,8 @@ class FEModel:
     nodes come next, and last coordinates without a place, as those of modes in superelements.
 
     Attributes:
-        K: (n, n) stiffness [N/m], symmetric, with the six rigid motions in its null space;
-            SciPy sparse, or a PETSc matrix distributed over the ranks.
+        K: (n, n) stiffness [N/m], symmetric, with the six rigid motions in its null space, with
+            that of ``springs``; SciPy sparse, or a PETSc matrix distributed over the ranks.
         M: (n, n) mass [kg], symmetric, positive definite but for rotations without inertia; of
             the mesh alone when ``attachments`` are given.
         points: (k, 3) reference coordinates in the body frame [m], the same on all ranks.
@@ -202,6 +202,7 @@ class FEModel:
         rotations: which dofs turn nodes; None for solids.
         n_scalars: number of coordinates without a place.
         D: (n, n) damping [N s/m] of the deformation, which bodies get; None for none.
+        springs: names of those of a deck that the stiffness has beside that of elements.
     """
 
     K: Any
@@ -218,6 +219,7 @@ class FEModel:
     n_scalars: int = 0
     D: Any = None
     kinds: Mapping[str, str] = field(default_factory=dict)
+    springs: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         return (

@@ -44,7 +44,8 @@ class UnitLoads:
     connection: Connection  # the model in interface coordinates
 
     def __post_init__(self) -> None:
-        with_elements(self.model, "geometric stiffness", ", or reduce with stiffening=False")
+        otherwise = ", or reduce with stiffening=False"
+        with_elements(self.model, "geometric stiffness", otherwise, alone=True)
 
     def geometric_stiffness(self, E: Array, markers: dict[str, Marker]) -> dict[str, Array]:
         """{load: (r, r)} of the shapes E (n_local, r) in their mean-axis frame."""

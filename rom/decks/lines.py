@@ -18,8 +18,8 @@ CURES = {  # words of cards that are not read -> what to do instead
     "and interfaces={...} makes rigid (rbe2) and distributing (rbe3) ones.",
     r"CONM|MASS|NSM|INERTIA|ET, 21\b": "Masses: point masses are read from .bdf and .inp; take "
     "others out, and rom.Attachment adds them to the model.",
-    r"CBUSH|CELAS|CDAMP|SPRING|DASHPOT|COMBIN|ET, (14|39|40)\b": "Springs stand between "
-    "bodies, in the mechanism.",
+    r"BUSH|ELAS|CDAMP|SPRING|DASHPOT|COMBIN|ET, (14|39|40)\b": "Springs: linear ones between nodes "
+    "are read from .bdf and .inp; others, and those to ground, stand in the mechanism.",
     r"PSHELL|PCOMP|SHELL SECTION": "Shells without this card only name faces of the solid.",
     r"COPY|GEN|FILL|INSTANCE|PART|SYSTEM": "Write all nodes and elements out, in one system.",
 }

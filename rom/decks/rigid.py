@@ -1,11 +1,12 @@
-"""Point masses and rigid elements of decks, and what they make of a solid.
+"""Point masses, springs and rigid elements of decks, and what they make of a solid.
 
 Both dialects come to the same records. What hangs on a reference node becomes a rigid body that an
 interface carries; the interface is made of the nodes of the solid that a rigid element ties.
+Springs act between two such interfaces, or nodes of the solid.
 """
 
 from collections.abc import Callable, Iterable, Set
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,8 @@ from rom.model import Array
 
 DISPLACED, ALL = set("123"), set("123456")
 RIGID_KIND, AVERAGE_KIND, LOOSE_KIND = "rbe2", "rbe3", ""
+ASKEW_RTOL = 1e-6  # sine of the angle between two directions that are meant to be one
+APART_RTOL = 1e-9  # of their coordinates, up to which two nodes lie in one place
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +59,29 @@ class Average(Element):
     of_area: bool = False  # each node with its area of the surface of this name
 
 
+@dataclass(frozen=True, eq=False)
+class Spring(Element):
+    """Stiffness of the motion of another node against it, in a place between the two."""
+
+    other: int
+    stiffness: Array  # (6,) along axes and about them
+    axes: Array | None = None  # (3, 3) columns, basic axes; the first along its line for None
+    share: float = 0.5  # of the way from node to node, where it is
+    armed: bool = True  # whether its nodes reach there by rigid arms; else both displace alone
+
+    @classmethod
+    def scalar(cls, named: tuple[str, Place], k: float, *ends: tuple[int, int, Array]) -> "Spring":
+        """One between equal components of two nodes: number, 1 to 6 and direction (3,) of each."""
+        (a, i, d), (b, j, e) = ends
+        stiffness, nodes = k * np.eye(6)[3 * (i > 3)], (a * (i > 0), b * (j > 0))
+        one = cls(*named, *nodes, stiffness, _along(d), armed=False)
+        unlike = max(i, j) > 6 or (i > 3) != (j > 3) or np.abs(d - e).max() > ASKEW_RTOL
+        if all(nodes) and unlike:
+            text = f"it ties the components {i} and {j} of its nodes, which are not one direction"
+            raise one.wrong(f"{text}, so it would hold the body against moving")
+        return one
+
+
 @dataclass(frozen=True)
 class Hung:
     """What the elements of a deck make of the nodes of its solid, in what fits into JSON."""
@@ -63,6 +89,7 @@ class Hung:
     # {interface: kind, points (k, 3), weights (k,), origin (3,)}
     ties: dict[str, dict[str, Any]] = field(default_factory=dict)
     carried: list[dict[str, Any]] = field(default_factory=list)  # as `rom.Attachment`
+    springs: list[dict[str, Any]] = field(default_factory=list)  # name, ends, at, stiffness (6, 6)
     nodes: set[int] = field(default_factory=set)  # that are of use without an element
 
 
@@ -74,7 +101,7 @@ def hung(elements: Iterable[Element], solid: Set[int], x: Callable[[int], Array]
 
     Raises:
         FileFormatError: naming the element: nodes that depend twice, circles, hinges, masses that
-            hang on nothing, negative ones, inertia without mass.
+            hang on nothing, negative ones, inertia without mass, springs that resist rigid motion.
     """
     elements = list(elements)
     found, turning = Hung(), dict[int, str]()  # node that turns -> its interface
@@ -109,6 +136,8 @@ def hung(elements: Iterable[Element], solid: Set[int], x: Callable[[int], Array]
             _check_plain(some, node, solid)
             _add(found, some[0], LOOSE_KIND, {node: 1.0}, node, x)
         found.carried.append({"interface": turning.get(node, some[0].name)} | body)
+    for spring in (e for e in elements if isinstance(e, Spring)):
+        _sprung(found, spring, solid, turning, x)
     return found
 
 
@@ -182,3 +211,44 @@ def _check_plain(masses: list[PointMass], node: int, solid: Set[int]) -> None:
                 f"node {node} of the solid does not turn, so it carries no inertia and no offset",
                 "Hang it on the reference node of a rigid element.",
             )
+
+
+def _along(d: Array) -> Array:
+    """(3, 3) orthonormal columns, the first along d (3,)."""
+    return np.linalg.svd(d[None])[2].T
+
+
+def _sprung(
+    found: Hung, one: Spring, solid: Set[int], turning: dict[int, str], x: Callable[[int], Array]
+) -> None:
+    """Put a spring between two interfaces, or refuse what would resist rigid motion."""
+    if not (one.node and one.other):
+        raise one.wrong("an end of it is at ground", "Springs to ground stand in the mechanism.")
+    if not one.stiffness.any() or one.stiffness.min() < 0.0:
+        raise one.wrong(f"its stiffness is {one.stiffness.min():g}, not above zero")
+    (a, b), axes, ends = (x(node) for node in (one.node, one.other)), one.axes, list[str]()
+    line = (b - a) * (np.linalg.norm(b - a) > APART_RTOL * np.abs([a, b]).max())
+    if axes is None and not line.any():
+        raise one.wrong("its nodes lie in one place, so it has no direction")
+    stiff = one.stiffness[:3] > 0.0
+    across = axes is not None and np.linalg.norm(np.cross(line, axes.T[stiff]), axis=1)
+    askew = np.max(across, initial=0.0) > ASKEW_RTOL * np.linalg.norm(line)
+    if askew and not one.armed:
+        text = "its nodes lie apart across its direction, so it would hold the body against turning"
+        raise one.wrong(text, "Use a CBUSH between reference nodes, or nodes in one place.")
+    if axes is None or (line.any() and not askew and not one.stiffness[1:].any()):
+        axes = _along(line)  # to the last digit
+    for node, arm in ((one.node, one.share), (one.other, 1.0 - one.share)):
+        if node not in turning and node not in solid:
+            raise one.wrong(f"node {node} belongs neither to the solid nor to what turns with it")
+        if node not in turning and ((askew and arm) or one.stiffness[3:].any()):
+            text = f"node {node} of the solid does not turn, and the spring would turn it"
+            raise one.wrong(text, "Hang it on the reference node of a rigid element.")
+        ends.append(turning.get(node, f"node {node}"))
+        if ends[-1] not in found.ties:
+            _add(found, replace(one, name=ends[-1]), LOOSE_KIND, {node: 1.0}, node, x)
+    found.nodes.update((one.node, one.other))
+    Q = np.kron(np.eye(2), axes)
+    at, K = a + one.share * line, Q * one.stiffness @ Q.T
+    named = {"name": one.name, "ends": ends, "at": at.tolist(), "stiffness": K.tolist()}
+    found.springs.append(named)

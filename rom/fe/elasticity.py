@@ -24,8 +24,8 @@ from rom.fe.jit import compiling
 from rom.fe.mesh.cad import Axis
 from rom.fe.mesh.curving import without_middles
 from rom.fe.mesh.quality import layer_doubt
-from rom.fe.mesh.solid import Notes, SolidMesh, Tie
-from rom.fe.mesh.ties import of_degree, tied
+from rom.fe.mesh.solid import Notes, SolidMesh, Spring, Tie
+from rom.fe.mesh.ties import of_degree, sprung, tied
 from rom.fe.operators.aij import symmetric, without_zeros, wrapped
 from rom.fe.operators.foreseen import COUPLED_NODES, automatic, check_indices
 from rom.fe.operators.memory import give_back
@@ -228,12 +228,13 @@ class _Head:
     material: Solids
     ties: dict[str, Tie]
     carried: tuple[Attachment, ...]
+    springs: tuple[Spring, ...]
 
     @classmethod
     def of(cls, mesh: SolidMesh, material: Solids) -> "_Head":
         regions = {name: tag for tag, name in mesh.region_names.items()}
         told = regions, tuple(mesh.facets), mesh.warnings or (), mesh.provenance, mesh.axes
-        return cls(*told, material, mesh.ties, mesh.carried)
+        return cls(*told, material, mesh.ties, mesh.carried, mesh.springs)
 
 
 def _model(options: _Options, part: SolidMesh | None, head: _Head) -> FEModel:
@@ -274,7 +275,7 @@ def _model(options: _Options, part: SolidMesh | None, head: _Head) -> FEModel:
     )
     for name in [key for key, tie in head.ties.items() if tie.kind]:
         mean_motion(interfaces[name])  # refuses those on a line
-    return made
+    return sprung(made, head.springs) if head.springs else made
 
 
 @typed

@@ -33,6 +33,16 @@ class Tie:
 
 
 @dataclass(frozen=True, slots=True)
+class Spring:
+    """Stiffness between two ties of a deck, in a place that moves with each of them."""
+
+    name: str
+    ends: tuple[str, str]
+    at: Array  # (3,) [m]
+    stiffness: Array  # (6, 6) of displacements and rotations there [N/m, N m/rad]
+
+
+@dataclass(frozen=True, slots=True)
 class SolidMesh:
     """A solid body cut into cells of one type."""
 
@@ -57,6 +67,7 @@ class SolidMesh:
     unread: Notes = field(default_factory=dict)
     ties: dict[str, Tie] = field(default_factory=dict)  # of a deck, by name
     carried: tuple[Attachment, ...] = ()  # masses of a deck, on surfaces and ties
+    springs: tuple[Spring, ...] = ()  # of a deck, between ties
     faces: tuple[Face, ...] = ()  # all faces of the CAD, where they were asked for
 
     @property

@@ -49,6 +49,7 @@ def summary(mesh: SolidMesh) -> Notes:
         },
         "ties": {name: len(tie.points) for name, tie in mesh.ties.items() if tie.kind},
         "masses": [{"interface": body.interface, "mass": body.mass} for body in mesh.carried],
+        "springs": [spring.name for spring in mesh.springs],
         "quality": {
             "smallest scaled Jacobian": float(scaled_jacobian(mesh).min()),
             "largest aspect ratio": float(aspect_ratio(mesh).max()),
