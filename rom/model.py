@@ -10,11 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from rom.arguments import Number, Point, matrix, typed
-from rom.errors import InterfaceError, warn
+from rom.errors import InterfaceError, ModelError, warn
 from rom.material import PAIRS as PAIRS
 from rom.material import Material as Material
 from rom.material import Orthotropic as Orthotropic
-from rom.names import check_text
+from rom.names import check_text, named
 from rom.notebook import html_table, listed
 
 Array = npt.NDArray[np.float64]
@@ -244,6 +244,11 @@ class FEModel:
     def interface_names(self) -> tuple[str, ...]:
         """Names of the interfaces."""
         return tuple(self.interfaces)
+
+    def refuse_springs(self, why: str) -> None:
+        """Raise where springs, which know small motions alone, would be lost."""
+        if self.springs:
+            raise ModelError(f"the model has springs of a deck, {named(self.springs)}: {why}.")
 
     def rigid_motions(self, about: Point = (0.0, 0.0, 0.0)) -> Array:
         """(n, 6) rigid motions of all its dofs, rotations about a point (3,) [1, m]."""

@@ -44,11 +44,11 @@ class UnitLoads:
     connection: Connection  # the model in interface coordinates
 
     def __post_init__(self) -> None:
-        otherwise = ", or reduce with stiffening=False"
-        with_elements(self.model, "geometric stiffness", otherwise, alone=True)
+        with_elements(self.model, "geometric stiffness", ", or reduce with stiffening=False")
 
     def geometric_stiffness(self, E: Array, markers: dict[str, Marker]) -> dict[str, Array]:
         """{load: (r, r)} of the shapes E (n_local, r) in their mean-axis frame."""
+        self.model.refuse_springs("stiffening knows elements alone; reduce with stiffening=False")
         carried = [carried_displacements(a, self.model) for a in self.model.attachments]
         of_interfaces = (load for m in markers for load in interface_loads(m))
         names = [*CENTRIFUGAL_LOADS, *of_interfaces, *elastic_loads(E.shape[1])]

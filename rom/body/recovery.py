@@ -10,7 +10,6 @@ from rom.eigen.connection import Connection
 from rom.eigen.verbs import Operators, own_points
 from rom.errors import ConfigError
 from rom.model import Array, Basis, FEModel, SurfaceMesh
-from rom.names import named
 
 PRODUCTS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))  # of two angular velocities
 AXIS_NAMES = "xyz"
@@ -106,18 +105,11 @@ def one_stress(parts: list[Any]) -> StressRecovery | None:
     )
 
 
-def with_elements(
-    model: FEModel, what: str, otherwise: str = "", *, alone: bool = False
-) -> SurfaceMesh:
+def with_elements(model: FEModel, what: str, otherwise: str = "") -> SurfaceMesh:
     """The surface of a model of finite elements, from which alone something follows."""
     if model.stresses is None or model.surface is None:
         text = f"the model has no finite elements, from which alone {what} follows"
         raise ConfigError(f"{text}; make it with rom.fe.model{otherwise}.")
-    if alone and model.springs:
-        text = (
-            f"the model has springs of a deck, {named(model.springs)}, of which no {what} is known"
-        )
-        raise ConfigError(f"{text}; take them out{otherwise}.")
     return model.surface
 
 

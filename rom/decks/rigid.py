@@ -13,11 +13,11 @@ import numpy as np
 
 from rom.decks.lines import Place, at
 from rom.errors import FileFormatError
-from rom.model import Array
+from rom.model import Array, rigid_motions
 
 DISPLACED, ALL = set("123"), set("123456")
 RIGID_KIND, AVERAGE_KIND, LOOSE_KIND = "rbe2", "rbe3", ""
-ASKEW_RTOL = 1e-6  # sine of the angle between two directions that are meant to be one
+ASKEW_RTOL = 1e-6  # angle between two directions that are meant to be one
 APART_RTOL = 1e-9  # of their coordinates, up to which two nodes lie in one place
 
 
@@ -61,24 +61,23 @@ class Average(Element):
 
 @dataclass(frozen=True, eq=False)
 class Spring(Element):
-    """Stiffness of the motion of another node against it, in a place between the two."""
+    """Stiffness (m,) between the motions of two nodes.
+
+    It is stretched by (m, 12) times displacements and rotations, basic axes, of one and the other.
+    """
 
     other: int
-    stiffness: Array  # (6,) along axes and about them
-    axes: Array | None = None  # (3, 3) columns, basic axes; the first along its line for None
-    share: float = 0.5  # of the way from node to node, where it is
-    armed: bool = True  # whether its nodes reach there by rigid arms; else both displace alone
+    stiffness: Array
+    stretch: Array
 
     @classmethod
     def scalar(cls, named: tuple[str, Place], k: float, *ends: tuple[int, int, Array]) -> "Spring":
-        """One between equal components of two nodes: number, 1 to 6 and direction (3,) of each."""
-        (a, i, d), (b, j, e) = ends
-        stiffness, nodes = k * np.eye(6)[3 * (i > 3)], (a * (i > 0), b * (j > 0))
-        one = cls(*named, *nodes, stiffness, _along(d), armed=False)
-        unlike = max(i, j) > 6 or (i > 3) != (j > 3) or np.abs(d - e).max() > ASKEW_RTOL
-        if all(nodes) and unlike:
-            text = f"it ties the components {i} and {j} of its nodes, which are not one direction"
-            raise one.wrong(f"{text}, so it would hold the body against moving")
+        """One between components of two nodes: number, 1 to 6 and direction (3,) of each."""
+        rows = [np.kron([i <= 3, i > 3], d) for _, i, d in ends]
+        a, b = (node * (component > 0) for node, component, _ in ends)
+        one = cls(*named, a, b, np.array([k]), np.hstack([-rows[0], rows[1]])[None])
+        if (most := max(component for _, component, _ in ends)) > 6:
+            raise one.wrong(f"there is no component {most}")
         return one
 
 
@@ -89,7 +88,8 @@ class Hung:
     # {interface: kind, points (k, 3), weights (k,), origin (3,)}
     ties: dict[str, dict[str, Any]] = field(default_factory=dict)
     carried: list[dict[str, Any]] = field(default_factory=list)  # as `rom.Attachment`
-    springs: list[dict[str, Any]] = field(default_factory=list)  # name, ends, at, stiffness (6, 6)
+    # name, ends, stiffness (12, 12) of the motions at their origins
+    springs: list[dict[str, Any]] = field(default_factory=list)
     nodes: set[int] = field(default_factory=set)  # that are of use without an element
 
 
@@ -213,42 +213,37 @@ def _check_plain(masses: list[PointMass], node: int, solid: Set[int]) -> None:
             )
 
 
-def _along(d: Array) -> Array:
-    """(3, 3) orthonormal columns, the first along d (3,)."""
-    return np.linalg.svd(d[None])[2].T
+def arm(x: Array) -> Array:
+    """(6, 6) displacement and rotation at x (3,) of a rigid piece by those at zero."""
+    return np.vstack([rigid_motions(x[None]), np.eye(6)[3:]])
 
 
 def _sprung(
     found: Hung, one: Spring, solid: Set[int], turning: dict[int, str], x: Callable[[int], Array]
 ) -> None:
     """Put a spring between two interfaces, or refuse what would resist rigid motion."""
-    if not (one.node and one.other):
+    nodes, k = (one.node, one.other), one.stiffness
+    if not all(nodes):
         raise one.wrong("an end of it is at ground", "Springs to ground stand in the mechanism.")
-    if not one.stiffness.any() or one.stiffness.min() < 0.0:
-        raise one.wrong(f"its stiffness is {one.stiffness.min():g}, not above zero")
-    (a, b), axes, ends = (x(node) for node in (one.node, one.other)), one.axes, list[str]()
+    if k.min() < 0.0 or not (k @ one.stretch).any():
+        raise one.wrong(f"its stiffness is {k.min():g}, not above zero, or without direction")
+    if loose := set(nodes) - turning.keys() - solid:
+        raise one.wrong(f"node {min(loose)} belongs neither to the solid nor to what turns with it")
+    a, b = map(x, nodes)
     line = (b - a) * (np.linalg.norm(b - a) > APART_RTOL * np.abs([a, b]).max())
-    if axes is None and not line.any():
-        raise one.wrong("its nodes lie in one place, so it has no direction")
-    stiff = one.stiffness[:3] > 0.0
-    across = axes is not None and np.linalg.norm(np.cross(line, axes.T[stiff]), axis=1)
-    askew = np.max(across, initial=0.0) > ASKEW_RTOL * np.linalg.norm(line)
-    if askew and not one.armed:
-        text = "its nodes lie apart across its direction, so it would hold the body against turning"
-        raise one.wrong(text, "Use a CBUSH between reference nodes, or nodes in one place.")
-    if axes is None or (line.any() and not askew and not one.stiffness[1:].any()):
-        axes = _along(line)  # to the last digit
-    for node, arm in ((one.node, one.share), (one.other, 1.0 - one.share)):
-        if node not in turning and node not in solid:
-            raise one.wrong(f"node {node} belongs neither to the solid nor to what turns with it")
-        if node not in turning and ((askew and arm) or one.stiffness[3:].any()):
-            text = f"node {node} of the solid does not turn, and the spring would turn it"
-            raise one.wrong(text, "Hang it on the reference node of a rigid element.")
-        ends.append(turning.get(node, f"node {node}"))
-        if ends[-1] not in found.ties:
-            _add(found, replace(one, name=ends[-1]), LOOSE_KIND, {node: 1.0}, node, x)
-    found.nodes.update((one.node, one.other))
-    Q = np.kron(np.eye(2), axes)
-    at, K = a + one.share * line, Q * one.stiffness @ Q.T
-    named = {"name": one.name, "ends": ends, "at": at.tolist(), "stiffness": K.tolist()}
-    found.springs.append(named)
+    unit = np.repeat([1.0, np.linalg.norm(line) or 1.0], 3)  # of rotations, as displacements
+    felt = np.array([turns for n in nodes for turns in (True, n in turning)]).repeat(3)
+    rigid = (np.vstack([np.eye(6), arm(line)]) * np.tile(unit, 2)[:, None] / unit)[felt]
+    given, W = one.stretch[k > 0.0] / np.tile(unit, 2), np.zeros((np.count_nonzero(k), 12))
+    W[:, felt] = given[:, felt] @ (np.eye(len(rigid)) - rigid @ np.linalg.pinv(rigid, 1e-9))
+    if (np.abs(W - given) > ASKEW_RTOL * np.abs(given).max(axis=1, keepdims=True)).any():
+        text = "it would hold the body against rigid motion, or turn a node of the solid"
+        raise one.wrong(text, "Use a CBUSH between reference nodes of rigid elements.")
+    ends, W = [turning.get(n, f"node {n}") for n in nodes], W * np.tile(unit, 2)
+    for end, node, own in zip(ends, nodes, (W[:, :6], W[:, 6:]), strict=True):
+        if end not in found.ties:
+            _add(found, replace(one, name=end), LOOSE_KIND, {node: 1.0}, node, x)
+        own[:] = own @ arm(x(node) - found.ties[end]["origin"])
+    found.nodes.update(nodes)
+    K = (W.T * k[k > 0.0] @ W).tolist()
+    found.springs.append({"name": one.name, "ends": ends, "stiffness": K})

@@ -152,7 +152,8 @@ def _refuse(bent: Bent) -> None:
     """Say what does not go together with large deflection."""
     geometric, model, connection = bent.geometric, bent.model, bent.connection
     basis, reference = bent.basis, bent.reference
-    with_elements(model, "large strain", alone=True)
+    with_elements(model, "large strain")
+    model.refuse_springs("large deflection knows elements alone")
     modes_held = basis.held is not None
     if modes_held and basis.omega.size:
         K = quadratic(connection.ops, connection.ops.apply_K, _normal(basis))

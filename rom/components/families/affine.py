@@ -26,7 +26,7 @@ from rom.eigen.attachments import added_mass
 from rom.eigen.verbs import Operators, orthonormal_in, own_points, rigid_motions
 from rom.errors import ModelError, ParameterError
 from rom.model import Array, FEModel, Interface, Layered
-from rom.names import check_known, named
+from rom.names import check_known
 from rom.reduction.full_model import mesh_operators
 from rom.reduction.interfaces.characteristic import GivenFunctions
 
@@ -46,10 +46,8 @@ class AffineModel:
         self.model, self.parameters = model, parameters
         self.ops = mesh_operators(model)
         self.added = added_mass(model, self.ops.first, self.ops.n_local)
-        scaled = [p for p in parameters.values() if not (p.region or isinstance(p, Density))]
-        if model.springs and scaled:
-            text = f"the model has springs of a deck, {named(model.springs)}, with which"
-            raise ParameterError(f"{text} {scaled[0]} has nothing to do; name a region.")
+        for whole in (p for p in parameters.values() if not (p.region or isinstance(p, Density))):
+            model.refuse_springs(f"the factor of {whole} is of elements alone; name a region")
         names = dict.fromkeys(p.region for p in parameters.values() if p.region is not None)
         for name in names:
             text = f"there is no region {name!r}, a named physical volume; the model has"
@@ -132,9 +130,9 @@ class StretchedModel(AffineModel):
 
     def __init__(self, model: FEModel, parameters: dict[str, Parameter]):
         super().__init__(model, parameters)
-        if model.attachments or model.springs:
-            text = "a model with a parameter of thickness takes no attached masses and no springs."
-            raise ParameterError(text)
+        if model.attachments:
+            raise ParameterError("a model with a parameter of thickness takes no attached masses.")
+        model.refuse_springs("a parameter of thickness moves elements alone")
         thin = [p for p in parameters.values() if isinstance(p, Thickness)]
         axis = "xyz".index(thin[0].axis)
         self.regions = dict(model.regions)

@@ -29,7 +29,7 @@ from rom.eigen.verbs import rigid_motions
 from rom.eigen.workers import ONE_PROCESS, Workers
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, FEModel, Index, Interface
-from rom.names import check_known, named
+from rom.names import check_known
 
 Complex = npt.NDArray[np.complex128]
 Matrix = Any  # sparse, dense or of another library: SciPy has no types
@@ -305,13 +305,12 @@ def stresses_of(model: FEModel, blade: str | None = None) -> Any:
     """Stress that the finite elements of a model, or of its blade, carry.
 
     Raises:
-        ConfigError: if there are none, or springs beside them.
+        ConfigError: if there are none.
     """
     found = (model if blade is None else model.regions[blade]).stresses
     if found is None:
         raise ConfigError("the model of the blade has no finite elements; see rom.fe.model.")
-    if model.springs:
-        raise ConfigError(f"of springs, {named(model.springs)}, no rotation or heat is known.")
+    model.refuse_springs("stress of rotation and heat knows elements alone")
     return found
 
 

@@ -280,7 +280,7 @@ def _solid(
         unread=notes.get("unread", {}),
         ties={name: _tie(tie, scale) for name, tie in notes.get("ties", {}).items()},
         carried=tuple(_carried(body, scale, unit) for body in notes.get("carried", ())),
-        springs=tuple(_spring(spring, scale, unit) for spring in notes.get("springs", ())),
+        springs=tuple(_spring(spring, unit) for spring in notes.get("springs", ())),
         faces=tuple(scaled(from_plain(Face, face), scale) for face in notes.get("faces", ())),
     )
 
@@ -297,11 +297,10 @@ def _carried(values: Notes, scale: float, unit: UnitSystem) -> Attachment:
     return Attachment(values["interface"], values["mass"] * unit.mass, inertia, at)
 
 
-def _spring(values: Notes, scale: float, unit: UnitSystem) -> Spring:
-    turns = np.repeat([1.0, unit.length], 3)
+def _spring(values: Notes, unit: UnitSystem) -> Spring:
+    turns = np.tile([1.0, unit.length], 2).repeat(3)
     stiffness = np.array(values["stiffness"]) * np.outer(turns, turns) * unit.force / unit.length
-    one, other = values["ends"]
-    return Spring(values["name"], (one, other), np.array(values["at"]) * scale, stiffness)
+    return Spring(values["name"], tuple(values["ends"]), stiffness)
 
 
 def _tables(arrays: Arrays, kind: str, names: Sequence[str]) -> dict[str, Index]:

@@ -34,12 +34,11 @@ class Tie:
 
 @dataclass(frozen=True, slots=True)
 class Spring:
-    """Stiffness between two ties of a deck, in a place that moves with each of them."""
+    """Stiffness between two ties of a deck."""
 
     name: str
     ends: tuple[str, str]
-    at: Array  # (3,) [m]
-    stiffness: Array  # (6, 6) of displacements and rotations there [N/m, N m/rad]
+    stiffness: Array  # (12, 12) of both, displacements and rotations at their origins
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,10 +4,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.linalg import block_diag
 from scipy.sparse import csr_matrix, diags
 from scipy.spatial import cKDTree
 
-from rom.eigen.verbs import coupled, mean_motion, rigid_motions
+from rom.eigen.verbs import coupled, mean_motion
 from rom.errors import MeshError
 from rom.fe.forms.nodes import by_position
 from rom.fe.mesh.cell_types import CELL_TYPES, READ_TYPES
@@ -90,18 +91,10 @@ def sprung(model: FEModel, springs: Sequence[Spring]) -> FEModel:
     dK = csr_matrix((ops.n_local, ops.n))
     for one in springs:
         ends = [model.interfaces[name] for name in one.ends]
-        B = np.hstack([sign * _moved(end, one.at) for sign, end in zip((-1, 1), ends, strict=True)])
+        B = block_diag(*(mean_motion(e) if e.nodes.size > 1 else np.eye(6, 3) for e in ends))
         block, dofs = B.T @ one.stiffness @ B, np.concatenate([end.dofs for end in ends])
         dK = dK + coupled(dK.shape, ops.first, dofs, 0.5 * (block + block.T))
     alone = hasattr(model.K, "tocsr")
     K = csr_matrix(model.K + dK) if alone else ops.plus(ops.K, dK)
     ops = ops.like(wrapped(K) if alone else K, ops.M, ops.rigid)
     return replace(model, K=K, operators=ops, springs=tuple(one.name for one in springs))
-
-
-def _moved(interface: Interface, at: Array) -> Array:
-    """(6, 3 k) how a place (3,) moves with an interface; with one node it only displaces."""
-    if interface.nodes.size == 1:
-        return np.eye(6, 3)
-    arm = np.vstack([rigid_motions(at[None] - interface.origin), np.eye(6)[3:]])
-    return arm @ mean_motion(interface)

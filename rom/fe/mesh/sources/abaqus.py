@@ -312,7 +312,7 @@ def _points(deck: Deck) -> Iterator[PointMass | Spring]:
                 raise block.wrong(f"element {label} is not of its type, or has one already")
             m, J = block.reals(0, 0)[0] if kind == "MASS" else 0.0, np.zeros((3, 3))
             if kind in SPRINGS:
-                yield _spring(block, kind, label, nodes)
+                yield _spring(deck, block, kind, label, nodes)
                 continue
             if kind != "MASS":
                 xx, yy, zz, xy, xz, yz = block.reals(0, *range(6))
@@ -323,7 +323,7 @@ def _points(deck: Deck) -> Iterator[PointMass | Spring]:
         raise FileFormatError(text, where=str(deck.deck))
 
 
-def _spring(block: Block, kind: str, label: int, nodes: list[int]) -> Spring:
+def _spring(deck: Deck, block: Block, kind: str, label: int, nodes: list[int]) -> Spring:
     """One along its line, or between a component of each node, which stands in the first row."""
     rows = [r for r, row in enumerate(block.rows) if any(row)]
     named = f"{kind} {label}", block.place
@@ -331,7 +331,10 @@ def _spring(block: Block, kind: str, label: int, nodes: list[int]) -> Spring:
         raise block.wrong(f"element {label}: it has {len(rows)} rows, not those of one stiffness")
     k = block.reals(rows[-1], 0)[0]
     if kind == "SPRINGA":
-        return Spring(*named, *nodes, k * np.eye(6)[0])
+        a, b = (deck.nodes.get(node, np.zeros(3)) for node in nodes)
+        return Spring.scalar(
+            named, k, *((n, 1, (b - a) / (np.linalg.norm(b - a) or 1)) for n in nodes)
+        )
     ends = ((node, block.whole(rows[0], n)) for n, node in enumerate(nodes))
     return Spring.scalar(named, k, *((node, c, np.eye(3)[(c - 1) % 3]) for node, c in ends))
 

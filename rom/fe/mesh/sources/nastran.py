@@ -20,7 +20,7 @@ import numpy as np
 
 from rom.decks.bulk import POINTS, Card, cards, grids
 from rom.decks.lines import Unread, at
-from rom.decks.rigid import ALL, DISPLACED, Average, Element, PointMass, Rigid, Spring
+from rom.decks.rigid import ALL, DISPLACED, Average, Element, PointMass, Rigid, Spring, arm
 from rom.decks.systems import System, system
 from rom.fe.mesh.cell_types import LOWER_EDGES, UPPER_EDGES, UPRIGHT_EDGES
 from rom.fe.mesh.solid import Read, packed
@@ -203,24 +203,26 @@ def _springs(found: Cards, place: At, moves: At, systems: Systems) -> Iterator[S
 
 def _bush(card: Card, own: Card, place: At, moves: At, systems: Systems) -> Spring:
     """CBUSH, whose axes are those of a system, or those of its line and a vector beside it."""
-    first = own.fields.index("K") + 1 if "K" in own.fields else len(own.fields)
-    share = card.reals(8)[0] if card.text(8) else 0.5
     a, b = _ends(card, place, 2, 3)
-    one = Spring(*_named(card), a, b, np.array(own.reals(*range(first, first + 6))), share=share)
+    first = own.fields.index("K") + 1 if "K" in own.fields else len(own.fields)
+    one = Spring(*_named(card), a, b, np.array(own.reals(*range(first, first + 6))), np.eye(6, 12))
     if not a * b:
         return one
+    line, beside = place[b] - place[a], [n for n in (4, 5, 6) if card.text(n)]
     if card.text(7):
-        return replace(one, axes=systems(card.whole(7), card).axes_at(place[a][None])[0])
-    if np.linalg.norm(place[b] - place[a]) < NO_LINE:
+        axes = systems(card.whole(7), card).axes_at(place[a][None])[0]
+    elif np.linalg.norm(line) < NO_LINE:
         raise one.wrong("its nodes lie in one place, so it needs a CID")
-    if any(card.text(n) for n in (4, 5, 6)):
+    elif beside or not one.stiffness[[1, 2, 4, 5]].any():
         (third,) = _ends(card, place, 4) if is_whole(card.text(4)) else (0,)  # or a vector
         v = place[third] - place[a] if third else moves[a] @ card.reals(4, 5, 6)
-        corners = np.array([place[a], place[b], place[a] + v])
-        return replace(one, axes=system(0, corners, "R", at(card.place)).axes)
-    if one.stiffness[[1, 2, 4, 5]].any():
+        v = v if beside else np.eye(3)[np.abs(line).argmin()]
+        axes = system(0, np.array([np.zeros(3), line, v]), "R", at(card.place)).axes
+    else:
         raise one.wrong("it has more than K1 and K4, so it needs a CID, GO or a vector")
-    return one
+    share = card.reals(8)[0] if card.text(8) else 0.5
+    ends = np.hstack([-arm(share * line), arm((share - 1.0) * line)])
+    return replace(one, stretch=np.kron(np.eye(2), axes.T) @ ends)
 
 
 def _ends(card: Card, place: At, *fields: int) -> list[int]:
