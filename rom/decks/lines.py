@@ -15,7 +15,8 @@ Place = tuple[Path, int]  # file and line
 CURES = {  # words of cards that are not read -> what to do instead
     r"\bR(BE|BAR|ROD)|MPC|COUPLING|EQUATION|TIE|RIGID|\bC[EP]|ET, (17\d|184)\b": "Ties: "
     "rigid and averaging elements of all directions are read from .bdf and .inp; take others out, "
-    "and interfaces={...} makes rigid (rbe2) and distributing (rbe3) ones.",
+    "and interfaces={...} makes rigid (rbe2) and distributing (rbe3) ones; a stiff spring ties one "
+    "component.",
     r"CONM|MASS|NSM|INERTIA|ET, 21\b": "Masses: point masses are read from .bdf and .inp; take "
     "others out, and rom.Attachment adds them to the model.",
     r"BUSH|ELAS|CDAMP|SPRING|DASHPOT|COMBIN|ET, (14|39|40)\b": "Springs: linear ones between nodes "

@@ -73,12 +73,9 @@ class Spring(Element):
     @classmethod
     def scalar(cls, named: tuple[str, Place], k: float, *ends: tuple[int, int, Array]) -> "Spring":
         """One between components of two nodes: number, 1 to 6 and direction (3,) of each."""
-        rows = [np.kron([i <= 3, i > 3], d) for _, i, d in ends]
+        rows = [np.kron([i <= 3, 3 < i <= 6], d) for _, i, d in ends]
         a, b = (node * (component > 0) for node, component, _ in ends)
-        one = cls(*named, a, b, np.array([k]), np.hstack([-rows[0], rows[1]])[None])
-        if (most := max(component for _, component, _ in ends)) > 6:
-            raise one.wrong(f"there is no component {most}")
-        return one
+        return cls(*named, a, b, np.array([k]), np.hstack([-rows[0], rows[1]])[None])
 
 
 @dataclass(frozen=True)
@@ -147,10 +144,8 @@ def _pieces(rigid: list[Rigid]) -> dict[int, list[Rigid]]:
     for one in rigid:
         for node in one.nodes:
             if (other := leaders.setdefault(node, one)) is not one:
-                raise one.wrong(
-                    f"node {node} depends on {other.name} as well",
-                    "Tie a node once; elements with one reference node are one rigid piece.",
-                )
+                hint = "Tie a node once; elements with one reference node are one rigid piece."
+                raise one.wrong(f"node {node} depends on {other.name} as well", hint)
     pieces: dict[int, list[Rigid]] = {}
     for one in rigid:
         top, passed = one, [one]
@@ -207,10 +202,8 @@ def _check_plain(masses: list[PointMass], node: int, solid: Set[int]) -> None:
         if node not in solid:
             raise one.wrong(f"node {node} belongs neither to the solid nor to what turns with it")
         if one.inertia.any() or one.offset.any():
-            raise one.wrong(
-                f"node {node} of the solid does not turn, so it carries no inertia and no offset",
-                "Hang it on the reference node of a rigid element.",
-            )
+            text = f"node {node} of the solid does not turn, so it carries no inertia and no offset"
+            raise one.wrong(text, "Hang it on the reference node of a rigid element.")
 
 
 def arm(x: Array) -> Array:

@@ -48,19 +48,9 @@ INCLUDES = {"abaqus": keywords.INCLUDE_PATTERN, "nastran": bulk.INCLUDE_PATTERN}
 LARGEST_FILE = 2**32  # bytes; some ten million nodes
 FACET_SHAPE = {"tetrahedron": "triangle", "hexahedron": "quadrilateral"}
 READERS = {
-    ".geo": "geo",
-    ".py": "builder",
-    ".step": "step",
-    ".stp": "step",
-    ".msh": "msh",
-    ".unv": "unv",
-    ".inp": "abaqus",
-    ".bdf": "nastran",
-    ".nas": "nastran",
-    ".dat": "nastran",
-    ".fem": "nastran",
-    ".cdb": "ansys",
-    ".med": "med",
+    **{".geo": "geo", ".py": "builder", ".step": "step", ".stp": "step", ".msh": "msh"},
+    **{".unv": "unv", ".inp": "abaqus", ".cdb": "ansys", ".med": "med"},
+    **dict.fromkeys((".bdf", ".nas", ".dat", ".fem"), "nastran"),
 }
 DECKS = ("abaqus", "nastran", "ansys")  # may say what regions are made of
 

@@ -310,10 +310,10 @@ def _points(deck: Deck) -> Iterator[PointMass | Spring]:
             kind, nodes = open_.pop(label, ("", []))
             if POINT_TYPES.get(kind) != block.keyword:
                 raise block.wrong(f"element {label} is not of its type, or has one already")
-            m, J = block.reals(0, 0)[0] if kind == "MASS" else 0.0, np.zeros((3, 3))
             if kind in SPRINGS:
                 yield _spring(deck, block, kind, label, nodes)
                 continue
+            m, J = block.reals(0, 0)[0] if kind == "MASS" else 0.0, np.zeros((3, 3))
             if kind != "MASS":
                 xx, yy, zz, xy, xz, yz = block.reals(0, *range(6))
                 J = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
@@ -326,17 +326,15 @@ def _points(deck: Deck) -> Iterator[PointMass | Spring]:
 def _spring(deck: Deck, block: Block, kind: str, label: int, nodes: list[int]) -> Spring:
     """One along its line, or between a component of each node, which stands in the first row."""
     rows = [r for r, row in enumerate(block.rows) if any(row)]
-    named = f"{kind} {label}", block.place
     if len(rows) != 1 + (kind == "SPRING2"):
         raise block.wrong(f"element {label}: it has {len(rows)} rows, not those of one stiffness")
-    k = block.reals(rows[-1], 0)[0]
-    if kind == "SPRINGA":
-        a, b = (deck.nodes.get(node, np.zeros(3)) for node in nodes)
-        return Spring.scalar(
-            named, k, *((n, 1, (b - a) / (np.linalg.norm(b - a) or 1)) for n in nodes)
-        )
-    ends = ((node, block.whole(rows[0], n)) for n, node in enumerate(nodes))
-    return Spring.scalar(named, k, *((node, c, np.eye(3)[(c - 1) % 3]) for node, c in ends))
+    a, b = (deck.nodes.get(node, np.zeros(3)) for node in nodes)
+    components, axes = [1, 1], [(b - a) / (np.linalg.norm(b - a) or 1.0)] * 2
+    if kind == "SPRING2":
+        components = [block.whole(rows[0], n) for n in (0, 1)]
+        axes = [np.eye(3)[(c - 1) % 3] for c in components]
+    ends = zip(nodes, components, axes, strict=True)
+    return Spring.scalar((f"{kind} {label}", block.place), block.reals(rows[-1], 0)[0], *ends)
 
 
 def _ties(deck: Deck) -> list[tuple[Block, Block]]:

@@ -99,11 +99,7 @@ def positions(ids: Index, wanted: Index, what: str) -> Index:
 
 
 def hung_on(
-    elements: Iterable[Element],
-    ids: Index,
-    points: Array,
-    cells: Index,
-    known: Iterable[int] = (),
+    elements: Iterable[Element], ids: Index, points: Array, cells: Index, known: Iterable[int] = ()
 ) -> tuple[Notes, list[str]]:
     """Ties, what they carry, and springs as notes; a remark on nodes of no known use."""
     solid = np.zeros(ids.size, dtype=bool)
