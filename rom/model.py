@@ -245,11 +245,6 @@ class FEModel:
         """Names of the interfaces."""
         return tuple(self.interfaces)
 
-    def refuse_springs(self, why: str) -> None:
-        """Raise where springs, which know small motions alone, would be lost."""
-        if self.springs:
-            raise ModelError(f"the model has springs of a deck, {named(self.springs)}: {why}.")
-
     def rigid_motions(self, about: Point = (0.0, 0.0, 0.0)) -> Array:
         """(n, 6) rigid motions of all its dofs, rotations about a point (3,) [1, m]."""
         return rigid_motions(self.points - np.asarray(about), self.rotations, self.n_dofs)
@@ -270,6 +265,12 @@ class FEModel:
         along_x = np.zeros((self.operators.n_local, 1))
         along_x[::3] = 1.0
         return self.operators.gram(along_x, self.operators.apply_M(along_x)).item() + carried
+
+
+def refuse_springs(model: FEModel, why: str) -> None:
+    """Raise a ModelError where springs, which know small motions alone, would be lost."""
+    if model.springs:
+        raise ModelError(f"the model has springs of a deck, {named(model.springs)}: {why}.")
 
 
 @typed

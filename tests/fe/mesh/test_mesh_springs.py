@@ -15,10 +15,11 @@ from scipy.spatial import cKDTree
 
 import rom
 from cases.command import ran
-from cases.files.cells import solid
+from cases.files.cells import SIZE, bulk, ends, keywords, long, model_of, solid
 from cases.files.damage import changed
-from cases.files.hung_decks import SIZE, bulk, ends, keywords, long, model_of
 from cases.files.schema import answer
+from cases.paths import RANKS
+from cases.ranks.environment import written_on_each
 from cases.refusals import refuses
 from rom.components.wheels.sector import stresses_of
 from rom.errors import FileFormatError, ModelError, in_file
@@ -224,6 +225,24 @@ def test_it_has_units(plain, tmp_path):
     same(found.K.toarray() - plain.K.toarray(), stiffness(found, *CARDS["S"][1:]), rtol=1e-7)
     refuses(FileFormatError, "no unit of the masses and springs", model_of, text, tmp_path,
             scale=1e-3)  # fmt: skip
+
+
+@pytest.mark.mpi
+def test_ranks_agree(tmp_path):
+    """A spring between reference nodes, whose ties lie on several ranks, and one between nodes."""
+    fine = solid("hex8", (9, 2, 2), SIZE)
+    root, tip = (ends(fine, name) for name in ("root", "tip"))
+    a, b = (f"GRID,{n},,{words(x)}" for n, x in ((990, A), (991, B)))
+    ties = [f"RBE2,{7 + k},{990 + k},123456,{long(nodes[:5])}\n,{','.join(map(str, nodes[5:]))}"
+            for k, nodes in enumerate((tip, root))]  # fmt: skip
+    springs = ["CBUSH,90,60,990,991,,,,0", PBUSH, f"CELAS2,91,1.+7,{root[0] + 9},1,{tip[0] - 9},1"]
+    path = tmp_path / "a.bdf"
+    path.write_text(bulk(a, b, *ties[:1], *springs, ties[1], mesh=fine))
+    found = written_on_each((1, 3), tmp_path, RANKS / "springs_under_mpi.py", path)
+    one, other = (found[n] for n in (1, 3))
+    assert other["ok"] and list(other["springs"]) == ["CELAS2 91", "CBUSH 90"]
+    for name in ("free", "held"):
+        assert_allclose(other[name], one[name], rtol=1e-9)
 
 
 SPRINGS = f"""*ELEMENT, TYPE=SPRINGA, ELSET=sa

@@ -10,9 +10,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial import cKDTree
 
 import rom
-from cases.files.cells import solid
+from cases.files.cells import SIZE, bulk, ends, keywords, long, model_of, solid
 from cases.files.damage import changed
-from cases.files.hung_decks import SIZE, bulk, ends, keywords, long, model_of
 from cases.files.schema import answer
 from cases.refusals import refuses
 from cases.solid import STEEL
