@@ -10,11 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from rom.arguments import Number, Point, matrix, typed
-from rom.errors import InterfaceError, warn
+from rom.errors import InterfaceError, ModelError, warn
 from rom.material import PAIRS as PAIRS
 from rom.material import Material as Material
 from rom.material import Orthotropic as Orthotropic
-from rom.names import check_text
+from rom.names import check_text, named
 from rom.notebook import html_table, listed
 
 Array = npt.NDArray[np.float64]
@@ -184,8 +184,8 @@ class FEModel:
     nodes come next, and last coordinates without a place, as those of modes in superelements.
 
     Attributes:
-        K: (n, n) stiffness [N/m], symmetric, with the six rigid motions in its null space;
-            SciPy sparse, or a PETSc matrix distributed over the ranks.
+        K: (n, n) stiffness [N/m], symmetric, with the six rigid motions in its null space, with
+            that of ``springs``; SciPy sparse, or a PETSc matrix distributed over the ranks.
         M: (n, n) mass [kg], symmetric, positive definite but for rotations without inertia; of
             the mesh alone when ``attachments`` are given.
         points: (k, 3) reference coordinates in the body frame [m], the same on all ranks.
@@ -202,6 +202,7 @@ class FEModel:
         rotations: which dofs turn nodes; None for solids.
         n_scalars: number of coordinates without a place.
         D: (n, n) damping [N s/m] of the deformation, which bodies get; None for none.
+        springs: names of those of a deck that the stiffness has beside that of elements.
     """
 
     K: Any
@@ -218,6 +219,7 @@ class FEModel:
     n_scalars: int = 0
     D: Any = None
     kinds: Mapping[str, str] = field(default_factory=dict)
+    springs: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         return (
@@ -263,6 +265,12 @@ class FEModel:
         along_x = np.zeros((self.operators.n_local, 1))
         along_x[::3] = 1.0
         return self.operators.gram(along_x, self.operators.apply_M(along_x)).item() + carried
+
+
+def refuse_springs(model: FEModel, why: str) -> None:
+    """Raise a ModelError where springs, which know small motions alone, would be lost."""
+    if model.springs:
+        raise ModelError(f"the model has springs of a deck, {named(model.springs)}: {why}.")
 
 
 @typed

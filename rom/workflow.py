@@ -35,7 +35,7 @@ def stages(draft: Draft) -> list[Stage]:
         (True, bodies.make_body),
         (draft.stress, bodies.recover),
         (draft.stiffening, bodies.stiffen),
-        (draft.model.stresses is not None and not draft.stiffening, bodies.press),
+        (draft.model.stresses and not (draft.stiffening or draft.model.springs), bodies.press),
         (True, bodies.place_frame),
         (draft.damping is not None, bodies.damp),
         (draft.certify, certify),

@@ -28,7 +28,7 @@ from rom.eigen.verbs import (
     pins,
     rigid_motions,
 )
-from rom.model import Array, FEModel, Index, Interface
+from rom.model import Array, FEModel, Index, Interface, refuse_springs
 
 Felt = Callable[[Array], Array]  # at points (p, 3), (3 p, k)
 MAX_PAIRS = 3  # of interfaces: each costs the assembly of a matrix
@@ -48,6 +48,7 @@ class UnitLoads:
 
     def geometric_stiffness(self, E: Array, markers: dict[str, Marker]) -> dict[str, Array]:
         """{load: (r, r)} of the shapes E (n_local, r) in their mean-axis frame."""
+        refuse_springs(self.model, "stiffening knows elements alone; reduce with stiffening=False")
         carried = [carried_displacements(a, self.model) for a in self.model.attachments]
         of_interfaces = (load for m in markers for load in interface_loads(m))
         names = [*CENTRIFUGAL_LOADS, *of_interfaces, *elastic_loads(E.shape[1])]

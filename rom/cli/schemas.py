@@ -140,6 +140,7 @@ VERBS: dict[str, Schema] = {
             record("a mass", interface=text("what carries it"), mass=number("[kg]")),
             "point masses of a deck",
         ),
+        springs=each(text("its name"), "springs of a deck"),
         faces=FACES,
         quality=by_name(number("figure"), "figures of quality"),
         parameters=by_name(number("as used"), "those of the geometry that are numbers, e.g. lc"),

@@ -15,11 +15,12 @@ Place = tuple[Path, int]  # file and line
 CURES = {  # words of cards that are not read -> what to do instead
     r"\bR(BE|BAR|ROD)|MPC|COUPLING|EQUATION|TIE|RIGID|\bC[EP]|ET, (17\d|184)\b": "Ties: "
     "rigid and averaging elements of all directions are read from .bdf and .inp; take others out, "
-    "and interfaces={...} makes rigid (rbe2) and distributing (rbe3) ones.",
+    "and interfaces={...} makes rigid (rbe2) and distributing (rbe3) ones; a stiff spring ties one "
+    "component.",
     r"CONM|MASS|NSM|INERTIA|ET, 21\b": "Masses: point masses are read from .bdf and .inp; take "
     "others out, and rom.Attachment adds them to the model.",
-    r"CBUSH|CELAS|CDAMP|SPRING|DASHPOT|COMBIN|ET, (14|39|40)\b": "Springs stand between "
-    "bodies, in the mechanism.",
+    r"BUSH|ELAS|CDAMP|SPRING|DASHPOT|COMBIN|ET, (14|39|40)\b": "Springs: linear ones between nodes "
+    "are read from .bdf and .inp; others, and those to ground, stand in the mechanism.",
     r"PSHELL|PCOMP|SHELL SECTION": "Shells without this card only name faces of the solid.",
     r"COPY|GEN|FILL|INSTANCE|PART|SYSTEM": "Write all nodes and elements out, in one system.",
 }

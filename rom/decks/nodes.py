@@ -131,10 +131,6 @@ def _part(deck: Nodes, block: Block) -> None:
         deck.unread.add(f"moved *{block.keyword}", block.place)
 
 
-def _node_set(deck: Nodes, block: Block) -> None:
-    deck.node_sets.add(block.option("NSET"), block.members())
-
-
 NODE_KEYWORDS: Table = {
     "PART": (_part, ("NAME",)),
     "END PART": (_part, ()),
@@ -142,5 +138,6 @@ NODE_KEYWORDS: Table = {
     "END INSTANCE": (_part, ()),
     "SYSTEM": (_system, ()),
     "NODE": (_node, ("NSET", "SYSTEM")),
-    "NSET": (_node_set, ("NSET", *SET_OPTIONS)),
-}
+    "NSET": (lambda deck, block: deck.node_sets.add(block.option("NSET"), block.members()),
+             ("NSET", *SET_OPTIONS)),
+}  # fmt: skip

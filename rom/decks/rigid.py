@@ -1,21 +1,24 @@
-"""Point masses and rigid elements of decks, and what they make of a solid.
+"""Point masses, springs and rigid elements of decks, and what they make of a solid.
 
 Both dialects come to the same records. What hangs on a reference node becomes a rigid body that an
 interface carries; the interface is made of the nodes of the solid that a rigid element ties.
+Springs act between two such interfaces, or nodes of the solid.
 """
 
 from collections.abc import Callable, Iterable, Set
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from rom.decks.lines import Place, at
 from rom.errors import FileFormatError
-from rom.model import Array
+from rom.model import Array, rigid_motions
 
 DISPLACED, ALL = set("123"), set("123456")
 RIGID_KIND, AVERAGE_KIND, LOOSE_KIND = "rbe2", "rbe3", ""
+ASKEW_RTOL = 1e-6  # angle between two directions that are meant to be one
+APART_RTOL = 1e-9  # of their coordinates, up to which two nodes lie in one place
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +59,25 @@ class Average(Element):
     of_area: bool = False  # each node with its area of the surface of this name
 
 
+@dataclass(frozen=True, eq=False)
+class Spring(Element):
+    """Stiffness (m,) between the motions of two nodes.
+
+    It is stretched by (m, 12) times displacements and rotations, basic axes, of one and the other.
+    """
+
+    other: int
+    stiffness: Array
+    stretch: Array
+
+    @classmethod
+    def scalar(cls, named: tuple[str, Place], k: float, *ends: tuple[int, int, Array]) -> "Spring":
+        """One between components of two nodes: number, 1 to 6 and direction (3,) of each."""
+        rows = [np.kron([i <= 3, 3 < i <= 6], d) for _, i, d in ends]
+        a, b = (node * (component > 0) for node, component, _ in ends)
+        return cls(*named, a, b, np.array([k]), np.hstack([-rows[0], rows[1]])[None])
+
+
 @dataclass(frozen=True)
 class Hung:
     """What the elements of a deck make of the nodes of its solid, in what fits into JSON."""
@@ -63,6 +85,8 @@ class Hung:
     # {interface: kind, points (k, 3), weights (k,), origin (3,)}
     ties: dict[str, dict[str, Any]] = field(default_factory=dict)
     carried: list[dict[str, Any]] = field(default_factory=list)  # as `rom.Attachment`
+    # name, ends, stiffness (12, 12) of the motions at their origins
+    springs: list[dict[str, Any]] = field(default_factory=list)
     nodes: set[int] = field(default_factory=set)  # that are of use without an element
 
 
@@ -74,7 +98,7 @@ def hung(elements: Iterable[Element], solid: Set[int], x: Callable[[int], Array]
 
     Raises:
         FileFormatError: naming the element: nodes that depend twice, circles, hinges, masses that
-            hang on nothing, negative ones, inertia without mass.
+            hang on nothing, negative ones, inertia without mass, springs that resist rigid motion.
     """
     elements = list(elements)
     found, turning = Hung(), dict[int, str]()  # node that turns -> its interface
@@ -109,6 +133,8 @@ def hung(elements: Iterable[Element], solid: Set[int], x: Callable[[int], Array]
             _check_plain(some, node, solid)
             _add(found, some[0], LOOSE_KIND, {node: 1.0}, node, x)
         found.carried.append({"interface": turning.get(node, some[0].name)} | body)
+    for spring in (e for e in elements if isinstance(e, Spring)):
+        _sprung(found, spring, solid, turning, x)
     return found
 
 
@@ -118,10 +144,8 @@ def _pieces(rigid: list[Rigid]) -> dict[int, list[Rigid]]:
     for one in rigid:
         for node in one.nodes:
             if (other := leaders.setdefault(node, one)) is not one:
-                raise one.wrong(
-                    f"node {node} depends on {other.name} as well",
-                    "Tie a node once; elements with one reference node are one rigid piece.",
-                )
+                hint = "Tie a node once; elements with one reference node are one rigid piece."
+                raise one.wrong(f"node {node} depends on {other.name} as well", hint)
     pieces: dict[int, list[Rigid]] = {}
     for one in rigid:
         top, passed = one, [one]
@@ -178,7 +202,41 @@ def _check_plain(masses: list[PointMass], node: int, solid: Set[int]) -> None:
         if node not in solid:
             raise one.wrong(f"node {node} belongs neither to the solid nor to what turns with it")
         if one.inertia.any() or one.offset.any():
-            raise one.wrong(
-                f"node {node} of the solid does not turn, so it carries no inertia and no offset",
-                "Hang it on the reference node of a rigid element.",
-            )
+            text = f"node {node} of the solid does not turn, so it carries no inertia and no offset"
+            raise one.wrong(text, "Hang it on the reference node of a rigid element.")
+
+
+def arm(x: Array) -> Array:
+    """(6, 6) displacement and rotation at x (3,) of a rigid piece by those at zero."""
+    return np.vstack([rigid_motions(x[None]), np.eye(6)[3:]])
+
+
+def _sprung(
+    found: Hung, one: Spring, solid: Set[int], turning: dict[int, str], x: Callable[[int], Array]
+) -> None:
+    """Put a spring between two interfaces, or refuse what would resist rigid motion."""
+    nodes, k = (one.node, one.other), one.stiffness
+    if not all(nodes):
+        raise one.wrong("an end of it is at ground", "Springs to ground stand in the mechanism.")
+    if k.min() < 0.0 or not (k @ one.stretch).any():
+        raise one.wrong(f"its stiffness is {k.min():g}, not above zero, or without direction")
+    if loose := set(nodes) - turning.keys() - solid:
+        raise one.wrong(f"node {min(loose)} belongs neither to the solid nor to what turns with it")
+    a, b = map(x, nodes)
+    line = (b - a) * (np.linalg.norm(b - a) > APART_RTOL * np.abs([a, b]).max())
+    unit = np.repeat([1.0, np.linalg.norm(line) or 1.0], 3)  # of rotations, as displacements
+    felt = np.array([turns for n in nodes for turns in (True, n in turning)]).repeat(3)
+    rigid = (np.vstack([np.eye(6), arm(line)]) * np.tile(unit, 2)[:, None] / unit)[felt]
+    given, W = one.stretch[k > 0.0] / np.tile(unit, 2), np.zeros((np.count_nonzero(k), 12))
+    W[:, felt] = given[:, felt] @ (np.eye(len(rigid)) - rigid @ np.linalg.pinv(rigid, 1e-9))
+    if (np.abs(W - given) > ASKEW_RTOL * np.abs(given).max(axis=1, keepdims=True)).any():
+        text = "it would hold the body against rigid motion, or turn a node of the solid"
+        raise one.wrong(text, "Use a CBUSH between reference nodes of rigid elements.")
+    ends, W = [turning.get(n, f"node {n}") for n in nodes], W * np.tile(unit, 2)
+    for end, node, own in zip(ends, nodes, (W[:, :6], W[:, 6:]), strict=True):
+        if end not in found.ties:
+            _add(found, replace(one, name=end), LOOSE_KIND, {node: 1.0}, node, x)
+        own[:] = own @ arm(x(node) - found.ties[end]["origin"])
+    found.nodes.update(nodes)
+    K = (W.T * k[k > 0.0] @ W).tolist()
+    found.springs.append({"name": one.name, "ends": ends, "stiffness": K})

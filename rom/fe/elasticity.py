@@ -21,11 +21,10 @@ from rom.fe.forms.nodes import all_points, interface, outer_surface
 from rom.fe.forms.region import Regions, forms
 from rom.fe.forms.stress import Stresses
 from rom.fe.jit import compiling
-from rom.fe.mesh.cad import Axis
 from rom.fe.mesh.curving import without_middles
 from rom.fe.mesh.quality import layer_doubt
-from rom.fe.mesh.solid import Notes, SolidMesh, Tie
-from rom.fe.mesh.ties import of_degree, tied
+from rom.fe.mesh.solid import SolidMesh
+from rom.fe.mesh.ties import of_degree, sprung, tied
 from rom.fe.operators.aij import symmetric, without_zeros, wrapped
 from rom.fe.operators.foreseen import COUPLED_NODES, automatic, check_indices
 from rom.fe.operators.memory import give_back
@@ -194,7 +193,7 @@ def _models(
     install_abort_hook(options.comm)  # whatever a script does next, one failing rank must end all
     parts: dict[str, SolidMesh] = {}
 
-    def head() -> dict[str, _Head]:
+    def head() -> tuple[Solids, dict[str, SolidMesh]]:
         if options.degree == 1 and mesh_options.get("order") is None and is_geometry(options.path):
             mesh_options["order"] = 1
         mesh = read_mesh(options.path, parameters=options.parameters, **mesh_options)
@@ -210,50 +209,32 @@ def _models(
         _check_attachments(options.attachments, mesh.facets.keys() | mesh.ties.keys())
         for name, part in division(mesh).items():
             parts[name] = part if part.warnings is not None else checked(part)
-        return {name: _Head.of(part, material) for name, part in parts.items()}
+        return material, {name: _without_cells(part) for name, part in parts.items()}
 
-    heads = on_root(options.comm, head)
-    return {name: _model(options, parts.pop(name, None), one) for name, one in heads.items()}
+    material, heads = on_root(options.comm, head)
+    return {key: _model(options, material, parts.pop(key, None), one) for key, one in heads.items()}
 
 
-@dataclass(frozen=True)
-class _Head:
+def _without_cells(mesh: SolidMesh) -> SolidMesh:
     """What all ranks know of a mesh that rank 0 holds."""
-
-    regions: dict[str, int]
-    facets: tuple[str, ...]
-    warnings: tuple[str, ...]
-    origin: Notes
-    axes: dict[str, Axis]
-    material: Solids
-    ties: dict[str, Tie]
-    carried: tuple[Attachment, ...]
-
-    @classmethod
-    def of(cls, mesh: SolidMesh, material: Solids) -> "_Head":
-        regions = {name: tag for tag, name in mesh.region_names.items()}
-        told = regions, tuple(mesh.facets), mesh.warnings or (), mesh.provenance, mesh.axes
-        return cls(*told, material, mesh.ties, mesh.carried)
+    tables = ("points", "cells", "regions")
+    none = {name: getattr(mesh, name)[:0].copy() for name in tables}  # a view would keep all
+    return replace(mesh, **none, facets={}, cell_ids=None, faces=())
 
 
-def _model(options: _Options, part: SolidMesh | None, head: _Head) -> FEModel:
+def _model(options: _Options, material: Solids, part: SolidMesh | None, head: SolidMesh) -> FEModel:
     """The model of one mesh, which rank 0 holds."""
     from rom.fe.mesh.read import to_dolfinx
 
-    comm, material = options.comm, head.material
+    comm, regions = options.comm, {name: tag for tag, name in head.region_names.items()}
     with compiling(comm):
         mesh, cell_tags, facet_tags = to_dolfinx(part, comm)
     if isinstance(material, Mapping):
-        material = {region: material[region] for region in head.regions}
+        material = {region: material[region] for region in regions}
     made = assemble(
-        mesh,
-        cell_tags,
-        facet_tags,
-        material=material,
-        degree=options.degree,
-        regions=head.regions,
+        mesh, cell_tags, facet_tags, material=material, degree=options.degree, regions=regions
     )
-    remarks = [*head.warnings, *made.provenance["warnings"]]
+    remarks = [*(head.warnings or ()), *made.provenance["warnings"]]
     method = parsed(options.solver)
     how, why = automatic(made.operators) if method.automatic else (method, options.solver)
     if comm.rank == 0 and how != DIRECT_SOLVER and method.automatic:
@@ -270,11 +251,11 @@ def _model(options: _Options, part: SolidMesh | None, head: _Head) -> FEModel:
         kinds={key: tie.kind for key, tie in head.ties.items() if tie.kind == "rbe2"},
         attachments=(*(x for x in options.attachments if x.interface in interfaces), *head.carried),
         operators=made.operators.solved_by(how),
-        provenance=head.origin | made.provenance | {"warnings": remarks, "solver": why},
+        provenance=head.provenance | made.provenance | {"warnings": remarks, "solver": why},
     )
     for name in [key for key, tie in head.ties.items() if tie.kind]:
         mean_motion(interfaces[name])  # refuses those on a line
-    return made
+    return sprung(made, head.springs) if head.springs else made
 
 
 @typed

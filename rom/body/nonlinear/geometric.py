@@ -46,7 +46,7 @@ from rom.eigen.verbs import (
     whole_clusters,
 )
 from rom.errors import ConfigError, InterfaceError, ModelError, ResourceError, warn
-from rom.model import Array, Basis, FEModel, Index, Interface
+from rom.model import Array, Basis, FEModel, Index, Interface, refuse_springs
 from rom.names import check_known
 
 DEPENDENT_RTOL = 1e-10  # energy of a derivative, of the largest, that the others explain
@@ -153,6 +153,7 @@ def _refuse(bent: Bent) -> None:
     geometric, model, connection = bent.geometric, bent.model, bent.connection
     basis, reference = bent.basis, bent.reference
     with_elements(model, "large strain")
+    refuse_springs(model, "large deflection knows elements alone")
     modes_held = basis.held is not None
     if modes_held and basis.omega.size:
         K = quadratic(connection.ops, connection.ops.apply_K, _normal(basis))

@@ -141,6 +141,7 @@ def _text(data: Data) -> str:
         )
     parts += [f"tie {name}: {n} nodes of the deck" for name, n in data["ties"].items()]
     parts += [f"mass of {one['mass']:.6g} kg on {one['interface']}" for one in data["masses"]]
+    parts += [f"spring {name}" for name in data["springs"]]
     if regions:
         parts += ["", table(("region", "cells", "volume [m^3]"), regions)]
     header = ("interface", "facets", "nodes", "middle [m]", "axis")

@@ -25,7 +25,7 @@ from rom.components.families.parameters import (
 from rom.eigen.attachments import added_mass
 from rom.eigen.verbs import Operators, orthonormal_in, own_points, rigid_motions
 from rom.errors import ModelError, ParameterError
-from rom.model import Array, FEModel, Interface, Layered
+from rom.model import Array, FEModel, Interface, Layered, refuse_springs
 from rom.names import check_known
 from rom.reduction.full_model import mesh_operators
 from rom.reduction.interfaces.characteristic import GivenFunctions
@@ -46,6 +46,8 @@ class AffineModel:
         self.model, self.parameters = model, parameters
         self.ops = mesh_operators(model)
         self.added = added_mass(model, self.ops.first, self.ops.n_local)
+        for whole in (p for p in parameters.values() if not (p.region or isinstance(p, Density))):
+            refuse_springs(model, f"the factor of {whole} is of elements alone; name a region")
         names = dict.fromkeys(p.region for p in parameters.values() if p.region is not None)
         for name in names:
             text = f"there is no region {name!r}, a named physical volume; the model has"
@@ -130,6 +132,7 @@ class StretchedModel(AffineModel):
         super().__init__(model, parameters)
         if model.attachments:
             raise ParameterError("a model with a parameter of thickness takes no attached masses.")
+        refuse_springs(model, "a parameter of thickness moves elements alone")
         thin = [p for p in parameters.values() if isinstance(p, Thickness)]
         axis = "xyz".index(thin[0].axis)
         self.regions = dict(model.regions)

@@ -28,7 +28,7 @@ from rom.eigen.supports import Fixed, held_dofs
 from rom.eigen.verbs import rigid_motions
 from rom.eigen.workers import ONE_PROCESS, Workers
 from rom.errors import ConfigError, InterfaceError
-from rom.model import Array, FEModel, Index, Interface
+from rom.model import Array, FEModel, Index, Interface, refuse_springs
 from rom.names import check_known
 
 Complex = npt.NDArray[np.complex128]
@@ -310,6 +310,7 @@ def stresses_of(model: FEModel, blade: str | None = None) -> Any:
     found = (model if blade is None else model.regions[blade]).stresses
     if found is None:
         raise ConfigError("the model of the blade has no finite elements; see rom.fe.model.")
+    refuse_springs(model, "stress of rotation and heat knows elements alone")
     return found
 
 

@@ -265,16 +265,10 @@ class LargeStrain:
     def second_forces(self, U: Array, pairs: Index) -> Array:
         """(n_local, p) forces D^2 f [u_i, u_j] at no displacement [N], of pairs (p, 2) i and j."""
         a, b, v = fem.Function(self.V), fem.Function(self.V), ufl.TestFunction(self.V)
-
-        def L(u: Expr) -> Expr:
-            return ufl.sym(ufl.grad(u))
-
-        def Q(u: Expr, w: Expr) -> Expr:
-            return ufl.sym(ufl.dot(ufl.grad(u).T, ufl.grad(w)))
-
+        slopes = (map(ufl.grad, turn) for turn in ((a, b, v), (v, a, b), (v, b, a)))
         density = sum(
-            ufl.inner(stress(Q(x, y), self.numbers), L(z))
-            for x, y, z in ((a, b, v), (v, a, b), (v, b, a))
+            ufl.inner(stress(ufl.sym(ufl.dot(X.T, Y)), self.numbers), ufl.sym(Z))
+            for X, Y, Z in slopes
         )
         dx = ufl.Measure("dx", domain=self.mesh, metadata={"quadrature_degree": self.order})
         with compiling(self.mesh.comm):

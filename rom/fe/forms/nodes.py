@@ -47,7 +47,8 @@ def interface(name: str, tags: MeshTags, V: fem.FunctionSpace, points: Array) ->
     comm, facets = V.mesh.comm, tags.indices
     if comm.allreduce(facets.size) == 0:
         raise InterfaceError(f"the interface {name!r} has no facet; use tags of the mesh.")
-    nodes = _nodes(V, facets)
+    local = fem.locate_dofs_topological(V, 2, facets.astype(np.int32))
+    nodes = np.unique(gathered(comm, to_global(V.dofmap.index_map, local)))
     nodes = nodes[by_position(points[nodes], np.ptp(points, axis=0).max())]
     S = _surface_mass(V, facets, nodes)
     weights = np.asarray(S.sum(axis=0)).ravel()
@@ -55,12 +56,6 @@ def interface(name: str, tags: MeshTags, V: fem.FunctionSpace, points: Array) ->
         text = f"the interface {name!r} lies inside the solid and has no outer surface"
         raise InterfaceError(f"{text}; interfaces are parts of the outer boundary.")
     return Interface(name, nodes, points[nodes], S, weights @ points[nodes] / weights.sum())
-
-
-def _nodes(V: fem.FunctionSpace, facets: Integers) -> Index:
-    """Global numbers of all nodes on the facets, ascending."""
-    local = fem.locate_dofs_topological(V, 2, facets.astype(np.int32))
-    return np.unique(gathered(V.mesh.comm, to_global(V.dofmap.index_map, local)))
 
 
 def _surface_mass(V: fem.FunctionSpace, facets: Integers, nodes: Index) -> csr_matrix:

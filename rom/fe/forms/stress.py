@@ -16,7 +16,6 @@ from rom.fe.compat import (
     degree_of_slopes,
     evaluated,
     give_own,
-    quadrature_rule,
     reference_points,
     to_global,
 )
@@ -119,17 +118,6 @@ class Stresses:
         for number, row in enumerate(every):
             of_cell[(row == C).all(axis=1)] = number
         return every.reshape(-1, 6, 6), of_cell
-
-    def at_gauss_points(self, U: Array) -> tuple[Array, Array]:
-        """(g, 3) quadrature points of own cells [m], (g, 6, k) stress of U (n_local, k) [Pa]."""
-        cells = np.arange(self.n_cells, dtype=np.int32)
-        X, _ = quadrature_rule(self.mesh, 2 * (self.degree - 1))
-        with compiling(self.mesh.comm):
-            x = fem.Expression(ufl.SpatialCoordinate(self.mesh), X)
-        points = evaluated(x, self.mesh, cells).reshape(-1, 3)
-        fields = self._evaluated(self._hooke, 6, U, cells, X)
-        found = [values.reshape(-1, 6) for values in fields]
-        return points, np.stack(found, axis=2)
 
     def geometric_stiffness(self, U: Array, Psi: Array) -> Array:
         """(l, r, r) stiffness that the stress of loads gives to shapes Psi (n_local, r).

@@ -1,7 +1,8 @@
 """Shape of the cells: volume, Jacobian, aspect ratio."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import reduce
 from itertools import chain, repeat
 
 import numpy as np
@@ -164,27 +165,26 @@ def _edges(kind: CellType) -> list[tuple[int, int]]:
     return sorted({(min(e), max(e)) for ring in rings for e in ring})
 
 
-def _longest_edge(mesh: SolidMesh) -> Array:
+def _edge_lengths(mesh: SolidMesh) -> Iterator[Array]:
+    """(m,) lengths of the edges of all cells, one edge after the other."""
     x, corners = mesh.points, mesh.corners
-    longest = np.zeros(len(corners))
-    for a, b in _edges(mesh.kind):
-        edge = x[corners[:, b]] - x[corners[:, a]]
-        np.maximum(longest, np.einsum("ij,ij->i", edge, edge), out=longest)
-    return np.sqrt(longest)
+    return (
+        np.linalg.norm(x[corners[:, b]] - x[corners[:, a]], axis=1) for a, b in _edges(mesh.kind)
+    )
+
+
+def _longest_edge(mesh: SolidMesh) -> Array:
+    return reduce(np.maximum, _edge_lengths(mesh))
 
 
 def aspect_ratio(mesh: SolidMesh) -> Array:
     """(m,) longest edge over the smallest height (tetrahedra) or edge (hexahedra)."""
-    x, corners = mesh.points, mesh.corners
+    x, corners, longest = mesh.points, mesh.corners, _longest_edge(mesh)
     if mesh.kind.shape == "hexahedron":
-        lengths = [
-            np.linalg.norm(x[corners[:, b]] - x[corners[:, a]], axis=1)
-            for a, b in _edges(mesh.kind)
-        ]
-        return np.max(lengths, axis=0) / np.min(lengths, axis=0)
+        return longest / reduce(np.minimum, _edge_lengths(mesh))
     a, b, c = (x[corners[:, i]] - x[corners[:, 0]] for i in (1, 2, 3))
     volume = np.abs(np.einsum("ij,ij->i", a, np.cross(b, c)))
     areas = [
         np.linalg.norm(np.cross(u, v), axis=1) for u, v in ((a, b), (b, c), (c, a), (b - a, c - a))
     ]
-    return _longest_edge(mesh) * np.max(areas, axis=0) / volume
+    return longest * np.max(areas, axis=0) / volume

@@ -30,7 +30,7 @@ from rom.fe.mesh.curving import without_middles
 from rom.fe.mesh.picks import EVERY_FACE, picks
 from rom.fe.mesh.quality import straighten
 from rom.fe.mesh.repair import repair
-from rom.fe.mesh.solid import GEOMETRIES, PROGRAMS, Arrays, Notes, Request, SolidMesh, Tie
+from rom.fe.mesh.solid import GEOMETRIES, PROGRAMS, Arrays, Notes, Request, SolidMesh, Spring, Tie
 from rom.fe.mesh.validate import checked
 from rom.model import Array, Attachment, Index
 from rom.names import check_known, check_text
@@ -48,19 +48,9 @@ INCLUDES = {"abaqus": keywords.INCLUDE_PATTERN, "nastran": bulk.INCLUDE_PATTERN}
 LARGEST_FILE = 2**32  # bytes; some ten million nodes
 FACET_SHAPE = {"tetrahedron": "triangle", "hexahedron": "quadrilateral"}
 READERS = {
-    ".geo": "geo",
-    ".py": "builder",
-    ".step": "step",
-    ".stp": "step",
-    ".msh": "msh",
-    ".unv": "unv",
-    ".inp": "abaqus",
-    ".bdf": "nastran",
-    ".nas": "nastran",
-    ".dat": "nastran",
-    ".fem": "nastran",
-    ".cdb": "ansys",
-    ".med": "med",
+    **{".geo": "geo", ".py": "builder", ".step": "step", ".stp": "step", ".msh": "msh"},
+    **{".unv": "unv", ".inp": "abaqus", ".cdb": "ansys", ".med": "med"},
+    **dict.fromkeys((".bdf", ".nas", ".dat", ".fem"), "nastran"),
 }
 DECKS = ("abaqus", "nastran", "ansys")  # may say what regions are made of
 
@@ -138,8 +128,10 @@ def read_mesh(  # noqa: PLR0913  limits and trust beside what is read
         text = f"scale={scale:g} is of lengths alone and says no unit of the materials of the deck."
         hint = "Give units= instead, as 'mm-t-s'"
         notes["unread"] = {"message": text, "hint": f"{hint}, or others."}
-        if notes.get("carried"):
-            text = f"scale={scale:g} is of lengths alone and says no unit of the masses."
+        if notes.get("carried") or notes.get("springs"):
+            text = (
+                f"scale={scale:g} is of lengths alone and says no unit of the masses and springs."
+            )
             raise FileFormatError(text, where=str(path), hint=f"{hint}.")
     mesh, remarks = _solid(arrays, notes, provenance, scale, unit), notes["warnings"]
     if reader in GEOMETRIES:
@@ -278,6 +270,7 @@ def _solid(
         unread=notes.get("unread", {}),
         ties={name: _tie(tie, scale) for name, tie in notes.get("ties", {}).items()},
         carried=tuple(_carried(body, scale, unit) for body in notes.get("carried", ())),
+        springs=tuple(_spring(spring, unit) for spring in notes.get("springs", ())),
         faces=tuple(scaled(from_plain(Face, face), scale) for face in notes.get("faces", ())),
     )
 
@@ -292,6 +285,12 @@ def _carried(values: Notes, scale: float, unit: UnitSystem) -> Attachment:
     inertia = np.array(values["inertia"]) * unit.mass * unit.length**2
     at = np.array(values["at"]) * scale
     return Attachment(values["interface"], values["mass"] * unit.mass, inertia, at)
+
+
+def _spring(values: Notes, unit: UnitSystem) -> Spring:
+    turns = np.tile([1.0, unit.length], 2).repeat(3)
+    stiffness = np.array(values["stiffness"]) * np.outer(turns, turns) * unit.force / unit.length
+    return Spring(values["name"], tuple(values["ends"]), stiffness)
 
 
 def _tables(arrays: Arrays, kind: str, names: Sequence[str]) -> dict[str, Index]:

@@ -33,6 +33,15 @@ class Tie:
 
 
 @dataclass(frozen=True, slots=True)
+class Spring:
+    """Stiffness between two ties of a deck."""
+
+    name: str
+    ends: tuple[str, str]
+    stiffness: Array  # (12, 12) of both, displacements and rotations at their origins
+
+
+@dataclass(frozen=True, slots=True)
 class SolidMesh:
     """A solid body cut into cells of one type."""
 
@@ -57,6 +66,7 @@ class SolidMesh:
     unread: Notes = field(default_factory=dict)
     ties: dict[str, Tie] = field(default_factory=dict)  # of a deck, by name
     carried: tuple[Attachment, ...] = ()  # masses of a deck, on surfaces and ties
+    springs: tuple[Spring, ...] = ()  # of a deck, between ties
     faces: tuple[Face, ...] = ()  # all faces of the CAD, where they were asked for
 
     @property

@@ -29,7 +29,7 @@ def summary(mesh: SolidMesh) -> Notes:
             for name, value in mesh.provenance.get("parameters", {}).items()
             if isinstance(value, int | float)
         },
-        "box": np.column_stack([mesh.points.min(axis=0), mesh.points.max(axis=0)]).tolist(),
+        "box": _box(mesh.points).T.tolist(),
         "volume": float(volumes.sum()),
         "regions": {
             name: {
@@ -42,13 +42,14 @@ def summary(mesh: SolidMesh) -> Notes:
             name: {
                 "facets": len(facets),
                 "nodes": len(np.unique(facets)),
-                "middle": _middle(mesh.points[facets.ravel()]),
+                "middle": np.mean(_box(mesh.points[facets.ravel()]), axis=0).tolist(),
                 **_axis(mesh.axes.get(name)),
             }
             for name, facets in mesh.facets.items()
         },
         "ties": {name: len(tie.points) for name, tie in mesh.ties.items() if tie.kind},
         "masses": [{"interface": body.interface, "mass": body.mass} for body in mesh.carried],
+        "springs": [spring.name for spring in mesh.springs],
         "quality": {
             "smallest scaled Jacobian": float(scaled_jacobian(mesh).min()),
             "largest aspect ratio": float(aspect_ratio(mesh).max()),
@@ -102,9 +103,8 @@ def _axis(axis: Axis | None) -> Notes:
     return {"axis": list(axis.direction), "point": list(axis.point)} if axis else {}
 
 
-def _middle(points: Array) -> list[float]:
-    """Middle of the box around the points."""
-    return (0.5 * (points.min(axis=0) + points.max(axis=0))).tolist()
+def _box(points: Array) -> Array:
+    return np.array([points.min(axis=0), points.max(axis=0)])
 
 
 def vtk_cells(mesh: SolidMesh) -> tuple[Index, int]:

@@ -1,16 +1,20 @@
-"""Nodes that a deck ties or loads with masses, found again in a mesh and in its model."""
+"""Nodes that a deck ties, loads with masses or hangs on springs, found again in a model."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.sparse import diags
+from scipy.linalg import block_diag
+from scipy.sparse import csr_matrix, diags
 from scipy.spatial import cKDTree
 
+from rom.eigen.verbs import coupled, mean_motion
 from rom.errors import MeshError
 from rom.fe.forms.nodes import by_position
 from rom.fe.mesh.cell_types import CELL_TYPES, READ_TYPES
-from rom.fe.mesh.solid import SolidMesh, Tie
-from rom.model import Array, Index, Interface
+from rom.fe.mesh.solid import SolidMesh, Spring, Tie
+from rom.fe.operators.aij import wrapped
+from rom.model import Array, FEModel, Index, Interface
 
 MATCH_RTOL = 1e-8  # of the size, up to which two nodes are at one place
 OF_DEGREE = {"tetrahedron": ("tet4", "tet10"), "hexahedron": ("hex8", "hex27")}
@@ -79,3 +83,18 @@ def _completed(mesh: SolidMesh, name: str, tie: Tie, degree: int) -> Tie:
         own = mesh.kind.among([support]) or support  # amid straight edges where there is none
         found.append(mesh.points[tied[:, own]].mean(axis=1))
     return Tie(np.vstack(found), np.ones(0), tie.origin, tie.kind)
+
+
+def sprung(model: FEModel, springs: Sequence[Spring]) -> FEModel:
+    """The model with springs between what its interfaces do in the mean, in its stiffness."""
+    ops = model.operators
+    dK = csr_matrix((ops.n_local, ops.n))
+    for one in springs:
+        ends = [model.interfaces[name] for name in one.ends]
+        B = block_diag(*(mean_motion(e) if e.nodes.size > 1 else np.eye(6, 3) for e in ends))
+        block, dofs = B.T @ one.stiffness @ B, np.concatenate([end.dofs for end in ends])
+        dK = dK + coupled(dK.shape, ops.first, dofs, 0.5 * (block + block.T))
+    alone = hasattr(model.K, "tocsr")
+    K = csr_matrix(model.K + dK) if alone else ops.plus(ops.K, dK)
+    ops = ops.like(wrapped(K) if alone else K, ops.M, ops.rigid)
+    return replace(model, K=K, operators=ops, springs=tuple(one.name for one in springs))

@@ -29,7 +29,10 @@ def validate(mesh: SolidMesh) -> list[str]:
 
     Returned are warnings of what is legal, but a careful user wants to know.
     """
-    for check in (_check_names, _check_tables, _check_numbers, _check_cells):
+    for what, names in (("a region", mesh.region_names.values()), ("a surface", mesh.facets)):
+        for name in names:
+            check_text(name, what, TagError)
+    for check in (_check_tables, _check_numbers, _check_cells):
         check(mesh)
     warnings = check_shape(mesh)
     faces = faces_of(mesh.cells, mesh.kind, mesh.points.shape[0])
@@ -42,7 +45,9 @@ def validate(mesh: SolidMesh) -> list[str]:
             f"{same} nodes of the surface lie at the same place as another: the body has a slit of "
             "no width there. Merge the nodes if that is not meant."
         )
-    return [*warnings, *_doubts(mesh)]
+    distance = float(np.linalg.norm(0.5 * (mesh.points.min(axis=0) + mesh.points.max(axis=0))))
+    doubts = SIZE.doubt(mesh.size, "the mesh"), far_doubt(distance, mesh.size, "the mesh")
+    return [*warnings, *filter(None, doubts)]
 
 
 def _check_tables(mesh: SolidMesh) -> None:
@@ -147,14 +152,6 @@ def _coincident_nodes(mesh: SolidMesh, faces: Faces) -> int:
     return int(np.unique(tree.query_pairs(COINCIDENT_RTOL * mesh.size, output_type="ndarray")).size)
 
 
-def _doubts(mesh: SolidMesh) -> list[str]:
-    """Size and place that digits or units speak against."""
-    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
-    distance = float(np.linalg.norm(0.5 * (low + high)))
-    found = (SIZE.doubt(mesh.size, "the mesh"), far_doubt(distance, mesh.size, "the mesh"))
-    return [text for text in found if text]
-
-
 def _check_facets(mesh: SolidMesh, faces: Faces) -> None:
     n_faces, n = faces.count.size, mesh.points.shape[0]
     for name, rows in mesh.facets.items():
@@ -167,12 +164,6 @@ def _check_facets(mesh: SolidMesh, faces: Faces) -> None:
                 f"cell; the first has the nodes {rows[alien.argmax()].tolist()}.",
                 hint="The surface is not part of the meshed volume, or meshed on its own.",
             )
-
-
-def _check_names(mesh: SolidMesh) -> None:
-    for what, names in (("a region", mesh.region_names.values()), ("a surface", mesh.facets)):
-        for name in names:
-            check_text(name, what, TagError)
 
 
 def _check_regions(mesh: SolidMesh) -> None:

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial import cKDTree
 
 import rom
-from cases.files.cells import solid
+from cases.files.cells import SIZE, bulk, ends, keywords, long, model_of, solid
 from cases.files.damage import changed
 from cases.files.schema import answer
 from cases.refusals import refuses
@@ -24,7 +24,6 @@ from rom.reduction.full_model import mass_properties, operators
 
 pytestmark = pytest.mark.fenicsx
 
-SIZE = (0.4, 0.05, 0.03)
 REFERENCE = np.array([0.45, 0.02, 0.01])
 # points of a rigid body beside the reference node: their masses, centre and tensor
 CLOUD = np.random.default_rng(4).uniform(0.0, 0.1, (5, 3))
@@ -36,28 +35,6 @@ INERTIA = np.trace(SECOND) * np.eye(3) - SECOND
 XX, YY, ZZ = np.diag(INERTIA)
 
 
-def bulk(*cards, mesh=None, nodes=()):
-    """Bulk data of a box whose ends are SPC1 1 and 2, with cards and nodes {label: place}."""
-    mesh = mesh or solid("hex8", (4, 1, 1), SIZE)
-    out = [f"GRID,{k},,{x!r},{y!r},{z!r}" for k, (x, y, z) in enumerate(mesh.points.tolist(), 1)]
-    out += [f"GRID,{k},,{x!r},{y!r},{z!r}" for k, (x, y, z) in nodes]
-    out += [f"CHEXA,{k},1,{long(row + 1)}" for k, row in enumerate(mesh.cells, 1)]
-    out += [f"SPC1,{k},123,{long(ends(mesh, name))}" for k, name in ((1, "root"), (2, "tip"))]
-    out += ["PSOLID,1,1", "MAT1,1,2.1+11,,.3,7850."]
-    return "\n".join([*out, *cards, ""])
-
-
-def long(numbers):
-    """Fields behind the third, over as many lines as they need."""
-    words = [str(n) for n in numbers]
-    rows = [words[:6], *(words[k : k + 8] for k in range(6, len(words), 8))]
-    return "\n,".join(",".join(row) for row in rows)
-
-
-def ends(mesh, name):
-    return np.unique(mesh.facets[name]) + 1
-
-
 TIED = ends(solid("hex8", (4, 1, 1), SIZE), "tip")
 OFFSET = ",".join(repr(float(v)) for v in CENTRE)
 MASS = repr(float(WEIGHTS.sum()))
@@ -67,12 +44,6 @@ BODY = [
 ]
 RBE2 = f"RBE2,7,900,123456,{long(TIED)}"
 HUNG = {900: REFERENCE.tolist()}.items()
-
-
-def model_of(text, folder, **options):
-    path = folder / ("a.inp" if text.startswith("*") or "*NODE" in text else "a.bdf")
-    path.write_text(text)
-    return rom.fe.model(path, **{"degree": 1} | options)
 
 
 def by_hand(folder, **body):
@@ -183,18 +154,6 @@ def same_motion(model, folder, rtol=1e-9):
     expected = rom.modes(plain, 6, fixed=("spc_1",), interfaces={"spc_2": "rbe2"}).omega
     assert_allclose(rom.modes(model, 6, fixed=(held,)).omega, expected, rtol=rtol)
     assert name in model.interfaces
-
-
-def keywords(text, mesh=None, nodes=(), kind="C3D8"):
-    mesh = mesh or solid("hex8", (4, 1, 1), SIZE)
-    rows = [f"{k}, {x!r}, {y!r}, {z!r}" for k, (x, y, z) in enumerate(mesh.points.tolist(), 1)]
-    rows += [f"{k}, {x!r}, {y!r}, {z!r}" for k, (x, y, z) in nodes]
-    cells = [f"{k}, {', '.join(map(str, row + 1))}" for k, row in enumerate(mesh.cells, 1)]
-    sets = [f"*NSET, NSET={n}\n{', '.join(map(str, ends(mesh, n)))}" for n in ("root", "tip")]
-    law = "*SOLID SECTION, ELSET=e, MATERIAL=m\n"
-    law += "*MATERIAL, NAME=m\n*ELASTIC\n210e9, .3\n*DENSITY\n7850."
-    head = ["*NODE", *rows, f"*ELEMENT, TYPE={kind}, ELSET=e", *cells, *sets]
-    return "\n".join([*head, "*SURFACE, NAME=face, TYPE=ELEMENT\n4, S4", law, text, ""])
 
 
 PLACES = {900: REFERENCE.tolist(), 901: (REFERENCE + CENTRE).tolist(), 902: (0.0, 0.0, 1.0)}.items()

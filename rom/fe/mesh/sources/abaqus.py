@@ -5,8 +5,8 @@ without any the ``ELSET`` of ``*ELEMENT``.
 Interfaces are ``*SURFACE`` of element faces or nodes, sets of skin elements (S3, S4, M3D3, CPS3,
 ...), and each ``*NSET`` that contains whole facets of the outer surface. ``*RIGID BODY``,
 ``*COUPLING`` and ``*MPC`` of beams make interfaces too, by the names of their sets and surfaces,
-and ``*MASS`` and ``*ROTARY INERTIA`` what these and nodes carry. Every keyword is read, left aside
-because a free body does not need it, or refused by name.
+``*MASS`` and ``*ROTARY INERTIA`` what these and nodes carry, and ``*SPRING`` what acts between
+them. Every keyword is read, left aside because a free body does not need it, or refused by name.
 
 Source:
     Abaqus Keywords Reference Guide; CalculiX CrunchiX user's manual.
@@ -23,7 +23,7 @@ import numpy as np
 from rom.decks.keywords import Block, Sets
 from rom.decks.lines import Unread
 from rom.decks.nodes import NODE_KEYWORDS, SET_OPTIONS, Nodes, Table
-from rom.decks.rigid import ALL, DISPLACED, Average, PointMass, Rigid
+from rom.decks.rigid import ALL, DISPLACED, Average, PointMass, Rigid, Spring
 from rom.errors import FileFormatError
 from rom.fe.mesh.cell_types import READ_TYPES
 from rom.fe.mesh.solid import Read, packed
@@ -45,7 +45,9 @@ LINE_TYPES = ("T3D2", "T3D3")  # without a section, as gmsh writes curves
 COUPLINGS = ("KINEMATIC", "DISTRIBUTING")  # what follows *COUPLING
 BODY_SETS = ("NSET", "TIE NSET", "PIN NSET")  # of nodes of a *RIGID BODY
 USUAL = {"WEIGHTING METHOD": "UNIFORM", "COUPLING": "CONTINUUM"}
-POINT_TYPES = {"MASS": "MASS", "ROTARYI": "ROTARY INERTIA"}  # and what says their numbers
+SPRINGS = ("SPRINGA", "SPRING2")
+# and what says their numbers
+POINT_TYPES = {"MASS": "MASS", "ROTARYI": "ROTARY INERTIA"} | dict.fromkeys(SPRINGS, "SPRING")
 MOST_GENERATED = 10_000_000  # elements by a row
 # corners of the faces S1, S2, ... of a cell
 SIDES = {
@@ -58,7 +60,7 @@ SIDES = {
 class Deck(Nodes):
     """What a deck says, in its own numbers.
 
-    Solids are {number: (cell type, nodes)}, skin {number: nodes}, at_nodes {number: (type, node)},
+    Solids are {number: (cell type, nodes)}, skin {number: nodes}, at_nodes {number: (type, nodes)},
     surfaces {name: (type, rows)}; rigid has what ties nodes and hangs on them, own are names of the
     element sets of ``*ELEMENT``, laws what is said of materials.
     """
@@ -66,7 +68,7 @@ class Deck(Nodes):
     aside: Unread = field(default_factory=Unread)
     solids: dict[int, tuple[str, list[int]]] = field(default_factory=dict)
     skin: dict[int, list[int]] = field(default_factory=dict)
-    at_nodes: dict[int, tuple[str, int]] = field(default_factory=dict)
+    at_nodes: dict[int, tuple[str, list[int]]] = field(default_factory=dict)
     rigid: list[Block] = field(default_factory=list)
     cell_sets: Sets = field(default_factory=lambda: Sets("elements"))
     surfaces: dict[str, tuple[str, list[list[str]]]] = field(default_factory=dict)
@@ -96,7 +98,7 @@ def read(path: str) -> Read:
     names, regions = _regions(deck, ids)
     facets, remarks = _facets(deck, ids, cells, cell_type, node_ids)
     labels = {name: node_ids[np.unique(rows)].tolist() for name, rows in facets.items()}
-    elements = [*_masses(deck), *(one for tie in ties for one in _tied(deck, *tie, labels))]
+    elements = [*_points(deck), *(one for tie in ties for one in _tied(deck, *tie, labels))]
     turned = (b.options["ROT NODE"] for b in deck.rigid if "ROT NODE" in b.options)
     rotating = [node for word in turned for node in _members(deck.node_sets, word).tolist()]
     told, more = hung_on(elements, node_ids, points, cells, rotating)
@@ -117,9 +119,12 @@ def _element(deck: Deck, block: Block) -> None:
         else:
             deck.skin |= {row[0]: row[1:] for row in rows}
     elif kind in POINT_TYPES:
-        rows = _numbers(block)
+        rows = _table(block, 2 + (kind in SPRINGS))
         deck.cell_sets.add(block.options.get("ELSET", kind), [row[0] for row in rows])
-        deck.at_nodes |= {label: (kind, node) for label, node in rows}
+        for label, *nodes in rows:
+            if label in deck.solids or label in deck.at_nodes:
+                raise block.wrong(f"element {label} is defined twice")
+            deck.at_nodes[label] = kind, nodes
     elif kind.startswith("C3D") and is_whole(digits) and int(digits) in SOLIDS:
         cell_type = SOLIDS[int(digits)]
         _new_cells(deck, block, cell_type, _table(block, 1 + READ_TYPES[cell_type].n_nodes))
@@ -144,7 +149,7 @@ def _table(block: Block, width: int) -> list[list[int]]:
 def _new_cells(deck: Deck, block: Block, cell_type: str, rows: list[list[int]]) -> None:
     """Solids, in a set that is a region where there are no sections."""
     for label, *nodes in rows:
-        if label in deck.solids:
+        if label in deck.solids or label in deck.at_nodes:
             raise block.wrong(f"element {label} is defined twice")
         deck.solids[label] = cell_type, nodes
     name = block.options.get("ELSET", "body")
@@ -195,6 +200,7 @@ MESH_KEYWORDS: Table = {
                       ("ELSET", "MATERIAL", "ORIENTATION", "CONTROLS")),
     "MASS": (_rigid, ("ELSET",)),
     "ROTARY INERTIA": (_rigid, ("ELSET",)),
+    "SPRING": (_rigid, ("ELSET",)),
     "RIGID BODY": (_rigid, (*BODY_SETS, "ELSET", "REF NODE", "ROT NODE")),
     "COUPLING": (_rigid, ("CONSTRAINT NAME", "REF NODE", "SURFACE")),
     "KINEMATIC": (_rigid, ()),
@@ -296,22 +302,39 @@ def _members(sets: Sets, word: str) -> Index:
     return np.array([int(word)], dtype=np.int64) if is_whole(word) else sets.of(word.strip('"'))
 
 
-def _masses(deck: Deck) -> Iterator[PointMass]:
+def _points(deck: Deck) -> Iterator[PointMass | Spring]:
     """Of ``*MASS`` and ``*ROTARY INERTIA``, whose products of inertia are entries of the tensor."""
     open_ = dict(deck.at_nodes)
     for block in (b for b in deck.rigid if b.keyword in POINT_TYPES.values()):
         for label in deck.cell_sets.of(block.option("ELSET")).tolist():
-            kind, node = open_.pop(label, ("", 0))
+            kind, nodes = open_.pop(label, ("", []))
             if POINT_TYPES.get(kind) != block.keyword:
                 raise block.wrong(f"element {label} is not of its type, or has one already")
+            if kind in SPRINGS:
+                yield _spring(deck, block, kind, label, nodes)
+                continue
             m, J = block.reals(0, 0)[0] if kind == "MASS" else 0.0, np.zeros((3, 3))
             if kind != "MASS":
                 xx, yy, zz, xy, xz, yz = block.reals(0, *range(6))
                 J = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-            yield PointMass(f"{kind} {label}", block.place, node, m, np.zeros(3), J)
+            yield PointMass(f"{kind} {label}", block.place, nodes[0], m, np.zeros(3), J)
     for label, (kind, _) in open_.items():
         text = f"element {label} of the type {kind} has no *{POINT_TYPES[kind]}."
         raise FileFormatError(text, where=str(deck.deck))
+
+
+def _spring(deck: Deck, block: Block, kind: str, label: int, nodes: list[int]) -> Spring:
+    """One along its line, or between a component of each node, which stands in the first row."""
+    rows = [r for r, row in enumerate(block.rows) if any(row)]
+    if len(rows) != 1 + (kind == "SPRING2"):
+        raise block.wrong(f"element {label}: it has {len(rows)} rows, not those of one stiffness")
+    a, b = (deck.nodes.get(node, np.zeros(3)) for node in nodes)
+    components, axes = [1, 1], [(b - a) / (np.linalg.norm(b - a) or 1.0)] * 2
+    if kind == "SPRING2":
+        components = [block.whole(rows[0], n) for n in (0, 1)]
+        axes = [np.eye(3)[(c - 1) % 3] for c in components]
+    ends = zip(nodes, components, axes, strict=True)
+    return Spring.scalar((f"{kind} {label}", block.place), block.reals(rows[-1], 0)[0], *ends)
 
 
 def _ties(deck: Deck) -> list[tuple[Block, Block]]:

@@ -99,13 +99,9 @@ def positions(ids: Index, wanted: Index, what: str) -> Index:
 
 
 def hung_on(
-    elements: Iterable[Element],
-    ids: Index,
-    points: Array,
-    cells: Index,
-    known: Iterable[int] = (),
+    elements: Iterable[Element], ids: Index, points: Array, cells: Index, known: Iterable[int] = ()
 ) -> tuple[Notes, list[str]]:
-    """Ties and what they carry as notes, of a solid, and a remark on nodes of no known use."""
+    """Ties, what they carry, and springs as notes; a remark on nodes of no known use."""
     solid = np.zeros(ids.size, dtype=bool)
     solid[cells] = True
     row = dict(zip(ids.tolist(), range(ids.size), strict=True))
@@ -119,4 +115,4 @@ def hung_on(
     lonely = ids[~solid & ~np.isin(ids, [*found.nodes, *known])]
     text = f"{lonely.size} nodes belong to no solid and are left out: {named(lonely.tolist())}"
     remarks = [f"{text}; check that no element is missing."] if lonely.size else []
-    return {"ties": found.ties, "carried": found.carried}, remarks
+    return {"ties": found.ties, "carried": found.carried, "springs": found.springs}, remarks

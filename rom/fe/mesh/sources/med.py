@@ -13,12 +13,7 @@ import numpy as np
 
 from rom.errors import FileFormatError
 from rom.fe.mesh.solid import Read, packed
-from rom.fe.mesh.sources.deck import (
-    facets_of_nodes,
-    only_type,
-    regions_of,
-    to_gmsh,
-)
+from rom.fe.mesh.sources.deck import facets_of_nodes, only_type, regions_of, to_gmsh
 from rom.model import Index
 from rom.names import named
 

@@ -3,22 +3,25 @@
 Regions are the property numbers of the solids ("property_1"), made of their MAT1. Interfaces are
 skin elements (CTRIA3, CTRIA6, CQUAD4, CQUAD8) by property number ("property_5") and the nodes of
 SPC and SPC1 cards by set number ("spc_7"), where they contain whole facets of the outer surface.
-RBE2, RBAR and RBE3 make interfaces too ("RBE2 7"), and CONM1 and CONM2 what these and nodes carry.
-Every card is read, left aside because a free body does not need it, or refused by name.
+RBE2, RBAR and RBE3 make interfaces too ("RBE2 7"), CONM1 and CONM2 what these and nodes carry, and
+CELAS1, CELAS2 and CBUSH are springs between them. Every card is read, left aside because a free
+body does not need it, or refused by name.
 
 Source:
-    MSC Nastran Quick Reference Guide: CONM1, CONM2, RBAR, RBE2, RBE3.
+    MSC Nastran Quick Reference Guide: CBUSH, CELAS1, CELAS2, CONM1, CONM2, PBUSH, PELAS, RBAR,
+    RBE2, RBE3.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from rom.decks.bulk import POINTS, Card, cards, grids
-from rom.decks.lines import Unread
-from rom.decks.rigid import ALL, DISPLACED, Average, Element, PointMass, Rigid
-from rom.decks.systems import System
+from rom.decks.lines import Unread, at
+from rom.decks.rigid import ALL, DISPLACED, Average, Element, PointMass, Rigid, Spring, arm
+from rom.decks.systems import System, system
 from rom.fe.mesh.cell_types import LOWER_EDGES, UPPER_EDGES, UPRIGHT_EDGES
 from rom.fe.mesh.solid import Read, packed
 from rom.fe.mesh.sources.deck import (
@@ -30,6 +33,7 @@ from rom.fe.mesh.sources.deck import (
     to_gmsh,
 )
 from rom.model import Array, Index
+from rom.names import is_whole
 
 SOLIDS = {"CTETRA": {4: "tet4", 10: "tet10"}, "CHEXA": {8: "hex8", 20: "hex20"}}
 # mid-edge nodes where not as in Abaqus
@@ -37,12 +41,15 @@ EDGES = {"hex20": (*LOWER_EDGES, *UPRIGHT_EDGES, *UPPER_EDGES)}
 SKIN_CARDS = {"CTRIA3": 3, "CTRIA6": 3, "CQUAD4": 4, "CQUAD8": 4}  # corners
 LINES = ("CBAR",)  # without a property, as gmsh writes curves
 MASSES, TIES = ("CONM1", "CONM2"), ("RBE2", "RBAR", "RBE3")
-MESH_CARDS = {*POINTS, *SOLIDS, *SKIN_CARDS, "SPC", "SPC1", *MASSES}
+SPRINGS, OF_SPRINGS = ("CELAS1", "CELAS2", "CBUSH"), ("PELAS", "PBUSH")
+MESH_CARDS = {*POINTS, *SOLIDS, *SKIN_CARDS, "SPC", "SPC1", *MASSES, *SPRINGS, *OF_SPRINGS}
 SECTIONS, MATERIALS = ("PSOLID", "PLSOLID"), "MAT"
 OF_MAT1 = {"MAT1", "MATS1", "MATCID"}  # with what a linear isotropic solid does not need
 HARMLESS_CARDS = tuple("EIG TABLE SET1 SET3 PLOTEL ECHO".split())
 BODY_RTOL = 1e-6  # of a mass matrix, up to which it is that of a rigid body
 CONTRADICTION = 0.01  # of E, G and NU, from where Nastran warns
+DAMPING = ("B", "GE")  # of springs; bodies get their own
+NO_LINE = 1e-4  # in units of the deck, below which the nodes of a CBUSH give it no direction
 # loads, supports, steps, and what a reduction there holds
 LOAD_CARDS = set(
     "FORCE FORCE1 FORCE2 MOMENT MOMENT1 MOMENT2 PLOAD PLOAD1 PLOAD2 PLOAD4 GRAV ACCEL ACCEL1 "
@@ -50,38 +57,46 @@ LOAD_CARDS = set(
     "TEMPP1 SPCD SPCADD SUPORT SUPORT1 FREQ FREQ1 FREQ2 FREQ3 FREQ4 TSTEP TSTEPNL NLPARM TIC "
     "ASET ASET1 BSET BSET1 CSET CSET1 QSET QSET1 OMIT OMIT1 SPOINT".split()
 )
+Cards, At = dict[str, list[Card]], dict[int, Array]  # by name; by node
+Systems = Callable[[int, Card], System]
 
 
 def read(path: str) -> Read:
     """Read bulk data, or refuse cards whose mass or stiffness would be lost."""
     found, ties, remarks = _sorted(Path(path))
-    ids, points, _, system = grids(found)
+    ids, points, moves, systems = grids(found)
     solids = [card for name in SOLIDS for card in found.get(name, ())]
     nodes = [_nodes(card) for card in solids]
     cell_type = only_type(_type(*solid) for solid in zip(solids, nodes, strict=True))
     raw = np.array(nodes, dtype=np.int64)
     properties = np.array([_property(card) for card in solids], dtype=np.int64)
-    numbers = np.array([card.whole(0) for card in solids], dtype=np.int64)
+    springs = [card for name in SPRINGS for card in found.get(name, ())]
+    numbers = np.array([card.whole(0) for card in (*solids, *springs)], dtype=np.int64)
     positions(numbers, numbers[:1], "element")  # refuses a number given twice
+    numbers = numbers[: len(solids)]
     cells = to_gmsh(positions(ids, raw, "node"), cell_type, EDGES.get(cell_type))
     labels = {name: np.array(nodes, dtype=np.int64) for name, nodes in _sets(found, ids).items()}
     sets = {name: positions(ids, nodes, "node") for name, nodes in labels.items()}
     facets, left = facets_of_nodes(cells, sets, cell_type, len(points))
     names = {int(p): f"property_{p}" for p in np.unique(properties)}
     cards = [card for name in MASSES for card in found.get(name, ())]
-    place = dict(zip(ids.tolist(), points, strict=True)) if cards or ties else {}
-    masses = [_mass(card, place, system, _per_weight(found)) for card in cards]
-    told, more = hung_on([*ties, *masses], ids, points, cells)
+    place = dict(zip(ids.tolist(), points, strict=True)) if cards or springs else {}
+    turned = dict(zip(ids.tolist(), moves, strict=True)) if springs else {}
+    masses = [_mass(card, place, systems, _per_weight(found)) for card in cards]
+    between = _springs(found, place, turned, systems)
+    told, more = hung_on([*ties, *masses, *between], ids, points, cells)
     told |= {"region_names": names, "warnings": [*remarks, *left, *more]}
     told |= {"provenance": {"parameters": {}}} | of_materials(_materials, found, list(names))
     return packed(points, cells, cell_type, properties, numbers, facets=facets, **told)
 
 
-def _sorted(path: Path) -> tuple[dict[str, list[Card]], list[Element], list[str]]:
+def _sorted(path: Path) -> tuple[Cards, list[Element], list[str]]:
     """Cards that are read, by name, ties, and remarks on those that need not be."""
-    found: dict[str, list[Card]] = {}
+    found: Cards = {}
     unread, aside, ties = Unread(), Unread(), list[Element]()
     for card in cards(path):
+        for word in _beside(card) if card.name in (*SPRINGS, *OF_SPRINGS) else ():
+            (aside if word in DAMPING else unread).add(f"{card.name}, {word}", card.place)
         if card.name in SECTIONS and card.text(6) not in ("", "SMECH"):
             unread.add(f"{card.name}, {card.text(6)}", card.place)
         elif card.name in TIES:
@@ -149,21 +164,73 @@ def _averaged(card: Card) -> Average | str:
     return Average(*_named(card), card.whole(2), weights)
 
 
-def _mass(
-    card: Card,
-    place: dict[int, Array],
-    system: Callable[[int, Card], System],
-    per_weight: float,
-) -> PointMass:
+def _mass(card: Card, place: At, systems: Systems, per_weight: float) -> PointMass:
     """CONM1 or CONM2, in the axes that its coordinate system has at its node."""
-    node, number = card.whole(1), card.whole(2, 0)
-    if node not in place:
-        raise card.wrong(f"node {node} is not defined")
-    Q = np.eye(3) if number <= 0 else system(number, card).axes_at(place[node][None])[0]
+    (node,), number = _ends(card, place, 1), card.whole(2, 0)
+    Q = np.eye(3) if number <= 0 else systems(number, card).axes_at(place[node][None])[0]
     mass, arm, J = _of_matrix(card) if card.name == "CONM1" else _of_body(card)
     offset = arm - place[node] if number == -1 and card.name == "CONM2" else Q @ arm
     J = Q @ J @ Q.T * per_weight
     return PointMass(*_named(card), node, mass * per_weight, offset, J)
+
+
+def _beside(card: Card) -> list[str]:
+    """What the card of a spring says beside its place, stiffness and factors of stress."""
+    if card.name == "PBUSH":
+        return [word for word in card.fields if word.isalpha() and word not in ("K", "RCV")]
+    if card.name == "CBUSH":
+        return ["OCID"] * (card.text(9) not in ("", "-1"))
+    return ["GE"] * any(card.reals(*{"CELAS2": (6,), "PELAS": (2, 6)}.get(card.name, ())))
+
+
+def _springs(found: Cards, place: At, moves: At, systems: Systems) -> Iterator[Spring]:
+    """CELAS1 and CELAS2 between components of two nodes, CBUSH between their whole motions."""
+    halves = [(c, k) for c in found.get("PELAS", ()) for k in (0, 4) if c.text(k)]
+    elastic = [replace(card, fields=card.fields[k:]) for card, k in halves]
+    pairs = [(card, card) for card in found.get("CELAS2", ())]
+    for name, some in (("CELAS1", elastic), ("CBUSH", found.get("PBUSH", []))):
+        if users := found.get(name):
+            wanted = [card.whole(1, card.whole(0)) for card in users]
+            pairs += zip(users, _numbered(some, wanted, f"property of a {name}"), strict=True)
+    for card, own in pairs:
+        if card.name == "CBUSH":
+            yield _bush(card, own, place, moves, systems)
+            continue
+        ends = zip(_ends(card, place, 2, 4), (card.whole(3, 0), card.whole(5, 0)), strict=True)
+        turned = ((node, c, moves.get(node, np.eye(3))[:, (c - 1) % 3]) for node, c in ends)
+        yield Spring.scalar(_named(card), own.reals(1)[0], *turned)
+
+
+def _bush(card: Card, own: Card, place: At, moves: At, systems: Systems) -> Spring:
+    """CBUSH, whose axes are those of a system, or those of its line and a vector beside it."""
+    a, b = _ends(card, place, 2, 3)
+    first = own.fields.index("K") + 1 if "K" in own.fields else len(own.fields)
+    one = Spring(*_named(card), a, b, np.array(own.reals(*range(first, first + 6))), np.eye(6, 12))
+    if not a * b:
+        return one
+    line, beside = place[b] - place[a], [n for n in (4, 5, 6) if card.text(n)]
+    if card.text(7):
+        axes = systems(card.whole(7), card).axes_at(place[a][None])[0]
+    elif np.linalg.norm(line) < NO_LINE:
+        raise one.wrong("its nodes lie in one place, so it needs a CID")
+    elif beside or not one.stiffness[[1, 2, 4, 5]].any():
+        (third,) = _ends(card, place, 4) if is_whole(card.text(4)) else (0,)  # or a vector
+        v = place[third] - place[a] if third else moves[a] @ card.reals(4, 5, 6)
+        v = v if beside else np.eye(3)[np.abs(line).argmin()]
+        axes = system(0, np.array([np.zeros(3), line, v]), "R", at(card.place)).axes
+    else:
+        raise one.wrong("it has more than K1 and K4, so it needs a CID, GO or a vector")
+    share = card.reals(8)[0] if card.text(8) else 0.5
+    ends = np.hstack([-arm(share * line), arm((share - 1.0) * line)])
+    return replace(one, stretch=np.kron(np.eye(2), axes.T) @ ends)
+
+
+def _ends(card: Card, place: At, *fields: int) -> list[int]:
+    """Nodes that a card names, zero for none; they must be there."""
+    nodes = [card.whole(k, 0) for k in fields]
+    if missing := set(nodes) - place.keys() - {0}:
+        raise card.wrong(f"node {min(missing)} is not defined")
+    return nodes
 
 
 def _of_body(card: Card) -> tuple[float, Array, Array]:
@@ -187,7 +254,7 @@ def _of_matrix(card: Card) -> tuple[float, Array, Array]:
     return m, arm, M[3:, 3:] - m * (arm @ arm * np.eye(3) - np.outer(arm, arm))
 
 
-def _per_weight(found: dict[str, list[Card]]) -> float:
+def _per_weight(found: Cards) -> float:
     """Mass of what is given as a weight, PARAM WTMASS."""
     factors = {card.reals(1)[0] for card in found.get("PARAM", ()) if card.text(0) == "WTMASS"}
     if len(factors) > 1:
@@ -216,7 +283,7 @@ def _property(card: Card) -> int:
     return card.whole(1)
 
 
-def _materials(found: dict[str, list[Card]], properties: list[int]) -> dict[str, list[float]]:
+def _materials(found: Cards, properties: list[int]) -> dict[str, list[float]]:
     """{region: E, nu and rho} of the material of each property, in units of the deck."""
     sections = _numbered([card for name in SECTIONS for card in found.get(name, ())], properties)
     used, unread = [card.whole(1) for card in sections], Unread()
@@ -231,9 +298,9 @@ def _materials(found: dict[str, list[Card]], properties: list[int]) -> dict[str,
     return {f"property_{p}": numbers for p, numbers in zip(properties, solids, strict=True)}
 
 
-def _numbered(some: list[Card], wanted: list[int]) -> list[Card]:
+def _numbered(some: list[Card], wanted: list[int], none: str = "MAT1") -> list[Card]:
     """The cards of these numbers, each there once."""
-    labels, name = np.array([card.whole(0) for card in some]), some[0].name if some else "MAT1"
+    labels, name = np.array([card.whole(0) for card in some]), some[0].name if some else none
     return [some[k] for k in positions(labels, np.array(wanted), name)]
 
 
@@ -251,7 +318,7 @@ def _isotropic(card: Card, per_weight: float) -> list[float]:
     return [E, nu, rho * per_weight]
 
 
-def _sets(found: dict[str, list[Card]], ids: Index) -> dict[str, list[int]]:
+def _sets(found: Cards, ids: Index) -> dict[str, list[int]]:
     """Nodes of skin elements by property, and of SPC and SPC1 cards by set number."""
     sets: dict[str, list[int]] = {}
     for name, n_corners in SKIN_CARDS.items():
