@@ -57,6 +57,10 @@ TEXTS = {  # case: (file name, its content, reader)
     "sid": ("x.SID_FEM", sid("sid"), lambda path: rom.read_sid(path, ge="as_written")),
     "sid-pysid": ("x.SID_FEM", sid("sid-pysid"), rom.io.read_body),
     "sid-geisler": ("x.sid_fem", sid("sid-geisler"), rom.io.read_body),
+    "mbdyn": ("x.fem", exported("mbdyn", body=lambda: random_body(np.random.default_rng(1), r=2)),
+              rom.io.read_body),
+    "exudyn": ("x.py", exported("exudyn", body=lambda: random_body(np.random.default_rng(1), r=2)),
+               rom.io.read_body),
     "op4 text": ("x.op4", whole("dense.op4"), rom.io.read_op4),
     "op4 sparse": ("x.op4", whole("nonbigmat_text.op4"), rom.io.read_op4),
     "op4 long": ("x.op4", whole("bigmat_text.op4"), rom.io.read_op4),
@@ -90,7 +94,7 @@ TEXTS = {  # case: (file name, its content, reader)
 
 COMPLETE = {  # case: bytes at the end that no reader needs
     "body": 0, "family": 0, "state": 0,
-    "sid": 1, "sid-pysid": 1, "sid-geisler": 1, "op4 text": 24, "op4 sparse": 24, "op4 long": 24,
+    "sid": 1, "sid-pysid": 1, "sid-geisler": 1, "mbdyn": 0, "op4 text": 24, "op4 sparse": 24, "op4 long": 24,
     "op4 binary": 0, "op4 binary sparse": 0, "op4 binary long": 0, "market": 0, "market dense": 0,
     "user element of a body": 0, "substructure": 0, "openfast": 22, "openfast-4": 22,
     "stiffness": 0, "labels": 0,
