@@ -24,7 +24,7 @@ MATRIX_ADVICE = (
 READER_ADVICE = {  # ending: what reads such a file
     **dict.fromkeys(".geo .msh .step .stp .brep .inp .bdf .cdb .med .py".split(), MESH_ADVICE),
     **dict.fromkeys(
-        (".op4", ".mtx", ".mm", ".pch", ".dmig", ".dat", ".sti", ".mas"), MATRIX_ADVICE
+        ".op4 .mtx .mm .pch .dmig .dat .sti .mas .op2 .full .mnf".split(), MATRIX_ADVICE
     ),
     **dict.fromkeys((".unv", ".uff"), "rom.io.read_responses and rom.io.read_modes read tests."),
     ".sid_fem": "rom.read_sid reads its blocks; rom export FILE.SID_FEM BODY.rom.npz makes a body.",

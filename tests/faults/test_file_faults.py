@@ -10,6 +10,7 @@ from scipy.io import mmwrite
 from scipy.sparse import random as random_matrix
 
 import rom
+from cases.files.abaqus_text import write_abaqus_matrix
 from cases.files.damage import ARCHIVES, damaged, outcome
 from cases.files.decks import BY_HAND, DECK, IM, RE, X, binary, dataset
 from cases.files.toml_files import ALL, CRANK, PENDULUM, SOLID
@@ -36,7 +37,7 @@ def market(folder, **how):
 
 def abaqus(folder):
     dofs = np.column_stack([np.repeat([3, 9], 3), np.tile([1, 2, 3], 2)])
-    return rom.io.write_abaqus_matrix(np.eye(6) + 1.0, dofs, folder / "m.mtx").read_bytes()
+    return write_abaqus_matrix(np.eye(6) + 1.0, dofs, folder / "m.mtx").read_bytes()
 
 
 def exported(to, held=(), body=lambda: reduced(2, block(cells=(2, 1, 1)))):
@@ -94,7 +95,8 @@ TEXTS = {  # case: (file name, its content, reader)
 
 COMPLETE = {  # case: bytes at the end that no reader needs
     "body": 0, "family": 0, "state": 0,
-    "sid": 1, "sid-pysid": 1, "sid-geisler": 1, "mbdyn": 0, "op4 text": 24, "op4 sparse": 24, "op4 long": 24,
+    "sid": 1, "sid-pysid": 1, "sid-geisler": 1, "mbdyn": 0,
+    "op4 text": 24, "op4 sparse": 24, "op4 long": 24,
     "op4 binary": 0, "op4 binary sparse": 0, "op4 binary long": 0, "market": 0, "market dense": 0,
     "user element of a body": 0, "substructure": 0, "openfast": 22, "openfast-4": 22,
     "stiffness": 0, "labels": 0,

@@ -119,14 +119,9 @@ ARRAYS = dict(np.load(io.BytesIO(_decoded("""
 
 
 def write_exudyn(body: FlexibleBody, path: str | Path) -> Path:
-    """Write a module that adds the body to an Exudyn system.
+    """Write a module that adds the body to an Exudyn system, by a name that Python can import.
 
-    Args:
-        body: any body; geometric stiffness has no place in Exudyn and is left out.
-        path: file ending in ``.py``, a name that Python can import.
-
-    Raises:
-        ConfigError, ResourceError: if the place is not writable, or the disk is full.
+    Geometric stiffness has no place in Exudyn and is left out.
 
     Warns:
         RomWarning: if the shapes move the mass centre, which gravity in Exudyn does not see.
@@ -178,14 +173,11 @@ def _body(name: str, names: list[str], found: dict[str, Array]) -> FlexibleBody:
         "Inv5": -found["mPsiTildePsi"].reshape(r, 3, r).swapaxes(0, 1),
         "Inv9": -found["mPsiTildePsiTilde"].reshape(r, 3, r, 3).swapaxes(0, 1),
     }
-    return body_of(
-        name,
-        (mass, mass * found["centerOfMass"].reshape(3), found["inertia"].reshape(3, 3)),
-        known,
-        tuple(found[matrix].reshape(r, r) for matrix in "KMD"),
-        {name: _middle(x, u) for name, x, u in stars},
-        surface=Surface(X[n:], corners, shapes[n:].reshape(-1, r)) if len(X) > n else None,
-    )
+    rigid = mass, mass * found["centerOfMass"].reshape(3), found["inertia"].reshape(3, 3)
+    matrices = (found[matrix].reshape(r, r) for matrix in "KDM")
+    surface = Surface(X[n:], corners, shapes[n:].reshape(-1, r)) if len(X) > n else None
+    nodes = {name: _middle(x, u) for name, x, u in stars}
+    return body_of(name, rigid, known, *matrices, nodes=nodes, surface=surface)
 
 
 def _middle(points: Array, shapes: Array) -> tuple[Array, Array, Array]:

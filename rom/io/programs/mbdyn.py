@@ -38,7 +38,7 @@ from rom.io.files import (
     numbers_line,
     write_lines,
 )
-from rom.io.sid.body import UNEVEN_RTOL, body_of, invariants
+from rom.io.sid.body import UNEVEN_RTOL, Rigid, body_of, invariants
 from rom.io.sid.reading import MAX_BYTES, MOST_MODES
 from rom.model import Array
 from rom.names import ORIGIN_MARK, named
@@ -55,14 +55,9 @@ def write_mbdyn(body: FlexibleBody, path: str | Path) -> Path:
     The modal joint has to list the nodes in their order here, as stiffening counts them so; give
     it "use invariant 9" where it asks.
 
-    Args:
-        body: with at least one shape and one interface.
-        path: file, usually ending in ``.fem``.
-
     Raises:
         ConfigError: if there is no shape or no interface, names become equal without their
             blanks, or the place is not writable.
-        ResourceError: if the disk is full.
     """
     if not body.n_modes or not body.markers:
         raise ConfigError(
@@ -135,8 +130,9 @@ def read_mbdyn(path: str | Path) -> FlexibleBody:
         found = _numbers(words, path.stat().st_size)
         moves = zip(words[2], found[5], found[8].transpose(1, 2, 0), strict=True)
         nodes = {label: (x, A[:3], A[3:]) for label, x, A in moves}
-        matrices = found[10], found[9], found.get(13, np.zeros_like(found[9]))
-        body = body_of(path.stem, *_inertia(found), matrices, nodes, provenance={"from": path.name})
+        K, M, origin = found[10], found[9], {"from": path.name}
+        matrices = K, found.get(13, np.zeros_like(K)), M
+        body = body_of(path.stem, *_inertia(found), *matrices, nodes=nodes, provenance=origin)
         if any(found[k].any() for k in (3, 4) if k in found):
             warn(f"{path}: amplitudes at the start are left out.")
         return replace(body, K_geo=_stiffness(body, found[19])) if 19 in found else body
@@ -177,7 +173,7 @@ def _numbers(words: dict[int, list[str]], n_bytes: int) -> dict[int, Array]:
     return found | {5: np.column_stack([found[k] for k in (5, 6, 7)]), 8: found[8][rejected:]}
 
 
-def _inertia(found: dict[int, Array]) -> tuple[tuple[float, Array, Array], dict[str, Array]]:
+def _inertia(found: dict[int, Array]) -> tuple[Rigid, dict[str, Array]]:
     """Mass, first moment, inertia; and invariants."""
     known = {name: found[group] for group, name in enumerate(INVARIANTS, 14) if group in found}
     lacking = ", ".join(name for name in INVARIANTS if name not in known)

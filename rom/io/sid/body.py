@@ -10,6 +10,7 @@ from rom.body.flexible import FlexibleBody
 from rom.body.inertia import InertiaIntegrals
 from rom.body.records import Marker
 from rom.body.recovery import CENTRIFUGAL_LOADS, PRODUCTS
+from rom.body.reference import rigid_marker
 from rom.body.stiffening import ANGULAR_LOADS, LINEAR_LOADS, SecondOrder, interface_loads
 from rom.errors import ConfigError, QualityGateError
 from rom.io.sid.dialect import by_mode, first
@@ -17,6 +18,8 @@ from rom.io.sid.format import StandardInput, Taylor
 from rom.model import FILE_FRAME, Array
 from rom.rotation import crossed, skew_tensor
 
+Rigid = tuple[float, Array, Array]  # mass, first moment (3,), inertia (3, 3) about the origin
+Nodes = dict[str, tuple[Array, Array, Array]]  # point (3,), translation, rotation (3, r)
 EPS = -skew_tensor()  # of Levi-Civita
 PRODUCT_NAMES = ("xx", "yy", "zz", "xy", "yz", "xz")  # of angular velocities: columns of Oe
 UNEVEN_RTOL = 1e-6  # share of Oe1 below which its asymmetry is round-off of the writer
@@ -114,7 +117,7 @@ def _node(marker: Marker, K: dict[str, Array]) -> dict[str, Taylor]:
     }
 
 
-def from_invariants(found: dict[str, Array], M: Array) -> dict[str, Any]:
+def from_invariants(found: dict[str, Array], M: Array) -> tuple[Array, Array, Array]:
     """S, Ibar_kl and S_kl from `invariants`, of which files may lack some, and the mass M (r, r).
 
     Inv4 and Inv5 are parts of Inv8 and Inv9. What none of them says is zero, but the trace of S_kl
@@ -127,7 +130,7 @@ def from_invariants(found: dict[str, Array], M: Array) -> dict[str, Any]:
     X, S = _turned(X, found.get("Inv4")), _turned(S, found.get("Inv5"))
     S = 0.5 * (S + S.transpose(1, 0, 3, 2))
     S = S + eye[..., None] * (M - np.einsum("aakl->kl", S)) / 3
-    return {"S": found.get("Inv3", np.zeros((3, r))), "Ibar_kl": X, "S_kl": S}
+    return found.get("Inv3", np.zeros((3, r))), X, S
 
 
 def _turned(A: Array, wanted: Array | None) -> Array:
@@ -136,40 +139,26 @@ def _turned(A: Array, wanted: Array | None) -> Array:
 
 
 def body_of(
-    name: str,
-    rigid: tuple[float, Array, Array],
-    found: dict[str, Array],
-    matrices: tuple[Array, ...],
-    nodes: dict[str, tuple[Array, Array, Array]],
-    **more: Any,
+    name: str, rigid: Rigid, found: dict[str, Array], *matrices: Array, nodes: Nodes, **more: Any
 ) -> FlexibleBody:
-    """The body of another program's file, in SI, if its matrices are symmetric and have a sign.
+    """The body of a file of another program, in SI, by `invariants` and (r, r) matrices K, D, M.
 
-    By mass, first moment (3,), inertia (3, 3); `invariants`; stiffness, mass, damping (r, r); point
-    (3,), translation and rotation (3, r) of the interfaces; and other fields.
+    Raises:
+        QualityGateError: if a matrix is not symmetric, or negative, or there is no mass.
     """
-    names = ("stiffness", "modal mass", "damping", "inertia", "mass")
+    names = ("stiffness", "damping", "modal mass", "inertia", "mass")
     for what, A in zip(names, (*matrices, rigid[2], np.eye(1) * rigid[0]), strict=True):
         symmetric(f"the {what}", A, UNEVEN_RTOL)
         lowest, size = np.linalg.eigvalsh(A).min(initial=np.inf), np.abs(A).max(initial=0.0)
         if lowest < -UNEVEN_RTOL * size or (lowest <= 0.0 and what.endswith("mass")):
             text = f"the {what} must be positive, but has the eigenvalue {lowest:.3g}."
             raise QualityGateError(text, hint="Look which motion has none, or less.")
-    K, M, D, inertia = (0.5 * (A + A.T) for A in (*matrices, rigid[2]))
-    lam = eigh(K, M, eigvals_only=True) if len(K) else np.zeros(0)
-    return FlexibleBody(
-        name=name,
-        mass=rigid[0],
-        first_moment=rigid[1],
-        inertia=inertia,
-        **from_invariants(found, M),
-        K=K,
-        D=D,
-        markers={label: _marker(label, *node) for label, node in nodes.items()},
-        omega=np.sqrt(np.maximum(lam, 0.0)),
-        reference=FILE_FRAME,
-        **{"labels": tuple(f"mode {k + 1}" for k in range(len(K)))} | more,
-    )
+    K, D, M, inertia = (0.5 * (A + A.T) for A in (*matrices, rigid[2]))
+    omega = np.sqrt(np.maximum(eigh(K, M, eigvals_only=True), 0.0)) if len(K) else np.zeros(0)
+    integrals = *rigid[:2], inertia, *from_invariants(found, M)
+    markers = {label: rigid_marker(label, *node) for label, node in nodes.items()}
+    more = {"labels": tuple(f"mode {k + 1}" for k in range(len(K)))} | more
+    return FlexibleBody(name, *integrals, K, D, markers, omega, reference=FILE_FRAME, **more)
 
 
 def sid_body(record: StandardInput) -> FlexibleBody:
@@ -185,24 +174,17 @@ def sid_body(record: StandardInput) -> FlexibleBody:
     b, r = record.blocks, record.n_modes
     Me, Oe1, Cr1 = b["Me"].M0, first(b["Oe"], r), first(b["Cr"], r)
     _check_inertia(record, Me, Oe1)
-    found = {
-        "Inv3": b["Ct"].M0.T,
-        "Inv8": 0.5 * by_mode(b["Gr"].M0).swapaxes(0, 1),
-        "Inv5": 0.5 * (Cr1 - Cr1.swapaxes(0, 1)).transpose(2, 0, 1),
-        "Inv9": np.zeros((3, r, r, 3)),
-    }
+    B = np.zeros((3, r, r, 3))
     for k, (a, c) in enumerate(PRODUCTS):
-        for at in ((a, ..., c), (c, ..., a)):
-            found["Inv9"][at] += 0.5 * Oe1[..., k]
-    return body_of(
-        record.name,
-        (record.mass, b["mdCM"].M0[:, 0], b["J"].M0),
-        found,
-        (b["Ke"].M0, Me, b["De"].M0),
-        {n: (at["origin"].M0[:, 0], at["phi"].M0, at["psi"].M0) for n, at in record.nodes.items()},
-        labels=record.coordinates,
-        provenance={"from": record.title},
-    )
+        B[a, ..., c] += 0.5 * Oe1[..., k]
+        B[c, ..., a] += 0.5 * Oe1[..., k]
+    C, cross = by_mode(b["Gr"].M0).swapaxes(0, 1), (Cr1 - Cr1.swapaxes(0, 1)).transpose(2, 0, 1)
+    found = {"Inv3": b["Ct"].M0.T, "Inv8": 0.5 * C, "Inv5": 0.5 * cross, "Inv9": B}
+    rigid = record.mass, b["mdCM"].M0[:, 0], b["J"].M0
+    nodes = {name: (node["origin"].M0[:, 0], node["phi"].M0, node["psi"].M0)
+             for name, node in record.nodes.items()}  # fmt: skip
+    told = {"labels": record.coordinates, "provenance": {"from": record.title}}
+    return body_of(record.name, rigid, found, b["Ke"].M0, b["De"].M0, Me, nodes=nodes, **told)
 
 
 def _check_inertia(record: StandardInput, Me: Array, Oe1: Array) -> None:
@@ -228,9 +210,3 @@ def _check_inertia(record: StandardInput, Me: Array, Oe1: Array) -> None:
             "another mass than that of Me.",
             hint="Export without geometric stiffness; rom.read_sid gives the blocks as they are.",
         )
-
-
-def _marker(name: str, point: Array, translation: Array, rotation: Array) -> Marker:
-    lever = -np.einsum("abc,b->ac", EPS, point)
-    hold = np.block([[np.eye(3), lever, translation], [np.zeros((3, 3)), np.eye(3), rotation]])
-    return Marker(name, point, translation, rotation, "rbe2", hold)
