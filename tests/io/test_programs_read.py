@@ -7,6 +7,7 @@ the blocks of tests/joints/modal/wallrapp/rotordynamics.fem agree with each othe
 import base64
 import io
 import json
+import warnings
 import zipfile
 from dataclasses import replace
 
@@ -20,7 +21,7 @@ from cases.files.damage import changed
 from cases.mbs.mechanisms import random_body, simulate_quietly
 from cases.refusals import refuses
 from cases.solid import block, reduced
-from rom.errors import FileFormatError, QualityGateError, RomWarning, UnsafeFileError
+from rom.errors import FileFormatError, ModelError, QualityGateError, RomWarning, UnsafeFileError
 from rom.io.export import read_body
 from rom.io.programs.exudyn import DATA_PATTERN
 from rom.io.sid.body import invariants
@@ -71,6 +72,24 @@ def test_stiffening_comes_back_but_not_that_of_shapes(tmp_path):
     for load, A in kept.items():
         assert_array_equal(back.K_geo[load], A, err_msg=load)
     back.second_order()  # takes all of them
+    text = path.read_text()
+    number = f"{some['omega_x^2'][0, 3]:.16e}"
+    path.write_text(text.replace(number, f"{some['omega_x^2'][0, 3] * (1 + 1e-8):.16e}", 1))
+    A = read_body(path).K_geo["omega_x^2"]
+    assert_array_equal(A, A.T)
+    assert_allclose(A, some["omega_x^2"], rtol=1e-8)
+
+
+def test_invariants_that_are_parts_of_others_may_be_missing(tmp_path):
+    """Inv8 has all of Inv4, Inv9 all of Inv5."""
+    body = random_body(np.random.default_rng(4))
+    path = rom.export(body, tmp_path / "b.fem")
+    head, *groups = path.read_text().split("** RECORD GROUP ")
+    kept = [group for group in groups if not group.startswith(("15,", "17,"))]
+    path.write_text("** RECORD GROUP ".join([head, *kept]))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert_same(read_body(path), body)
 
 
 def test_the_surface_of_a_module_comes_back(tmp_path):
@@ -143,6 +162,18 @@ def test_lumped_masses_give_all_integrals(tmp_path):
     assert_array_equal(body.markers["17"].rotation[:, 0], [0, 0, 3])
 
 
+def test_a_line_of_masses_has_no_free_motion(tmp_path):
+    """As beams of MBDyn: they turn about themselves without inertia.
+
+    With its hook at rest the other mass goes (0, 1/2, -1) q: 4 kg (1/4 + 1).
+    """
+    line = GROUPS | {6: "Y\n0\n0", 7: "Z\n0\n0", 9: "MASS\n3", 11: "M\n2 2 2 0 0 0\n4 4 4 0 0 0"}
+    body = read(tmp_path, line)
+    assert_allclose(np.diag(body.inertia), [0, 2, 2])
+    refuses(ModelError, "a motion of the body has .*no mass", body.frequencies)
+    assert_allclose(body.frequencies(fixed=("hook",)), np.sqrt(100 / 5) / (2 * np.pi))
+
+
 def test_inertia_as_a_whole_replaces_that_of_lumped_masses(tmp_path):
     lumped, body = read(tmp_path), read(tmp_path, GROUPS | {12: RIGID})
     assert body.mass == 7.0
@@ -156,13 +187,13 @@ def test_inertia_as_a_whole_replaces_that_of_lumped_masses(tmp_path):
 def test_without_lumped_masses_and_invariants_shapes_have_no_momentum(tmp_path):
     """As the modal joint takes it: of the body the rigid inertia, of the shape the modal mass."""
     alone = {k: words for k, words in GROUPS.items() if k != 11} | {12: RIGID}
-    with pytest.warns(RomWarning, match="no Inv3, Inv4, Inv8, Inv5, Inv9"):
+    with pytest.warns(RomWarning, match="no Inv3, Inv8, Inv9;"):
         body = read(tmp_path, alone)
     assert not body.S.any() and not body.Ibar_kl.any() and body.mass == 7.0
     assert_allclose(body.S_kl[..., 0, 0], 1.9 * np.eye(3))
     # those of the invariants 3, 4 and 8, as for another program
     some = alone | {14: "I3\n1\n2\n3", 15: "I4\n0.1\n0.2\n0.3", 16: "I8\n9 1 2\n3 8 4\n5 6 7"}
-    with pytest.warns(RomWarning, match="no Inv5, Inv9;"):
+    with pytest.warns(RomWarning, match="no Inv9;"):
         body = read(tmp_path, some)
     found = invariants(body)
     assert_allclose(found["Inv3"][:, 0], [1, 2, 3])
@@ -189,6 +220,7 @@ def test_habits_of_other_writers_are_read(tmp_path):
         lambda t: t.replace("REV0 2 1 0 0 0", "any 2 0 1 1 1")  # the first is rejected
                    .replace("# 1\n", "# 0\n9 9 9 9 9 9\n9 9 9 9 9 9\n** # 1\n"),
         lambda t: t.replace("\n", "\r\n"),
+        lambda t: t.replace("** comment", "revision, 7 nodes"),  # any line, but one
     ):  # fmt: skip
         assert_same(read(tmp_path, change=change), expected)
     with pytest.warns(RomWarning, match="amplitudes at the start"):
@@ -295,7 +327,8 @@ def test_data_of_a_module_that_belong_to_no_body_are_refused(tmp_path):
     refused(FileFormatError, "inertia", inertia=None)
     refused(FileFormatError, "not finite", S=np.array([np.nan]))
     refused(FileFormatError, "cannot reshape", mPhitTPsi=np.zeros((3, 3)))
-    refused(FileFormatError, "not those of its names", triangles=np.array([[1, 2, 900]]))
+    refused(FileFormatError, "not those of its names", triangles=np.array([[12, 13, 900]]))
+    refused(FileFormatError, "not those of its names", triangles=np.array([[1, 2, 3]]))
     refused(FileFormatError, "not those of its names", names=b'["a", "a"]')
     refused(FileFormatError, "no module for Exudyn", names=b'["a"')
     refused(UnsafeFileError, "type", K=np.array([{}, 1], dtype=object))

@@ -168,9 +168,7 @@ def _body(name: str, names: list[str], found: dict[str, Array]) -> FlexibleBody:
     stars = zip(names, X[:n].reshape(-1, 6, 3), shapes[:n].reshape(-1, 6, 3, r), strict=True)
     known = {
         "Inv3": found["mPhitTPsi"].reshape(3, r),
-        "Inv4": -found["mXRefTildePsi"].reshape(3, r),
         "Inv8": found["mXRefTildePsiTilde"].reshape(3, r, 3),
-        "Inv5": -found["mPsiTildePsi"].reshape(r, 3, r).swapaxes(0, 1),
         "Inv9": -found["mPsiTildePsiTilde"].reshape(r, 3, r, 3).swapaxes(0, 1),
     }
     rigid = mass, mass * found["centerOfMass"].reshape(3), found["inertia"].reshape(3, 3)

@@ -176,7 +176,7 @@ def _numbers(words: dict[int, list[str]], n_bytes: int) -> dict[int, Array]:
 def _inertia(found: dict[int, Array]) -> tuple[Rigid, dict[str, Array]]:
     """Mass, first moment, inertia; and invariants."""
     known = {name: found[group] for group, name in enumerate(INVARIANTS, 14) if group in found}
-    lacking = ", ".join(name for name in INVARIANTS if name not in known)
+    lacking = ", ".join(name for name in ("Inv3", "Inv8", "Inv9") if name not in known)
     need(11 in found or 12 in found, "neither record group 11 nor 12 says the mass of the body")
     need(11 not in found or not known, "it has lumped masses and invariants of others")
     if 11 in found:

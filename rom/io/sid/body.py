@@ -125,9 +125,8 @@ def from_invariants(found: dict[str, Array], M: Array) -> tuple[Array, Array, Ar
     """
     eye, r = np.eye(3)[..., None], len(M)
     C, B = found.get("Inv8", np.zeros((3, r, 3))), found.get("Inv9", np.zeros((3, r, r, 3)))
-    X = 0.5 * eye * np.einsum("aja->j", C) - C.transpose(2, 0, 1)
-    S = B.transpose(3, 0, 1, 2) - 0.5 * eye[..., None] * np.einsum("ajka->jk", B)
-    X, S = _turned(X, found.get("Inv4")), _turned(S, found.get("Inv5"))
+    X = _turned(0.5 * eye * np.einsum("aja->j", C) - C.transpose(2, 0, 1), found.get("Inv4"))
+    S = _turned(B.transpose(3, 0, 1, 2), found.get("Inv5"))
     S = 0.5 * (S + S.transpose(1, 0, 3, 2))
     S = S + eye[..., None] * (M - np.einsum("aakl->kl", S)) / 3
     return found.get("Inv3", np.zeros((3, r))), X, S
