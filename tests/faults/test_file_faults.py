@@ -10,9 +10,8 @@ from scipy.io import mmwrite
 from scipy.sparse import random as random_matrix
 
 import rom
-from cases.files.abaqus_text import write_abaqus_matrix
 from cases.files.damage import ARCHIVES, damaged, outcome
-from cases.files.decks import BY_HAND, DECK, IM, RE, X, binary, dataset
+from cases.files.decks import BY_HAND, DECK, IM, RE, X, binary, dataset, write_abaqus_matrix
 from cases.files.toml_files import ALL, CRANK, PENDULUM, SOLID
 from cases.mbs.mechanisms import random_body
 from cases.paths import TESTS

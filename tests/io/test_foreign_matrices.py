@@ -14,8 +14,7 @@ from scipy.io import loadmat, mmread, mmwrite
 from scipy.sparse import csr_matrix
 
 import rom
-from cases.files.abaqus_text import write_abaqus_matrix
-from cases.files.decks import DECK
+from cases.files.decks import DECK, write_abaqus_matrix
 from cases.paths import TESTS
 from cases.refusals import refuses
 from cases.solid import block, reduced

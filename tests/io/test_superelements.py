@@ -12,7 +12,7 @@ from scipy.linalg import eigh
 from scipy.sparse import csc_matrix, csr_matrix, tril
 
 import rom
-from cases.files.abaqus_text import write_abaqus_matrix
+from cases.files.decks import write_abaqus_matrix
 from cases.refusals import refuses
 from cases.solid import block
 from cases.structures.frames import Section, frame

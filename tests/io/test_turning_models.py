@@ -15,7 +15,7 @@ from scipy.io import mmwrite
 from scipy.sparse import block_diag, csr_matrix, diags
 
 import rom
-from cases.files.abaqus_text import write_abaqus_matrix
+from cases.files.decks import write_abaqus_matrix
 from cases.refusals import refuses
 from cases.structures.frames import Section, cantilever, frame, interface, plate
 from rom.eigen.verbs import mean_motion

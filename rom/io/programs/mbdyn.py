@@ -180,12 +180,7 @@ def _inertia(found: dict[int, Array]) -> tuple[Rigid, dict[str, Array]]:
     need(11 in found or 12 in found, "neither record group 11 nor 12 says the mass of the body")
     need(11 not in found or not known, "it has lumped masses and invariants of others")
     if 11 in found:
-        m, J, shapes, turns = (
-            found[11][:, :3],
-            found[11][:, 3:],
-            found[8][..., :3],
-            found[8][..., 3:],
-        )
+        (m, J), (shapes, turns) = np.split(found[11], 2, axis=1), np.split(found[8], 2, axis=2)
         alike = found[11].min() >= 0 and np.ptp(m, axis=1).max() <= LUMPED_RTOL * m.max()
         need(alike, "lumped masses must be positive, and the same along x, y and z")
         part = point_integrals(found[5], m[:, 0], shapes.reshape(len(shapes), -1).T)
