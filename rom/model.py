@@ -23,6 +23,7 @@ Mask = npt.NDArray[np.bool_]
 Integers = npt.NDArray[np.integer[Any]]
 Numbers = TypeVar("Numbers", Array, Index)
 BUCKLING_LOADS = "buckling loads"  # in the provenance of a body, see `rom.body.prestress`
+FILE_FRAME = "as in its file"  # the reference condition of a body from another program
 OWN_FRAME = "frame of the body"  # the marker that is the frame a body was given in
 
 

@@ -6,9 +6,9 @@ import numpy as np
 from scipy.linalg import eigh
 
 from rom.body.nonlinear.quartic import Quartic
-from rom.body.records import Body, Marker
+from rom.body.records import Body
 from rom.body.recovery import StressRecovery
-from rom.body.reference import MEAN_AXES, moved_frame, reference_motion
+from rom.body.reference import MEAN_AXES, moved_frame, reference_motion, rigid_marker
 from rom.body.stiffening import SecondOrder, moved_stiffening, recombined_stiffening
 from rom.eigen.verbs import Operators, own_points, rigid_motions
 from rom.errors import ConfigError, ModelError
@@ -24,9 +24,7 @@ def on_mean_axes(body: Body) -> Body:
         return body
     if OWN_FRAME in body.markers:
         raise ConfigError(f"body {body.name!r}: an interface {OWN_FRAME!r} needs another name.")
-    still = np.zeros((3, body.n_modes))
-    hold = np.hstack([np.eye(6), np.zeros((6, body.n_modes))])
-    own = Marker(OWN_FRAME, np.zeros(3), still, still, "rbe2", hold)
+    own = rigid_marker(OWN_FRAME, np.zeros(3), *np.zeros((2, 3, body.n_modes)))
     framed = replace(body, markers=body.markers | {OWN_FRAME: own})
     return moved_to(framed, "mean-axis")
 

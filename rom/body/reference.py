@@ -48,9 +48,16 @@ def reference_motion(body: BodyData, reference: object) -> Array:
     return np.linalg.solve(from_rigid, from_shapes)
 
 
+def rigid_marker(name: str, point: Array, translation: Array, rotation: Array) -> Marker:
+    """An interface that is rigid: its six coordinates are its motion."""
+    rigid = np.block([[np.eye(3), -skew(point)], [np.zeros((3, 3)), np.eye(3)]])
+    hold = np.hstack([rigid, np.vstack([translation, rotation])])
+    return Marker(name, point, translation, rotation, "rbe2", hold)
+
+
 def marker_motion(marker: Marker, r: int) -> tuple[Array, Array]:
     """The six motions of a marker under rigid motions and under the shapes."""
-    rigid = np.block([[np.eye(3), -skew(marker.point)], [np.zeros((3, 3)), np.eye(3)]])
+    rigid = rigid_marker(marker.name, marker.point, *np.zeros((2, 3, 0))).hold
     return rigid, motion_of(marker).reshape(6, r)
 
 

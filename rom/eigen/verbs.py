@@ -364,7 +364,10 @@ def modes_within(N: Array, K: Array, M: Array) -> tuple[Array, Array]:
 
     Among the motions N (k, m) alone, which constraints leave, in units of any kind.
     """
-    lam, V = eigh(N.T @ K @ N, N.T @ M @ N)
+    try:
+        lam, V = eigh(N.T @ K @ N, N.T @ M @ N)
+    except np.linalg.LinAlgError:
+        raise massless("the body") from None
     return lam, N @ V
 
 

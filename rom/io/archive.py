@@ -24,10 +24,11 @@ MATRIX_ADVICE = (
 READER_ADVICE = {  # ending: what reads such a file
     **dict.fromkeys(".geo .msh .step .stp .brep .inp .bdf .cdb .med .py".split(), MESH_ADVICE),
     **dict.fromkeys(
-        (".op4", ".mtx", ".mm", ".pch", ".dmig", ".dat", ".sti", ".mas"), MATRIX_ADVICE
+        ".op4 .mtx .mm .pch .dmig .dat .sti .mas .op2 .full .mnf".split(), MATRIX_ADVICE
     ),
     **dict.fromkeys((".unv", ".uff"), "rom.io.read_responses and rom.io.read_modes read tests."),
     ".sid_fem": "rom.read_sid reads its blocks; rom export FILE.SID_FEM BODY.rom.npz makes a body.",
+    ".fem": "rom export FILE.fem BODY.rom.npz makes a body of one of MBDyn.",
     ".toml": "rom.read_mechanism reads mechanisms, rom.read_component reads components.",
 }
 MAX_BYTES = 4 * 1024**3  # that the arrays may have in memory before reading is refused
@@ -78,7 +79,7 @@ def read_archive(
                     f"the file lacks the array {named(missing)} of its manifest.",
                     hint="It may have been changed after writing; write or copy it again.",
                 )
-            arrays = {name: _read(archive, name) for name in sorted(digests)}
+            arrays = {name: read_array(archive, name) for name in sorted(digests)}
     except (zipfile.BadZipFile, OSError, EOFError, KeyError, RuntimeError) as e:
         cut = "It may have been cut in a transfer; write or copy it again."
         hint, what = READER_ADVICE.get(path.suffix.lower(), cut), f"a complete {kind.what} ({e})"
@@ -121,15 +122,15 @@ def refuse_hostile(archive: zipfile.ZipFile, limit: int, hint: str = LARGER_HINT
             raise UnsafeFileError(f"the member {name[:60]!r} leads elsewhere.")
 
 
-def _read(archive: zipfile.ZipFile, name: str) -> Array:
+def read_array(archive: zipfile.ZipFile, name: str) -> Array:
     """One array; the header is compared with the size of the member before memory is taken."""
     info = archive.getinfo(f"{name}.npy")
     try:
         with archive.open(info) as member:
             if npy.read_magic(member) == (1, 0):
-                shape, fortran, dtype = npy.read_array_header_1_0(member)
+                shape, _, dtype = npy.read_array_header_1_0(member)
             else:
-                shape, fortran, dtype = npy.read_array_header_2_0(member)
+                shape, _, dtype = npy.read_array_header_2_0(member)
     except (ValueError, SyntaxError, TypeError, TokenError) as error:
         raise FileFormatError(f"the array {name!r} has a broken header.") from error
     if dtype.str not in ("<f8", "<i8", "|u1"):
@@ -137,7 +138,7 @@ def _read(archive: zipfile.ZipFile, name: str) -> Array:
             f"the array {name!r} has the type {dtype.str}; such a file holds 8-byte numbers."
         )
     n_bytes = int(np.prod(shape, dtype=object)) * dtype.itemsize
-    if fortran or n_bytes > info.file_size:
+    if n_bytes > info.file_size:
         raise UnsafeFileError(
             f"the array {name!r} claims {n_bytes} bytes but has {info.file_size}."
         )
@@ -149,7 +150,7 @@ def _read_manifest(archive: zipfile.ZipFile, kind: Kind) -> dict[str, Any]:
     if "manifest.npy" not in archive.namelist():
         raise FileFormatError(f"this archive is not a {kind.what}: it has no manifest.")
     try:
-        manifest = json.loads(_read(archive, "manifest").tobytes())
+        manifest = json.loads(read_array(archive, "manifest").tobytes())
         schema, (major, minor) = manifest["schema"], manifest["version"]
     except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise FileFormatError(f"the manifest cannot be read: {error}.") from error

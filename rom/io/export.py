@@ -13,9 +13,9 @@ from rom.io.matrices.dmig import write_dmig
 from rom.io.matrices.op4 import write_op4
 from rom.io.matrices.user_element import write_user_element
 from rom.io.native import load, save
-from rom.io.programs.exudyn import write_exudyn
+from rom.io.programs.exudyn import read_exudyn, write_exudyn
 from rom.io.programs.interface_form import InterfaceForm, interface_form
-from rom.io.programs.mbdyn import write_mbdyn
+from rom.io.programs.mbdyn import read_mbdyn, write_mbdyn
 from rom.io.programs.openfast import write_openfast
 from rom.io.programs.superelements import write_radioss, write_simscape
 from rom.io.sid.body import sid_body, standard_input
@@ -24,6 +24,11 @@ from rom.io.sid.format import write_sid
 from rom.model import Array
 
 SID_SUFFIX = ".sid_fem"
+READERS: dict[str, Callable[[str | Path], FlexibleBody]] = {  # ending: reader
+    SID_SUFFIX: lambda path: sid_body(read_sid(path)),
+    ".fem": read_mbdyn,
+    ".py": read_exudyn,
+}
 HOLDING_FORMATS = ("openfast", "openfast-4")  # formats with one free interface
 
 
@@ -131,13 +136,16 @@ def format_of(path: str | Path, to: str | None = None) -> str:
 
 
 def read_body(path: str | Path) -> FlexibleBody:
-    """A body from the native file, or from Standard Input Data without geometric stiffness.
+    """A body from the native file, or that of another program, by the ending of the path.
+
+    Args:
+        path: ``.npz``, ``.SID_FEM`` for Standard Input Data without geometric stiffness, ``.fem``
+            for the modal joint of MBDyn, ``.py`` for a module for Exudyn that rom has written.
 
     Raises:
         ConfigError: if Standard Input Data contain geometric stiffness.
         FileFormatError: if the file is missing, cut, or not what its ending promises.
+        QualityGateError: if its numbers are not those of a body.
     """
-    if Path(path).suffix.lower() == SID_SUFFIX:
-        with in_file(path):
-            return sid_body(read_sid(path))
-    return load(path)
+    with in_file(path):
+        return READERS.get(Path(path).suffix.lower(), load)(path)

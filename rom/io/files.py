@@ -1,6 +1,5 @@
 """Files are written whole or not at all, and looked at before they are read."""
 
-import math
 import os
 import secrets
 import shutil
@@ -13,6 +12,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import IO, Any
 
+from rom.decks.lines import real
 from rom.errors import ConfigError, FileFormatError, ResourceError
 from rom.names import MAX_FILE_NAME_BYTES, TEMPORARY_BYTES
 from rom.readable import MAX_FILE_BYTES as MAX_FILE_BYTES
@@ -104,13 +104,9 @@ def need(holds: object, otherwise: str) -> None:
 
 
 def number(text: str) -> float:
-    """A finite number, its exponent with E or D; else a ValueError, for `damaged`."""
-    try:
-        value = float(text.upper().replace("D", "E"))
-    except ValueError:
-        value = math.nan
-    need(math.isfinite(value), f"{text.strip()[:40]!r} is no finite number")
-    return value
+    """A finite number, its exponent with E, D or sign; else a ValueError, for `damaged`."""
+    need(text.strip(), "'' is no finite number")
+    return real(text)
 
 
 def check_writable(path: str | Path) -> Path:

@@ -4,6 +4,7 @@ import io
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property, partial
+from operator import attrgetter, itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from rom.names import csv_cell, offered
 AXIS_LETTERS = ("x", "y", "z")
 QUATERNION_PARTS = ("p0", "p1", "p2", "p3")
 DIMENSION_NAMES = {AXIS_LETTERS: "axis", QUATERNION_PARTS: "quaternion"}  # of data sets
+FORCE, MOMENT = itemgetter(np.s_[:, :3]), itemgetter(np.s_[:, 3:])
 ENERGIES = ("kinetic", "strain", "potential", "drives", "forces", "damping", "total")
 
 
@@ -111,8 +113,8 @@ def channels(solution: Any) -> Iterator[Channel]:
         yield from _of_body(solution, name, part)
     for joint in sorted(set(solution.packed.row_owner)):
         place, loads = ("joints", joint), cache(partial(solution.reaction, joint))
-        yield Channel((*place, "force"), "N", AXIS_LETTERS, partial(_cut, loads, slice(3)))
-        yield Channel((*place, "moment"), "N m", AXIS_LETTERS, partial(_cut, loads, slice(3, None)))
+        yield Channel((*place, "force"), "N", AXIS_LETTERS, partial(_got, loads, FORCE))
+        yield Channel((*place, "moment"), "N m", AXIS_LETTERS, partial(_got, loads, MOMENT))
         known = solution.mechanism.joints.get(joint)
         if known is None or known.coordinate is None:
             continue
@@ -121,7 +123,7 @@ def channels(solution: Any) -> Iterator[Channel]:
         for what, row, unit in (angle, way):
             if row is not None:
                 for told, per in ((what, ""), (f"{what} rate", "/s")):
-                    take = partial(_told, motion, told.replace(" ", "_"))
+                    take = partial(_got, motion, attrgetter(told.replace(" ", "_")))
                     yield Channel((*place, told), f"{unit}{per}", ("",), take)
     for element in solution.elements:
         place, found = ("elements", element), solution.element(element)
@@ -136,20 +138,15 @@ def channels(solution: Any) -> Iterator[Channel]:
         )
     for name in ENERGIES:
         energy = partial(getattr, solution, "energy")
-        yield Channel(("energy", name), "J", ("",), partial(_told, energy, name))
+        yield Channel(("energy", name), "J", ("",), partial(_got, energy, attrgetter(name)))
 
 
-def _cut(take: Callable[[], Array], columns: slice) -> Array:
-    return take()[:, columns]
+def _got(take: Callable[[], Any], part: Callable[[Any], Array]) -> Array:
+    return part(take())
 
 
 def _thinned(channel: Channel, rows: slice, n: int) -> Array:
     return channel.values[rows].reshape(n, -1)
-
-
-def _told(of: Callable[[], Any], name: str) -> Array:
-    values: Array = getattr(of(), name)
-    return values
 
 
 def asked(solution: Any, names: Sequence[str]) -> list[Channel]:

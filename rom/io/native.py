@@ -22,7 +22,7 @@ from rom.body.records import Marker, Patch, Surface
 from rom.body.recovery import StressRecovery
 from rom.errors import ConfigError, FileFormatError, QualityGateError, in_file
 from rom.io.archive import MAX_BYTES, Kind, read_archive, stated, write_archive
-from rom.model import Array, Report, Row
+from rom.model import FILE_FRAME, Array, Report, Row
 from rom.names import named
 from rom.units import SYSTEMS
 
@@ -34,7 +34,7 @@ SURFACE_ARRAYS = ("points", "triangles", "shape")
 QUARTIC_ARRAYS = ("cubic", "quartic")
 SIX_KINDS = ("rbe2", "rbe3")  # interfaces of six coordinates
 KINDS = (*SIX_KINDS, "full", "polynomial", "fourier", "snapshots", "characteristic")
-FRAMES = ("mean-axis", "buckens", "as in its SID")  # beside interfaces, pins and 3-2-1
+FRAMES = ("mean-axis", "buckens", FILE_FRAME, "as in its SID")  # beside interfaces, pins and 3-2-1
 LIMIT_DIGITS = 1e-5  # to which limits are written
 CAUCHY_ARRAYS = ("points", "gradient", "stiffness", "node", "material", "share")
 

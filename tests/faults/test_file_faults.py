@@ -11,7 +11,7 @@ from scipy.sparse import random as random_matrix
 
 import rom
 from cases.files.damage import ARCHIVES, damaged, outcome
-from cases.files.decks import BY_HAND, DECK, IM, RE, X, binary, dataset
+from cases.files.decks import BY_HAND, DECK, IM, RE, X, binary, dataset, write_abaqus_matrix
 from cases.files.toml_files import ALL, CRANK, PENDULUM, SOLID
 from cases.mbs.mechanisms import random_body
 from cases.paths import TESTS
@@ -36,7 +36,7 @@ def market(folder, **how):
 
 def abaqus(folder):
     dofs = np.column_stack([np.repeat([3, 9], 3), np.tile([1, 2, 3], 2)])
-    return rom.io.write_abaqus_matrix(np.eye(6) + 1.0, dofs, folder / "m.mtx").read_bytes()
+    return write_abaqus_matrix(np.eye(6) + 1.0, dofs, folder / "m.mtx").read_bytes()
 
 
 def exported(to, held=(), body=lambda: reduced(2, block(cells=(2, 1, 1)))):
@@ -57,6 +57,10 @@ TEXTS = {  # case: (file name, its content, reader)
     "sid": ("x.SID_FEM", sid("sid"), lambda path: rom.read_sid(path, ge="as_written")),
     "sid-pysid": ("x.SID_FEM", sid("sid-pysid"), rom.io.read_body),
     "sid-geisler": ("x.sid_fem", sid("sid-geisler"), rom.io.read_body),
+    "mbdyn": ("x.fem", exported("mbdyn", body=lambda: random_body(np.random.default_rng(1), r=2)),
+              rom.io.read_body),
+    "exudyn": ("x.py", exported("exudyn", body=lambda: random_body(np.random.default_rng(1), r=2)),
+               rom.io.read_body),
     "op4 text": ("x.op4", whole("dense.op4"), rom.io.read_op4),
     "op4 sparse": ("x.op4", whole("nonbigmat_text.op4"), rom.io.read_op4),
     "op4 long": ("x.op4", whole("bigmat_text.op4"), rom.io.read_op4),
@@ -90,7 +94,8 @@ TEXTS = {  # case: (file name, its content, reader)
 
 COMPLETE = {  # case: bytes at the end that no reader needs
     "body": 0, "family": 0, "state": 0,
-    "sid": 1, "sid-pysid": 1, "sid-geisler": 1, "op4 text": 24, "op4 sparse": 24, "op4 long": 24,
+    "sid": 1, "sid-pysid": 1, "sid-geisler": 1, "mbdyn": 0,
+    "op4 text": 24, "op4 sparse": 24, "op4 long": 24,
     "op4 binary": 0, "op4 binary sparse": 0, "op4 binary long": 0, "market": 0, "market dense": 0,
     "user element of a body": 0, "substructure": 0, "openfast": 22, "openfast-4": 22,
     "stiffness": 0, "labels": 0,

@@ -1,5 +1,7 @@
 """Superelements of OpenFAST: each block obeys its identities, and files come back or are named."""
 
+import re
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -154,6 +156,10 @@ def test_a_table_with_waves_is_read(tmp_path):
     assert_array_equal(found.t, [0.0, 0.5, 1.0])
     assert_array_equal(found.loads[:, 5], [6, 7, 8])
     assert_array_equal(found.elevation, [0.1, 0.2, 0.3])
+    path.write_text(re.sub(r" 0.[123]\n", "\n", BY_HAND))
+    found = read_openfast(path)
+    assert_array_equal(found.loads[:, 5], [6, 7, 8])
+    assert_array_equal(found.elevation, np.zeros(3))
 
 
 DIMENSION, DIAGONAL = "!Dimension:                         6", "2.5 0 0 0 0 0\n"

@@ -28,8 +28,11 @@ MATRIX = (
     "rom reduce {} --mass MASS --nodes NODES -i NAME=rbe2",
 )
 MESHED = "rom mesh {}", "rom modes {} --material steel"
+BODY = "rom export {} BODY.rom.npz", "rom check BODY.rom.npz"
 OTHERS = (  # endings; words of which a line begins with one, if need be; what it is, next commands
     (".step .stp", "ISO", "a part of a CAD program", "rom swing {}", "rom mesh {} --faces"),
+    (".py", "INTERFACES", "a reduced body for Exudyn", *BODY),
+    (".fem", "**/RECORD", "a reduced body of MBDyn", *BODY),
     (".geo .py", "", "a program of gmsh", *MESHED),
     (".msh", "$MESHFORMAT", "a mesh of gmsh", *MESHED),
     (".bdf .nas .dat .fem", "CTETRA CHEXA INCLUDE", "a deck of Nastran", *DECK),
@@ -42,7 +45,7 @@ OTHERS = (  # endings; words of which a line begins with one, if need be; what i
     (".unv .uff", "", "a vibration test", "rom update FAMILY {}"),
     (".json", "", "the record or the scene of a run", "rom report FOLDER"),
 )
-FIRST_WORDS = re.compile(r"^\s*([*$]?[A-Z]\w*|-1\s+2412\b)", re.MULTILINE)
+FIRST_WORDS = re.compile(r"^\s*([*$]?[A-Z]\w*|\*\* *RECORD|-1\s+2412\b)", re.M)
 BODIES = (".npz", ".sid_fem")
 
 

@@ -21,13 +21,14 @@ EXAMPLES = """\
   rom export rod.rom.npz rod.sid --to sid-geisler
   rom export jacket.rom.npz jacket.dat --to openfast --held foot
   rom export rod.SID_FEM rod.rom.npz    # and back, without geometric stiffness
+  rom export rod.fem rod.rom.npz        # from MBDyn
   rom export demos/slider_crank.toml crank.fmu --inputs motor
 """
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of the verb."""
-    parser.add_argument("file", type=Path, help="body, .rom.npz or .SID_FEM; mechanism, .toml")
+    parser.add_argument("file", type=Path, help="body, .rom.npz, .SID_FEM, .fem; or .toml")
     parser.add_argument("output", type=Path, help="file to write")
     option(parser, "--to FORMAT", "format, if the ending does not tell", str)
     option(parser, "--held NAME,...", "interfaces held, for openfast", names)

@@ -19,10 +19,10 @@ from scipy.linalg import null_space
 from rom.body.flexible import FlexibleBody
 from rom.body.inertia import InertiaIntegrals
 from rom.body.records import Marker, Surface
+from rom.body.reference import rigid_marker
 from rom.components.families.parameters import Parameter, Point, Thickness, factor
 from rom.eigen.verbs import rigid_motions
 from rom.model import Array
-from rom.rotation import skew
 
 ROUND_OFF = 1e-12  # of the largest distance from the origin: no length outside the layers
 
@@ -141,8 +141,6 @@ def _coordinates(body: FlexibleBody, R: Array, M: Array) -> Array:
 
 def _marker(marker: Marker, point: Array, R: Array, Y: Array) -> Marker:
     """A rigid face: its motion in the rigid motions about the origin, then at the point."""
-    rigid = np.block([[np.eye(3), -skew(point)], [np.zeros((3, 3)), np.eye(3)]])
+    rigid = rigid_marker(marker.name, point, *np.zeros((2, 3, 0))).hold
     motion = rigid @ np.linalg.lstsq(marker.hold @ R, marker.hold @ Y, rcond=None)[0]
-    return Marker(
-        marker.name, point, motion[:3], motion[3:], "rbe2", np.hstack([rigid, motion]), None
-    )
+    return rigid_marker(marker.name, point, motion[:3], motion[3:])

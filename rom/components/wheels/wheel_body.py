@@ -27,7 +27,7 @@ from rom.body.flexible import FlexibleBody
 from rom.body.inertia import InertiaIntegrals, fields_of, inertia_integrals
 from rom.body.records import Marker, Surface
 from rom.body.recovery import CENTRIFUGAL_LOADS
-from rom.body.reference import marker_motion
+from rom.body.reference import rigid_marker
 from rom.body.surface import one_surface
 from rom.components.wheels.faces import turned
 from rom.components.wheels.modes import CyclicModes, wheel_modes
@@ -168,9 +168,7 @@ def _from_origin(about: InertiaIntegrals, at: Array) -> InertiaIntegrals:
 def _hub(face: Interface, full: CyclicSector, r: int) -> Marker:
     """The hub as a rigid interface with its point on the axis, at rest in all shapes."""
     point = full.at + full.axis * (full.axis @ (face.origin - full.at))
-    still = np.zeros((3, r))
-    marker = Marker(face.name, point, still, still, "rbe2", np.zeros((6, 6 + r)))
-    return replace(marker, hold=np.hstack(marker_motion(marker, r)))
+    return rigid_marker(face.name, point, *np.zeros((2, 3, r)))
 
 
 def _stiffening(full: CyclicSector, F: Array, each: Turned, S_kl: Array) -> dict[str, Array]:

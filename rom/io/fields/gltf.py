@@ -92,9 +92,6 @@ def write_glb(
         path: file to write.
         up: (3,) upright direction of the world [1], which the format calls y.
         title: name of the scene.
-
-    Raises:
-        ConfigError, ResourceError: if the place is not writable, or the disk is full.
     """
     document, samplers, channels = _Document(), list[Entry](), list[Entry]()
     children = list(range(1, 1 + len(bodies)))

@@ -29,7 +29,6 @@ def write_vtu(body: FlexibleBody, path: str | Path) -> Path:
 
     Raises:
         ConfigError: if the body has no surface, or the place is not writable.
-        ResourceError: if the disk is full.
     """
     if body.surface is None:
         raise ConfigError(f"body {body.name!r} has no surface; to be drawn it needs a meshed one.")
@@ -57,7 +56,6 @@ def write_stress(
     Raises:
         ConfigError: if the stress of the body cannot be recovered, q has another length, or the
             place is not writable.
-        ResourceError: if the disk is full.
     """
     if body.stress is None or body.surface is None:
         text = f"the stress of body {body.name!r} cannot be recovered"
@@ -81,7 +79,6 @@ def write_stress_history(
 
     Raises:
         ConfigError: if the stress of the body cannot be recovered, or the place is not writable.
-        ResourceError: if the disk is full.
     """
     path = check_ending(path, "a motion", ".pvd")
     part = solution.mechanism.part(body)

@@ -74,9 +74,6 @@ def write_dmig(
         path: file to write.
         nodes: {label: (3,) position, in units of the matrices}, written as GRID cards, with the
             scalar points as SPOINT.
-
-    Raises:
-        ConfigError, ResourceError: if the place is not writable, or the disk is full.
     """
     lines = [f"$ {ORIGIN_MARK}", *_points(dofs, nodes)] if nodes else []
     for name, A in matrices.items():

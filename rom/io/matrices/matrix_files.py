@@ -33,15 +33,7 @@ from scipy.sparse import coo_matrix, csr_matrix
 
 from rom.decks.lines import whole
 from rom.errors import ConfigError, FileFormatError, UnsafeFileError, in_file
-from rom.io.files import (
-    check_last_line,
-    check_readable,
-    damaged,
-    lines_of,
-    need,
-    number,
-    write_lines,
-)
+from rom.io.files import check_last_line, check_readable, damaged, lines_of, need, number
 from rom.io.matrices.dmig import Dofs, labelled, read_dmig
 from rom.io.matrices.op4 import Matrices, read_op4
 from rom.io.matrices.user_element import read_user_element
@@ -54,6 +46,11 @@ BOEING_PATTERN = re.compile(rb"(?:[^\n]*\n){2}[RCPI][SUZHR][AE] ", re.IGNORECASE
 FIELD_PATTERN = re.compile(r"(\d*)[IDEFG](\d+)")  # of Fortran formats: how many, how wide
 SIGNS = {"general": 0.0, "symmetric": 1.0, "hermitian": 1.0, "skew-symmetric": -1.0}
 MATRIX_ENDINGS = (".sti", ".mas")
+CURES = {  # ending: what to do with what is not read
+    ".op2": "Let Nastran write DMIGPCH, or MATOP4.",
+    ".full": "Let Ansys write it by HBMAT, or by *EXPORT as Matrix Market.",
+    ".mnf": "Let the program that made it write stiffness and mass.",
+}
 LABEL_PATTERN = re.compile(r"(\d{1,18})\.([1-6])")
 REWRITE_HINT = "Let CalculiX write .sti, .mas and .dof again; they belong together."
 HEAD_BYTES = 10_000  # among which a user element is announced
@@ -99,27 +96,6 @@ def read_matrix(source: str | Path | tuple[str | Path, str]) -> NamedMatrix:
     return NamedMatrix(f"{path} {key}".strip(), csr_matrix(A), dofs.get(key))
 
 
-def write_abaqus_matrix(A: Array | csr_matrix, dofs: Dofs, path: str | Path) -> Path:
-    """Write the lower triangle of a symmetric matrix as text that ``*MATRIX INPUT`` reads.
-
-    Args:
-        A: (n, n) dense or sparse, in units of any kind.
-        dofs: (n, 2) node and component of each row.
-        path: file to write.
-
-    Raises:
-        ConfigError, ResourceError: if the place is not writable, or the disk is full.
-    """
-    found = coo_matrix(np.tril(A) if isinstance(A, np.ndarray) else A)
-    entries = zip(found.row, found.col, found.data, strict=True)
-    lines = (
-        f"{dofs[i, 0]},{dofs[i, 1]}, {dofs[j, 0]},{dofs[j, 1]}, {v:.16e}"
-        for i, j, v in entries
-        if i >= j and v
-    )
-    return write_lines(path, lines)
-
-
 def _all(path: Path) -> tuple[Matrices, dict[str, Dofs]]:
     """Matrices by name, and of those whose rows have labels these."""
     if path.suffix.lower() == ".op4":
@@ -146,7 +122,7 @@ def _pairs(path: Path) -> Mapping[str, tuple[csr_matrix, Dofs | None]]:
         raise ConfigError(
             f"{path} has the ending {ending!r}; known: .mtx, .mm, .inp, .sti, .mas, "
             ".op4, .bdf, .dat, .pch, .dmig.",
-            hint="Let Nastran write DMIGPCH, or MATOP4." if ending == ".op2" else "",
+            hint=CURES.get(ending, ""),
         )
     if ending == ".inp" or b"*USER ELEMENT" in start.upper():
         return read_user_element(path)

@@ -134,9 +134,6 @@ def write_op4(matrices: Mapping[str, Array | csr_matrix], path: str | Path) -> P
     Args:
         matrices: {name of at most 8 characters: (n, m) matrix}, in units of any kind.
         path: file to write.
-
-    Raises:
-        ConfigError, ResourceError: if the place is not writable, or the disk is full.
     """
     texts = (_written(name, csc_matrix(A)) for name, A in matrices.items())
     return write_lines(path, chain.from_iterable(texts))

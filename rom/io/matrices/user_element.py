@@ -74,9 +74,6 @@ def write_user_element(
         path: file to write.
         nodes: {label: (3,) position, in units of the matrices}; nodes without one, as those of
             modes, lie at the origin.
-
-    Raises:
-        ConfigError, ResourceError: if the place is not writable, or the disk is full.
     """
     return write_lines(path, _document(matrices, np.asarray(dofs), nodes))
 

@@ -1,4 +1,4 @@
-"""A body as a Python module for Exudyn: ``ObjectFFRFreducedOrder`` with all its arrays inside.
+"""A body as a Python module for Exudyn, and back: ``ObjectFFRFreducedOrder``, its arrays inside.
 
 The module needs NumPy and Exudyn, not rom. Its arrays are the integrals that Exudyn computes from
 finite elements, here from those of the body; x~ is the matrix of the cross product::
@@ -18,22 +18,29 @@ Source:
 import base64
 import io
 import json
+import re
 import textwrap
+import zipfile
+import zlib
 from pathlib import Path
 
 import numpy as np
 
 from rom.body.flexible import FlexibleBody
-from rom.errors import warn
-from rom.io.files import write_whole
-from rom.io.sid.body import invariants
+from rom.body.records import Surface
+from rom.errors import in_file, warn
+from rom.io.archive import MAX_BYTES, read_array, refuse_hostile
+from rom.io.files import WRONG_JSON, check_readable, damaged, need, write_whole
+from rom.io.sid.body import body_of, invariants
 from rom.model import Array, Index
 from rom.names import ORIGIN_MARK
-from rom.rotation import skew_tensor
+from rom.rotation import crossed, skew_tensor
 
 STAR_POINTS = np.vstack([np.eye(3), -np.eye(3)])  # nodes around an interface
 MOMENTUM_RTOL = 1e-9  # share of what the momentum of a shape could be
 STAR_RADIUS_RATIO = 1e-3  # of the body's size
+DATA_PATTERN = re.compile(r'_decoded\("""\n([A-Za-z0-9+/=\n]*)\n"""\)')
+WRONG_DATA = (*WRONG_JSON, zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError)
 
 MODULE_TEXT = '''\
 """A flexible body for Exudyn, {mark}.
@@ -112,14 +119,9 @@ ARRAYS = dict(np.load(io.BytesIO(_decoded("""
 
 
 def write_exudyn(body: FlexibleBody, path: str | Path) -> Path:
-    """Write a module that adds the body to an Exudyn system.
+    """Write a module that adds the body to an Exudyn system, by a name that Python can import.
 
-    Args:
-        body: any body; geometric stiffness has no place in Exudyn and is left out.
-        path: file ending in ``.py``, a name that Python can import.
-
-    Raises:
-        ConfigError, ResourceError: if the place is not writable, or the disk is full.
+    Geometric stiffness has no place in Exudyn and is left out.
 
     Warns:
         RomWarning: if the shapes move the mass centre, which gravity in Exudyn does not see.
@@ -140,6 +142,48 @@ def write_exudyn(body: FlexibleBody, path: str | Path) -> Path:
         mark=ORIGIN_MARK, stem=stem, names=_encoded(names), arrays=_encoded(memory.getvalue())
     )
     return write_whole(path, text.encode())
+
+
+def read_exudyn(path: str | Path) -> FlexibleBody:
+    """Read a module that `write_exudyn` has written, without running it; see `rom.io.read_body`."""
+    path = check_readable(path, MAX_BYTES)
+    what = "this is no module for Exudyn that rom has written"
+    with in_file(path), damaged(what, path, causes=WRONG_DATA):
+        names, data = map(base64.b64decode, DATA_PATTERN.findall(path.read_text("utf-8")))
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            refuse_hostile(archive, MAX_BYTES)
+            inside = (name.removesuffix(".npy") for name in archive.namelist())
+            found = {name: read_array(archive, name) for name in inside}
+        need(all(np.isfinite(A).all() for A in found.values()), "a number is not finite")
+        return _body(path.stem, json.loads(names), found)
+
+
+def _body(name: str, names: list[str], found: dict[str, Array]) -> FlexibleBody:
+    r, mass, n = len(found["K"]), float(found["mass"]), 6 * len(names)
+    X = found["referencePositions"].reshape(-1, 3)
+    shapes = found["modeBasis"].reshape(len(X), 3, r)
+    corners = found["triangles"].reshape(-1, 3).astype(np.int64) - n
+    fits = corners.min(initial=0) >= 0 and corners.max(initial=-1) < len(X) - n
+    need(fits and len(set(names)) == len(names), "its nodes are not those of its names")
+    stars = zip(names, X[:n].reshape(-1, 6, 3), shapes[:n].reshape(-1, 6, 3, r), strict=True)
+    known = {
+        "Inv3": found["mPhitTPsi"].reshape(3, r),
+        "Inv8": found["mXRefTildePsiTilde"].reshape(3, r, 3),
+        "Inv9": -found["mPsiTildePsiTilde"].reshape(r, 3, r, 3).swapaxes(0, 1),
+    }
+    rigid = mass, mass * found["centerOfMass"].reshape(3), found["inertia"].reshape(3, 3)
+    matrices = (found[matrix].reshape(r, r) for matrix in "KDM")
+    surface = Surface(X[n:], corners, shapes[n:].reshape(-1, r)) if len(X) > n else None
+    nodes = {name: _middle(x, u) for name, x, u in stars}
+    return body_of(name, rigid, known, *matrices, nodes=nodes, surface=surface)
+
+
+def _middle(points: Array, shapes: Array) -> tuple[Array, Array, Array]:
+    """Point (3,), translation and rotation (3, r) of six nodes around an interface."""
+    point, moved = points.mean(axis=0), shapes.mean(axis=0)
+    arms = points - point
+    turned = crossed(np.einsum("na,nbk->abk", arms, shapes - moved))
+    return point, moved, 1.5 * turned / np.square(arms).sum()
 
 
 def arrays(body: FlexibleBody) -> dict[str, Array | Index]:

@@ -20,7 +20,7 @@ import numpy.typing as npt
 from rom.arguments import symmetric
 from rom.body.flexible import FlexibleBody
 from rom.errors import ConfigError, QualityGateError, UnsafeFileError
-from rom.io.files import check_readable, damaged, need, number, numbers_line, write_lines
+from rom.io.files import Line, check_readable, damaged, need, number, numbers_line, write_lines
 from rom.io.programs.interface_form import InterfaceForm, interface_form
 from rom.model import Array
 from rom.names import ORIGIN_MARK, check_known
@@ -32,9 +32,10 @@ UNITS = {"Mass": "kg, m", "Stiffness": "N, m", "Damping": "N, m, s"}
 OLD_FORMAT_MARK = "flex 5 format"  # second line of files for versions 2.3 to 4
 HEAD_LINES = ("!dimension:", "!time increment in simulation:", "!total simulation time in file:")
 DIMENSION_LINE, STEP_LINE, DURATION_LINE = HEAD_LINES
-MATRICES = {"!mass": "M", "!stiffness": "K", "!damping": "D", "!weight stiffness": "K_W"}
 WEIGHT_LINE, LOADING_LINE = "!weight constant", "!loading and wave elevation"
-KEYWORDS = (*HEAD_LINES, *MATRICES, WEIGHT_LINE, LOADING_LINE)
+BLOCKS = {"!mass": "M", "!stiffness": "K", "!damping": "D", "!weight stiffness": "K_W",
+          WEIGHT_LINE: "weight", LOADING_LINE: "loads"}  # fmt: skip
+KEYWORDS = (*HEAD_LINES, *BLOCKS)
 MAX_COORDINATES = 10_000  # coordinates
 ASYMMETRY_RTOL, TIME_STEP_RTOL = 1e-6, 1e-3
 REWRITE_HINT = (
@@ -86,7 +87,6 @@ def write_openfast(
         ConfigError: if not exactly one interface is free, the version is unknown, or the place is
             not writable.
         ModelError: if the shapes do not let the interfaces move one by one.
-        ResourceError: if the disk is full.
     """
     check_known(version, VERSIONS, f"version {version!r} of OpenFAST is unknown; known:")
     found = superelement(body, held=held, gravity=gravity)
@@ -162,87 +162,69 @@ def read_openfast(path: str | Path) -> Superelement:
         UnsafeFileError: if it announces more coordinates than a dense matrix can have.
     """
     path = check_readable(path)
-    reader = _Reader(str(path), path.read_text(encoding="latin1").splitlines())
-    with damaged("this is no superelement", reader, REWRITE_HINT):
-        reader.run()
-        found = reader.superelement()
+    lines, at = path.read_text(encoding="latin1").splitlines(), Line(path)
+    with damaged("this is no superelement", at, REWRITE_HINT):
+        found = _superelement(*_blocks(lines, at))
     _check(found, str(path))
     return found
 
 
-class _Reader:
-    """Goes through the lines as OpenFAST does: keywords, then blocks of a known length."""
+def _blocks(lines: list[str], at: Line) -> tuple[int, float, dict[str, Array]]:
+    """Size, time step and blocks, as OpenFAST finds them: a keyword, then a known number of lines.
 
-    def __init__(self, path: str, lines: list[str]):
-        self.path, self.lines, self.at = path, lines, 0
-        self.old = len(lines) > 1 and OLD_FORMAT_MARK in lines[1].lower()
-        self.head: dict[str, float] = {}
-        self.blocks: dict[str, Array] = {}
+    Old files have a line of comment between the two.
+    """
+    old = len(lines) > 1 and OLD_FORMAT_MARK in lines[1].lower()
+    head, blocks, n = dict.fromkeys(HEAD_LINES, 0.0) | {DURATION_LINE: -1.0}, dict[str, Array](), 0
+    while at.number < len(lines):
+        line = lines[at.number].strip().lower()
+        at.number += 1
+        key = next((known for known in KEYWORDS if line.startswith(known)), "")
+        if key in HEAD_LINES:
+            head[key] = number(line[len(key) :])
+        elif key:
+            n = int(head[DIMENSION_LINE])
+            if n > MAX_COORDINATES:
+                raise UnsafeFileError(f"{n} coordinates are not read.", where=str(at.path))
+            whole = n >= 6 and n == head[DIMENSION_LINE]
+            need(whole, f"{DIMENSION_LINE!r} 6 or more has to come before the blocks")
+            k, widths = 1 if key == WEIGHT_LINE else n, [n]
+            if key == LOADING_LINE:
+                k, widths = _steps(head, len(lines)), [n + 1, n + 2]
+            at.number += old
+            rows = _table(lines, at, k, widths)
+            blocks[BLOCKS[key]] = rows[0] if key == WEIGHT_LINE else rows
+    missing = sorted({"M", "K", "D", *(("loads",) if old else ("weight", "K_W"))} - set(blocks))
+    need(not missing, f"the blocks {missing} are missing")
+    return n, head[STEP_LINE], blocks
 
-    def run(self) -> None:
-        while self.at < len(self.lines):
-            line = self.lines[self.at].strip().lower()
-            self.at += 1
-            key = next((known for known in KEYWORDS if line.startswith(known)), "")
-            if key in HEAD_LINES:
-                self.head[key] = number(line[len(key) :])
-            elif key in MATRICES:
-                self.blocks[MATRICES[key]] = self.rows(self.n, (self.n,))
-            elif key == WEIGHT_LINE:
-                self.blocks["weight"] = self.rows(1, (self.n,))[0]
-            elif key == LOADING_LINE:
-                self.blocks["loads"] = self.rows(self.steps, (self.n + 1, self.n + 2))
 
-    @property
-    def n(self) -> int:
-        n = self.head.get(DIMENSION_LINE, 0)
-        if n > MAX_COORDINATES:
-            raise UnsafeFileError(f"{n:.0f} coordinates are not read.", where=self.path)
-        whole = n >= 6 and n == int(n)
-        need(whole, f"{DIMENSION_LINE!r} 6 or more has to come before the blocks")
-        return int(n)
+def _steps(head: dict[str, float], most: int) -> int:
+    """Lines of loads that OpenFAST reads."""
+    dt, T = head[STEP_LINE], head[DURATION_LINE]
+    fits = dt > 0 and 0 <= T / dt < most
+    need(fits, f"a time step {dt:g} s and a duration {T:g} s do not fit the file")
+    return round(T / dt) + 1
 
-    @property
-    def steps(self) -> int:
-        """Lines of loads that OpenFAST reads."""
-        dt, T = self.head.get(STEP_LINE, 0.0), self.head.get(DURATION_LINE, -1.0)
-        fits = dt > 0 and 0 <= T / dt < len(self.lines)
-        need(fits, f"a time step {dt:g} s and a duration {T:g} s do not fit the file")
-        return round(T / dt) + 1
 
-    def rows(self, k: int, widths: tuple[int, ...]) -> Array:
-        """The next k rows; old files have a line of comment before them."""
-        self.at += self.old
-        found: list[list[float]] = []
-        for _ in range(k):
-            words = self.lines[self.at].split() if self.at < len(self.lines) else []
-            self.at += 1
-            fits = len(words) in widths and (not found or len(words) == len(found[0]))
-            need(fits, f"row {len(found) + 1} of {k} has {len(words)} words")
-            found.append([number(word) for word in words])
-        return np.array(found)
+def _table(lines: list[str], at: Line, k: int, widths: list[int]) -> Array:
+    found = list[list[float]]()
+    for row in range(1, k + 1):
+        words = lines[at.number].split() if at.number < len(lines) else []
+        at.number = min(at.number + 1, len(lines))
+        fits = len(words) in widths and (not found or len(words) == len(found[0]))
+        need(fits, f"row {row} of {k} has {len(words)} words")
+        found.append([number(word) for word in words])
+    return np.array(found)
 
-    def __str__(self) -> str:
-        return f"{self.path}, line {min(self.at, len(self.lines))}"
 
-    def superelement(self) -> Superelement:
-        needed = {"M", "K", "D"} | ({"loads"} if self.old else {"weight", "K_W"})
-        missing = sorted(needed - set(self.blocks))
-        need(not missing, f"the blocks {missing} are missing")
-        n, b, dt = self.n, self.blocks, self.head.get(STEP_LINE, 0.0)
-        loads = b.get("loads", np.zeros((0, n + 2)))
-        uneven = np.abs(np.diff(loads[:, 0]) - dt).max(initial=0.0)
-        need(uneven <= TIME_STEP_RTOL * dt, f"the times of the loads are not {dt:g} s apart")
-        return Superelement(
-            M=b["M"],
-            K=b["K"],
-            D=b["D"],
-            weight=b.get("weight", np.zeros(n)),
-            K_W=b.get("K_W", np.zeros((n, n))),
-            t=loads[:, 0],
-            loads=loads[:, 1 : n + 1],
-            elevation=loads[:, n + 1] if loads.shape[1] == n + 2 else np.zeros(len(loads)),
-        )
+def _superelement(n: int, dt: float, b: dict[str, Array]) -> Superelement:
+    loads = b.pop("loads", np.zeros((0, n + 2)))
+    uneven = np.abs(np.diff(loads[:, 0]) - dt).max(initial=0.0)
+    need(uneven <= TIME_STEP_RTOL * dt, f"the times of the loads are not {dt:g} s apart")
+    waves = loads[:, n + 1] if loads.shape[1] == n + 2 else np.zeros(len(loads))
+    still = {"weight": np.zeros(n), "K_W": np.zeros((n, n))}
+    return Superelement(**still | b, t=loads[:, 0], loads=loads[:, 1 : n + 1], elevation=waves)
 
 
 def _check(found: Superelement, path: str) -> None:

@@ -25,14 +25,9 @@ def write_simscape(body: FlexibleBody, path: str | Path) -> Path:
     the units of ``rod.units``: six rows for each frame (translation, rotation), then the modes,
     rigid motions included. All frames are parallel to the body.
 
-    Args:
-        body: with interfaces of six coordinates each.
-        path: file ending in ``.mat``.
-
     Raises:
         ConfigError: if an interface is not rigid or averaged, or the place is not writable.
         ModelError: if the shapes of the body do not let its interfaces move one by one.
-        ResourceError: if the disk is full.
     """
     form = interface_form(body)
     variables = {
@@ -75,7 +70,6 @@ def write_radioss(
         ConfigError: if the body keeps modes, has too few interfaces or all on a line, a label is
             missing or not a number of a node, or the place is not writable.
         ModelError: if the shapes of the body do not let its interfaces move one by one.
-        ResourceError: if the disk is full.
     """
     form = interface_form(body)
     if form.omega.size:

@@ -1,18 +1,25 @@
 """A flexible body as Standard Input Data, and back."""
 
+from typing import Any
+
 import numpy as np
 from scipy.linalg import eigh
 
+from rom.arguments import symmetric
 from rom.body.flexible import FlexibleBody
+from rom.body.inertia import InertiaIntegrals
 from rom.body.records import Marker
 from rom.body.recovery import CENTRIFUGAL_LOADS, PRODUCTS
+from rom.body.reference import rigid_marker
 from rom.body.stiffening import ANGULAR_LOADS, LINEAR_LOADS, SecondOrder, interface_loads
-from rom.errors import ConfigError
+from rom.errors import ConfigError, QualityGateError
 from rom.io.sid.dialect import by_mode, first
 from rom.io.sid.format import StandardInput, Taylor
-from rom.model import Array
-from rom.rotation import skew_tensor
+from rom.model import FILE_FRAME, Array
+from rom.rotation import crossed, skew_tensor
 
+Rigid = tuple[float, Array, Array]  # mass, first moment (3,), inertia (3, 3) about the origin
+Nodes = dict[str, tuple[Array, Array, Array]]  # point (3,), translation, rotation (3, r)
 EPS = -skew_tensor()  # of Levi-Civita
 PRODUCT_NAMES = ("xx", "yy", "zz", "xy", "yz", "xz")  # of angular velocities: columns of Oe
 UNEVEN_RTOL = 1e-6  # share of Oe1 below which its asymmetry is round-off of the writer
@@ -38,7 +45,7 @@ def standard_input(body: FlexibleBody) -> StandardInput:
     )
 
 
-def invariants(body: FlexibleBody) -> dict[str, Array]:
+def invariants(body: FlexibleBody | InertiaIntegrals) -> dict[str, Array]:
     """Integrals of the shapes phi_k, with x~ the matrix of the cross product with the position x.
 
     Inv3 (3, r) of phi_k, Inv4 (3, r) of x x phi_k, Inv8 (3, r, 3) of -x~ phi~_j, Inv5 (3, r, r) of
@@ -49,9 +56,9 @@ def invariants(body: FlexibleBody) -> dict[str, Array]:
     both = np.einsum("aajk->jk", body.S_kl)
     return {
         "Inv3": body.S,
-        "Inv4": np.einsum("cab,abk->ck", EPS, body.Ibar_kl),
+        "Inv4": crossed(body.Ibar_kl),
         "Inv8": np.einsum("j,ac->ajc", dot, eye) - body.Ibar_kl.transpose(1, 2, 0),
-        "Inv5": np.einsum("cab,abjk->cjk", EPS, body.S_kl),
+        "Inv5": crossed(body.S_kl),
         # phi~_j phi~_k = phi_k phi_j^T - (phi_j . phi_k) 1
         "Inv9": body.S_kl.transpose(1, 2, 3, 0) - np.einsum("jk,ac->ajkc", both, eye),
     }
@@ -110,6 +117,49 @@ def _node(marker: Marker, K: dict[str, Array]) -> dict[str, Taylor]:
     }
 
 
+def from_invariants(found: dict[str, Array], M: Array) -> tuple[Array, Array, Array]:
+    """S, Ibar_kl and S_kl from `invariants`, of which files may lack some, and the mass M (r, r).
+
+    Inv4 and Inv5 are parts of Inv8 and Inv9. What none of them says is zero, but the trace of S_kl
+    is M; what is left of it acts alike along all axes.
+    """
+    eye, r = np.eye(3)[..., None], len(M)
+    C, B = found.get("Inv8", np.zeros((3, r, 3))), found.get("Inv9", np.zeros((3, r, r, 3)))
+    X = _turned(0.5 * eye * np.einsum("aja->j", C) - C.transpose(2, 0, 1), found.get("Inv4"))
+    S = _turned(B.transpose(3, 0, 1, 2), found.get("Inv5"))
+    S = 0.5 * (S + S.transpose(1, 0, 3, 2))
+    S = S + eye[..., None] * (M - np.einsum("aakl->kl", S)) / 3
+    return found.get("Inv3", np.zeros((3, r))), X, S
+
+
+def _turned(A: Array, wanted: Array | None) -> Array:
+    """(3, 3, ...) integrals of u_a v_b with another integral (3, ...) of u x v, if there is one."""
+    return A if wanted is None else A + 0.5 * np.einsum("cab,c...->ab...", EPS, wanted - crossed(A))
+
+
+def body_of(
+    name: str, rigid: Rigid, found: dict[str, Array], *matrices: Array, nodes: Nodes, **more: Any
+) -> FlexibleBody:
+    """The body of a file of another program, in SI, by `invariants` and (r, r) matrices K, D, M.
+
+    Raises:
+        QualityGateError: if a matrix is not symmetric, or negative, or there is no mass.
+    """
+    names = ("stiffness", "damping", "modal mass", "inertia", "mass")
+    for what, A in zip(names, (*matrices, rigid[2], np.eye(1) * rigid[0]), strict=True):
+        symmetric(f"the {what}", A, UNEVEN_RTOL)
+        lowest, size = np.linalg.eigvalsh(A).min(initial=np.inf), np.abs(A).max(initial=0.0)
+        if lowest < -UNEVEN_RTOL * size or (lowest <= 0.0 and what.endswith("mass")):
+            text = f"the {what} must be positive, but has the eigenvalue {lowest:.3g}."
+            raise QualityGateError(text, hint="Look which motion has none, or less.")
+    K, D, M, inertia = (0.5 * (A + A.T) for A in (*matrices, rigid[2]))
+    omega = np.sqrt(np.maximum(eigh(K, M, eigvals_only=True), 0.0)) if len(K) else np.zeros(0)
+    integrals = *rigid[:2], inertia, *from_invariants(found, M)
+    markers = {label: rigid_marker(label, *node) for label, node in nodes.items()}
+    more = {"labels": tuple(f"mode {k + 1}" for k in range(len(K)))} | more
+    return FlexibleBody(name, *integrals, K, D, markers, omega, reference=FILE_FRAME, **more)
+
+
 def sid_body(record: StandardInput) -> FlexibleBody:
     """The flexible body of Standard Input Data without geometric stiffness.
 
@@ -118,31 +168,22 @@ def sid_body(record: StandardInput) -> FlexibleBody:
 
     Raises:
         ConfigError: if the blocks contain geometric stiffness, or are no integrals of shapes.
+        QualityGateError: if a matrix is not symmetric, or negative.
     """
     b, r = record.blocks, record.n_modes
     Me, Oe1, Cr1 = b["Me"].M0, first(b["Oe"], r), first(b["Cr"], r)
     _check_inertia(record, Me, Oe1)
-    C4 = -0.5 * by_mode(b["Gr"].M0)
-    trace = np.einsum("kaa->k", C4)
-    odd = np.einsum("cab,jic->abji", EPS, 0.5 * (Cr1 - Cr1.swapaxes(0, 1)))
-    K = b["Ke"].M0
-    lam = eigh(K, Me, eigvals_only=True) if r else np.zeros(0)
-    return FlexibleBody(
-        name=record.name,
-        mass=record.mass,
-        first_moment=b["mdCM"].M0[:, 0],
-        inertia=b["J"].M0,
-        S=b["Ct"].M0.T,
-        Ibar_kl=(C4 - 0.5 * trace[:, None, None] * np.eye(3)).transpose(2, 1, 0),
-        S_kl=_even(Oe1, Me) + 0.5 * odd,
-        K=K,
-        D=b["De"].M0,
-        markers={name: _marker(name, node) for name, node in record.nodes.items()},
-        omega=np.sqrt(np.maximum(lam, 0.0)),
-        labels=record.coordinates,
-        reference="as in its SID",
-        provenance={"from": record.title},
-    )
+    B = np.zeros((3, r, r, 3))
+    for k, (a, c) in enumerate(PRODUCTS):
+        B[a, ..., c] += 0.5 * Oe1[..., k]
+        B[c, ..., a] += 0.5 * Oe1[..., k]
+    C, cross = by_mode(b["Gr"].M0).swapaxes(0, 1), (Cr1 - Cr1.swapaxes(0, 1)).transpose(2, 0, 1)
+    found = {"Inv3": b["Ct"].M0.T, "Inv8": 0.5 * C, "Inv5": 0.5 * cross, "Inv9": B}
+    rigid = record.mass, b["mdCM"].M0[:, 0], b["J"].M0
+    nodes = {name: (node["origin"].M0[:, 0], node["phi"].M0, node["psi"].M0)
+             for name, node in record.nodes.items()}  # fmt: skip
+    told = {"labels": record.coordinates, "provenance": {"from": record.title}}
+    return body_of(record.name, rigid, found, b["Ke"].M0, b["De"].M0, Me, nodes=nodes, **told)
 
 
 def _check_inertia(record: StandardInput, Me: Array, Oe1: Array) -> None:
@@ -168,19 +209,3 @@ def _check_inertia(record: StandardInput, Me: Array, Oe1: Array) -> None:
             "another mass than that of Me.",
             hint="Export without geometric stiffness; rom.read_sid gives the blocks as they are.",
         )
-
-
-def _even(Oe1: Array, Me: Array) -> Array:
-    """(3, 3, r, r) part of S_kl that is symmetric in its axes."""
-    even = np.zeros((3, 3, *Me.shape))
-    for k, (a, c) in enumerate(PRODUCTS):
-        part = Oe1[:, :, k] + Me if a == c else 0.5 * Oe1[:, :, k]
-        even[a, c] = even[c, a] = 0.5 * (part + part.T)
-    return even
-
-
-def _marker(name: str, node: dict[str, Taylor]) -> Marker:
-    point, translation, rotation = node["origin"].M0[:, 0], node["phi"].M0, node["psi"].M0
-    lever = -np.einsum("abc,b->ac", EPS, point)
-    hold = np.block([[np.eye(3), lever, translation], [np.zeros((3, 3)), np.eye(3), rotation]])
-    return Marker(name, point, translation, rotation, "rbe2", hold)

@@ -99,7 +99,6 @@ def write_sid(record: StandardInput, path: str | Path, *, dialect: str = "fembs"
 
     Raises:
         ConfigError: for an unknown dialect or a place that is not writable.
-        ResourceError: if the disk is full.
     """
     one_of("dialect", dialect, DIALECTS)
     text = "\n".join(_document(record, dialect)) + "\n"
