@@ -30,7 +30,6 @@ from rom.assembly.joined import (
 from rom.body.damping import ModalDamping, Rayleigh, damped
 from rom.body.flexible import FlexibleBody
 from rom.body.records import Marker, n_rigid_motions, still_motions
-from rom.body.reference import MEAN_AXES
 from rom.errors import ConfigError, warn
 from rom.model import Array, Modes, Report, Row
 from rom.names import check_known, check_once, named
@@ -225,8 +224,7 @@ class Assembly:
         omega, V = elastic_modes(N, R, (M, K))
         body = joined(name, self.bodies, omega, V, places)
         rows = matrix_rows(body, R, V, M)
-        if reference not in MEAN_AXES:
-            body = body.with_reference(reference)
+        body = body.with_reference(reference)
         if damping is not None:
             body = damped(body, damping)
         own = Report(f"certificate of {name}", (*rows, *self._compared(body, places)))

@@ -61,6 +61,7 @@ def test_processes_threads_and_this_process_give_one_table(tmp_path):
 
 
 @pytest.mark.mpi
+@pytest.mark.fenicsx
 def test_ranks_of_mpi_give_the_same_table(tmp_path):
     script, file = tmp_path / "by_mpi.py", tmp_path / "x.study"
     script.write_text(BY_MPI)
@@ -245,8 +246,9 @@ def test_indices_are_those_of_ishigami_in_closed_form():
     X = indices_design({f"x{k}": (-pi, pi) for k in (1, 2, 3)}, 2**13, rng=rng())
     found = rom.study(ishigami, X, workers=0, progress=False).indices("y", rng=rng(2))
     first, total = np.array([v1, v2, 0]) / whole, np.array([v1 + v13, v2, v13]) / whole
-    assert found.first == pytest.approx(first, abs=0.01)
-    assert found.total == pytest.approx(total, abs=0.01)
+    # two standard errors that random points would have: 0.012 of the first, 0.017 of the total
+    assert found.first == pytest.approx(first, abs=0.024)
+    assert found.total == pytest.approx(total, abs=0.034)
     assert np.all((found.total_ends[:, 0] < total) & (total < found.total_ends[:, 1]))
     assert re.search(r"x2 +0\.44\d", str(found))
 
