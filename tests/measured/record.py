@@ -29,7 +29,7 @@ class Structure:
         parameters: {name: (value, spread)}.
         meshes: coarse, and twice as fine.
         note: what is assumed where the source says nothing.
-        span: deviations are parts of it; None for parts of what was measured.
+        span: of which displacements deviate by parts, in their unit; None for what was measured.
     """
 
     name: str
@@ -57,7 +57,7 @@ class Prediction:
 
 @dataclass(frozen=True)
 class Verdict:
-    """A prediction beside what was measured; deviation in percent of that, or of the span."""
+    """A prediction beside what was measured; deviation in percent, see `of`."""
 
     prediction: Prediction
     measured: float
@@ -126,6 +126,13 @@ def compare(structure: Structure) -> dict[str, Verdict]:
     predicted = read(structure.name)
     measured = tomllib.loads(FOUND.joinpath(f"{structure.name}.toml").read_text())["numbers"]
     return {
-        name: Verdict(one := predicted[name], x, 100 * (one.value - x) / (structure.span or abs(x)))
+        name: Verdict(
+            predicted[name], x, 100 * (predicted[name].value - x) / of(structure, name, x)
+        )
         for name, x in measured.items()
     }
+
+
+def of(structure: Structure, name: str, measured: float) -> float:
+    """What a deviation is a part of: the span for displacements, else what was measured."""
+    return structure.span if structure.span and "[deg]" not in name else abs(measured)
