@@ -6,6 +6,8 @@ from measured import record, rods
 from numpy.testing import assert_allclose
 from scipy.linalg import eigh
 
+from rom.components.cosserat import equilibrium, loads
+
 ALL = [pytest.param(one, id=one.name) for one in rods.RODS]
 
 
@@ -23,7 +25,7 @@ def test_the_model_gives_what_was_predicted(structure):
 def test_bands_follow_from_the_spreads(structure):
     kept, again = record.read(structure.name), record.predict(structure)
     for name, one in kept.items():
-        assert_allclose((one.low, one.high), (again[name].low, again[name].high), rtol=0.02,
+        assert_allclose((one.low, one.high), (again[name].low, again[name].high), rtol=0,
                         atol=0.02 * (one.high - one.low))  # fmt: skip
         widths = (one.high - one.low) / 2, np.linalg.norm([*one.parts.values()])
         assert_allclose(*widths, rtol=1e-3, atol=2e-5 * abs(one.value))
@@ -78,6 +80,9 @@ def test_a_laminate_bends_by_its_compliance_under_a_small_weight(beam, angle):
     assert_allclose((shape.x - one.x)[-1, 1:], (cube * side, -cube * down), rtol=2e-3, atol=1e-9)
     turn = shape.frame(-1) @ one_frame(one).T  # small; about x it is the twist
     assert_allclose((turn[2, 1] - turn[1, 2]) / 2, square * c * twist, rtol=2e-3, atol=1e-9)
+    shape = equilibrium(one, loads(one, tip_moment=(force, 0, 0)))
+    turn = shape.frame(-1) @ one_frame(one).T
+    assert_allclose((turn[2, 1] - turn[1, 2]) / 2, force * length * flexible[0, 0], rtol=2e-3)
 
 
 def one_frame(one):
@@ -85,13 +90,21 @@ def one_frame(one):
     return rods.rotation.matrix(one.p[-1])
 
 
+def test_a_wing_bends_and_twists_by_its_rigidities_under_a_small_mass():
+    one = rods.wing(80, "no skin", 0.13, 1.0, 0.5, 0.0, 0.0)
+    shape, force = rods.hung(one, 1e-3), 1e-3 * rods.GRAVITY
+    assert_allclose((one.x - shape.x)[80, 2], force * 0.5498**3 / 3 / 4.42, rtol=2e-3)
+    twist = -shape.frame(-2)[2, 0]  # of the link, along the chord
+    assert_allclose(twist, force * 0.13 * 0.5498 / ((6.45 + 7.28) / 2), rtol=2e-3)
+
+
 @pytest.mark.parametrize(
     ("structure", "quantity", "median", "largest", "inside", "number"),
     [
-        (rods.EPPS_CHANDRA, "flap", 5.8, 17.2, 0, 27),
-        (rods.EPPS_CHANDRA, "coupled", 3.5, 5.7, 2, 9),
-        (rods.MINGUET_DUGUNDJI, "beam 1", 0.39, 2.7, 18, 23),
-        (rods.MINGUET_DUGUNDJI, "beam 2", 0.72, 4.1, 21, 35),
+        (rods.EPPS_CHANDRA, "flap", 5.8, -17.2, 0, 27),
+        (rods.EPPS_CHANDRA, "coupled", 3.5, -5.7, 2, 9),
+        (rods.MINGUET_DUGUNDJI, "beam 1", 0.39, -2.7, 18, 23),
+        (rods.MINGUET_DUGUNDJI, "beam 2", 0.72, -4.1, 21, 35),
         (rods.PAZY, "displacement", 1.4, 2.92, 30, 35),
         (rods.PAZY, "twist", 42.0, 50.6, 1, 10),
     ],
@@ -99,6 +112,7 @@ def one_frame(one):
 def test_the_verdict_is_the_one_that_is_told(structure, quantity, median, largest, inside, number):
     """As docs/measured.md has it, hit or missed; percent of the frequency, span or twist."""
     rows = [row for name, row in record.compare(structure).items() if quantity in name]
-    off = np.abs([row.deviation for row in rows])
+    off = np.array([row.deviation for row in rows])
     assert (len(rows), sum(row.inside for row in rows)) == (number, inside)
-    assert_allclose((np.median(off), off.max()), (median, largest), rtol=0.02)
+    found = np.median(np.abs(off)), off[np.abs(off).argmax()]
+    assert_allclose(found, (median, largest), rtol=0.02)
