@@ -150,6 +150,6 @@ SUBJECTS = {
     lost_tip bent_blade rotor""",
     "Gears and bearings": "planetary transmission two_stage oil_inlet",
     "Wind turbines": "wind_turbine whole_turbine wind_power",
-    "Models and measurements": "updating bolted_frame virtual_sensing",
+    "Models and measurements": "updating bolted_frame virtual_sensing measured_rods",
     "Stones and rocks": "masonry rockfall",
 }
