@@ -29,19 +29,12 @@ from rom.body.inertia import point_integrals
 from rom.body.stiffening import known_loads
 from rom.decks.lines import whole
 from rom.errors import ConfigError, UnsafeFileError, in_file, warn
-from rom.io.files import (
-    check_last_line,
-    check_readable,
-    damaged,
-    need,
-    number,
-    numbers_line,
-    write_lines,
-)
+from rom.io.files import check_last_line, damaged, need, number, numbers_line, write_lines
 from rom.io.sid.body import UNEVEN_RTOL, Rigid, body_of, invariants
 from rom.io.sid.reading import MAX_BYTES, MOST_MODES
 from rom.model import Array
 from rom.names import ORIGIN_MARK, named
+from rom.readable import check_readable
 
 GROUP_PATTERN = re.compile(r"^\*\*[ \t]*RECORD[ \t]+GROUP[ \t]+(\d+)", re.IGNORECASE | re.MULTILINE)
 END_PATTERN = re.compile(r"^\*\*[ \t]*END[ \t]+OF[ \t]+FILE", re.IGNORECASE | re.MULTILINE)
@@ -56,8 +49,7 @@ def write_mbdyn(body: FlexibleBody, path: str | Path) -> Path:
     it "use invariant 9" where it asks.
 
     Raises:
-        ConfigError: if there is no shape or no interface, names become equal without their
-            blanks, or the place is not writable.
+        ConfigError: if there is no shape or no interface, or names differ in blanks alone.
     """
     if not body.n_modes or not body.markers:
         raise ConfigError(
@@ -100,16 +92,13 @@ def _document(body: FlexibleBody, labels: list[str]) -> Iterator[str]:
 
 
 def _stiffening(body: FlexibleBody) -> Iterator[str]:
-    taken = {k: body.K_geo[load] for k, load in _loads(body).items() if load in body.K_geo}
+    loads = enumerate(known_loads(body)[: -body.n_modes], 1)  # without those of shapes
+    taken = {k: body.K_geo[load] for k, load in loads if load in body.K_geo}
     yield from _group(19, "MODAL STRESS STIFFENING MATRIX")
     yield f"{len(taken)}"
     for load, A in taken.items():
         yield f"{load}"
         yield from map(numbers_line, A)
-
-
-def _loads(body: FlexibleBody) -> dict[int, str]:
-    return dict(enumerate(known_loads(body)[: -body.n_modes], 1))  # without those of shapes
 
 
 def _group(group: int, title: str, rows: Iterable[Iterable[float]] = ()) -> Iterator[str]:
@@ -200,10 +189,10 @@ def _inertia(found: dict[int, Array]) -> tuple[Rigid, dict[str, Array]]:
 
 def _stiffness(body: FlexibleBody, table: Array) -> dict[str, Array]:
     """Geometric stiffness of rows (k, 1 + r r) that begin with the number of a load."""
-    loads, numbers = _loads(body), set(table[:, 0])
-    once = numbers <= set(loads) and len(numbers) == len(table)
+    loads, numbers = known_loads(body)[: -body.n_modes], set(table[:, 0])
+    once = numbers <= set(range(1, len(loads) + 1)) and len(numbers) == len(table)
     need(once, f"record group 19 is not of loads 1 to {len(loads)}, each once")
-    K = {loads[int(row[0])]: row[1:].reshape(body.K.shape) for row in table}
+    K = {loads[int(row[0]) - 1]: row[1:].reshape(body.K.shape) for row in table}
     for load, A in K.items():
         symmetric(f"the geometric stiffness {load!r}", A, UNEVEN_RTOL)
     return {load: 0.5 * (A + A.T) for load, A in K.items()}
