@@ -48,7 +48,6 @@ OF_MAT1 = {"MAT1", "MATS1", "MATCID"}  # with what a linear isotropic solid does
 HARMLESS_CARDS = tuple("EIG TABLE SET1 SET3 PLOTEL ECHO".split())
 BODY_RTOL = 1e-6  # of a mass matrix, up to which it is that of a rigid body
 CONTRADICTION = 0.01  # of E, G and NU, from where Nastran warns
-DAMPING = ("B", "GE")  # of springs; bodies get their own
 NO_LINE = 1e-4  # in units of the deck, below which the nodes of a CBUSH give it no direction
 # loads, supports, steps, and what a reduction there holds
 LOAD_CARDS = set(
@@ -57,7 +56,8 @@ LOAD_CARDS = set(
     "TEMPP1 SPCD SPCADD SUPORT SUPORT1 FREQ FREQ1 FREQ2 FREQ3 FREQ4 TSTEP TSTEPNL NLPARM TIC "
     "ASET ASET1 BSET BSET1 CSET CSET1 QSET QSET1 OMIT OMIT1 SPOINT".split()
 )
-Cards, At = dict[str, list[Card]], dict[int, Array]  # by name; by node
+Cards = dict[str, list[Card]]  # by name
+At = dict[int, Array]  # by node
 Systems = Callable[[int, Card], System]
 
 
@@ -96,7 +96,7 @@ def _sorted(path: Path) -> tuple[Cards, list[Element], list[str]]:
     unread, aside, ties = Unread(), Unread(), list[Element]()
     for card in cards(path):
         for word in _beside(card) if card.name in (*SPRINGS, *OF_SPRINGS) else ():
-            (aside if word in DAMPING else unread).add(f"{card.name}, {word}", card.place)
+            (aside if word in ("B", "GE") else unread).add(f"{card.name}, {word}", card.place)
         if card.name in SECTIONS and card.text(6) not in ("", "SMECH"):
             unread.add(f"{card.name}, {card.text(6)}", card.place)
         elif card.name in TIES:
@@ -222,7 +222,7 @@ def _bush(card: Card, own: Card, place: At, moves: At, systems: Systems) -> Spri
         raise one.wrong("it has more than K1 and K4, so it needs a CID, GO or a vector")
     share = card.reals(8)[0] if card.text(8) else 0.5
     ends = np.hstack([-arm(share * line), arm((share - 1.0) * line)])
-    return replace(one, stretch=np.kron(np.eye(2), axes.T) @ ends)
+    return replace(one, stretch=np.vstack([axes.T @ ends[:3], axes.T @ ends[3:]]))
 
 
 def _ends(card: Card, place: At, *fields: int) -> list[int]:
