@@ -102,7 +102,7 @@ TASKS: dict[str, tuple[str, str]] = {
     "Matrices of other programs": (
         "Stiffness and mass from files, to be reduced here, and back.",
         """read_model io.read_matrix io.read_market io.read_op4 io.write_op4 io.read_dmig
-        io.write_dmig io.read_stored_matrix io.read_user_element
+        io.write_dmig io.read_stored_matrix io.write_abaqus_matrix io.read_user_element
         io.write_user_element io.read_nodes io.read_node_sets io.read_grids""",
     ),
     "Components": (

@@ -21,6 +21,7 @@ from rom.io.matrices.dmig import write_dmig as write_dmig
 from rom.io.matrices.matrix_files import read_market as read_market
 from rom.io.matrices.matrix_files import read_matrix as read_matrix
 from rom.io.matrices.matrix_files import read_stored_matrix as read_stored_matrix
+from rom.io.matrices.matrix_files import write_abaqus_matrix as write_abaqus_matrix
 from rom.io.matrices.node_files import read_node_sets as read_node_sets
 from rom.io.matrices.node_files import read_nodes as read_nodes
 from rom.io.matrices.op4 import read_op4 as read_op4

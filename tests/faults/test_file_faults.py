@@ -11,11 +11,12 @@ from scipy.sparse import random as random_matrix
 
 import rom
 from cases.files.damage import ARCHIVES, damaged, outcome
-from cases.files.decks import BY_HAND, DECK, IM, RE, X, binary, dataset, write_abaqus_matrix
+from cases.files.decks import BY_HAND, DECK, IM, RE, X, binary, dataset
 from cases.files.toml_files import ALL, CRANK, PENDULUM, SOLID
 from cases.mbs.mechanisms import random_body
 from cases.paths import TESTS
 from cases.solid import block, reduced
+from rom.io.matrices.matrix_files import write_abaqus_matrix
 from rom.io.matrices.node_files import read_node_sets, read_nodes
 
 HERE = TESTS / "reference" / "foreign"

@@ -14,14 +14,14 @@ from scipy.io import loadmat, mmread, mmwrite
 from scipy.sparse import csr_matrix
 
 import rom
-from cases.files.decks import DECK, write_abaqus_matrix
+from cases.files.decks import DECK
 from cases.paths import TESTS
 from cases.refusals import refuses
 from cases.solid import block, reduced
 from rom.decks.lines import real
 from rom.errors import ConfigError, FileFormatError, ModelError, QualityGateError, UnsafeFileError
 from rom.io.matrices.dmig import read_dmig, read_grids, write_dmig
-from rom.io.matrices.matrix_files import read_matrix
+from rom.io.matrices.matrix_files import read_matrix, write_abaqus_matrix
 from rom.io.matrices.op4 import read_op4, write_op4
 from rom.io.matrices.read_model import read_model
 from rom.io.programs.interface_form import interface_form

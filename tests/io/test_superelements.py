@@ -12,7 +12,6 @@ from scipy.linalg import eigh
 from scipy.sparse import csc_matrix, csr_matrix, tril
 
 import rom
-from cases.files.decks import write_abaqus_matrix
 from cases.refusals import refuses
 from cases.solid import block
 from cases.structures.frames import Section, frame
@@ -20,7 +19,7 @@ from rom.cli.main import main
 from rom.config.component import read_component
 from rom.errors import ConfigError, FileFormatError, ModelError, QualityGateError
 from rom.io.matrices.dmig import write_dmig
-from rom.io.matrices.matrix_files import read_matrix
+from rom.io.matrices.matrix_files import read_matrix, write_abaqus_matrix
 from rom.io.matrices.node_files import read_dofs
 from rom.io.matrices.op4 import write_op4
 from rom.io.matrices.read_model import read_model

@@ -15,13 +15,13 @@ from scipy.io import mmwrite
 from scipy.sparse import block_diag, csr_matrix, diags
 
 import rom
-from cases.files.decks import write_abaqus_matrix
 from cases.files.schema import answer
 from cases.refusals import refuses
 from cases.structures.frames import Section, cantilever, frame, interface, plate
 from rom.eigen.verbs import mean_motion
 from rom.errors import FileFormatError, ModelError, QualityGateError
 from rom.io.matrices.dmig import write_dmig
+from rom.io.matrices.matrix_files import write_abaqus_matrix
 from rom.io.matrices.op4 import write_op4
 from rom.io.matrices.read_model import read_model
 

@@ -33,7 +33,15 @@ from scipy.sparse import coo_matrix, csr_matrix
 
 from rom.decks.lines import whole
 from rom.errors import ConfigError, FileFormatError, UnsafeFileError, in_file
-from rom.io.files import check_last_line, check_readable, damaged, lines_of, need, number
+from rom.io.files import (
+    check_last_line,
+    check_readable,
+    damaged,
+    lines_of,
+    need,
+    number,
+    write_lines,
+)
 from rom.io.matrices.dmig import Dofs, labelled, read_dmig
 from rom.io.matrices.op4 import Matrices, read_op4
 from rom.io.matrices.user_element import read_user_element
@@ -94,6 +102,24 @@ def read_matrix(source: str | Path | tuple[str | Path, str]) -> NamedMatrix:
             hint=f"Stiffness and mass are real and square; the file holds {offered(found, key)}.",
         )
     return NamedMatrix(f"{path} {key}".strip(), csr_matrix(A), dofs.get(key))
+
+
+def write_abaqus_matrix(A: Array | csr_matrix, dofs: Dofs, path: str | Path) -> Path:
+    """Write the lower triangle of a symmetric matrix as text that ``*MATRIX INPUT`` reads.
+
+    Args:
+        A: (n, n) dense or sparse, in units of any kind.
+        dofs: (n, 2) node and component of each row.
+        path: file to write.
+    """
+    found = coo_matrix(np.tril(A) if isinstance(A, np.ndarray) else A)
+    entries = zip(found.row, found.col, found.data, strict=True)
+    lines = (
+        f"{dofs[i, 0]},{dofs[i, 1]}, {dofs[j, 0]},{dofs[j, 1]}, {v:.16e}"
+        for i, j, v in entries
+        if i >= j and v
+    )
+    return write_lines(path, lines)
 
 
 def _all(path: Path) -> tuple[Matrices, dict[str, Dofs]]:

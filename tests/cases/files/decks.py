@@ -1,7 +1,6 @@
 """Files of other programs, written by hand."""
 
 import numpy as np
-from scipy.sparse import coo_matrix
 
 BY_HAND = """*HEADING
 two nodes that move and turn in a plane, two of them along x only
@@ -94,13 +93,3 @@ def binary(kind, order):
     numbers = np.column_stack([RE, IM]).astype(f"{'<>'[order - 1]}f{4 * (kind - 4)}").tobytes()
     head = f"    58b{order:6d}{2:6d}{11:12d}{len(numbers):12d}" + " 0 0 0 0"
     return f"{-1:6d}\n{head}\n{header(kind, 5, 1)}".encode() + numbers + b"\n    -1\n"
-
-
-def write_abaqus_matrix(A, dofs, path):
-    """Text of ``*MATRIX GENERATE``: a lower triangle, rows by node and component."""
-    found = coo_matrix(np.tril(A) if isinstance(A, np.ndarray) else A)
-    entries = zip(found.row, found.col, found.data, strict=True)
-    lines = (f"{dofs[i, 0]},{dofs[i, 1]}, {dofs[j, 0]},{dofs[j, 1]}, {v:.16e}\n"
-             for i, j, v in entries if i >= j and v)  # fmt: skip
-    path.write_text("".join(lines))
-    return path

@@ -3,10 +3,9 @@
 import pytest
 
 import rom
-from benchmarks.ranks import most_ranks, shared_cost
 from cases.solid import STEEL
 from rom.fe import costs
-from rom.fe.costs import factor_cost, reduction_seconds
+from rom.fe.costs import factor_cost, least_machines, reduction_seconds, shared_cost
 
 # dofs, flops, entries, of beams of quadratic tetrahedra, by the analysis of MUMPS
 COUNTED = [(11_256, 4.870e8, 2.157e6), (29_286, 4.173e9, 9.269e6), (100_995, 6.606e10, 6.061e7)]
@@ -65,12 +64,12 @@ def test_where_more_ranks_end():
         assert costs.border_seconds(m**3 / 3, m**2 / 2) < costs.border_seconds(
             m**3 / 3, m**2 / 2, 2
         )
-        assert most_ranks(n) == 32
+        assert costs.most_ranks(n) == 32
         beyond = shared_cost(n, 64)
         assert beyond.border_flops > beyond.inside_flops
         seconds = [shared_cost(n, ranks).seconds for ranks in (1, 2, 4, 8, 16, 32)]
         assert sorted(seconds, reverse=True) == seconds
-    assert most_ranks(30_000) == 4  # each factors its border, to wait less
+    assert costs.most_ranks(30_000) == 4  # each factors its border, to wait less
 
 
 def test_times_that_were_measured():
@@ -83,6 +82,13 @@ def test_times_that_were_measured():
     one, base = factor_cost(n).solution_seconds, reduction_seconds(n, 12, 20)
     assert reduction_seconds(n, 20, 20) - base == pytest.approx(one)
     assert one < reduction_seconds(n, 12, 21) - base < 2 * one
+
+
+def test_machines_are_whole_and_hold_the_factor():
+    need = factor_cost(3e6).memory
+    for memory in (16e9, 64e9, need, 1e15):
+        machines = least_machines(3e6, memory)
+        assert machines * memory >= need > (machines - 1) * memory
 
 
 def test_full_modes_are_found_where_they_cost_less_than_the_reduction_or_little():
