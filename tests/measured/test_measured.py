@@ -2,13 +2,15 @@
 
 import numpy as np
 import pytest
-from measured import record, rods
+from measured import barc, record, rods
 from numpy.testing import assert_allclose
 from scipy.linalg import eigh
 
 from rom.components.cosserat import equilibrium, loads
+from rom.updating import Channels
 
 ALL = [pytest.param(one, id=one.name) for one in rods.RODS]
+ALL.append(pytest.param(barc.BARC, id="barc", marks=[pytest.mark.long, pytest.mark.fenicsx]))
 
 
 @pytest.mark.parametrize("structure", ALL)
@@ -107,6 +109,9 @@ def test_a_wing_bends_and_twists_by_its_rigidities_under_a_small_mass():
         (rods.MINGUET_DUGUNDJI, "beam 2", 0.72, -4.1, 21, 35),
         (rods.PAZY, "displacement", 1.4, 2.92, 30, 35),
         (rods.PAZY, "twist", 42.0, 50.6, 1, 10),
+        (barc.BARC, "glued", 4.51, 9.96, 2, 6),
+        (barc.BARC, "rigid squares", 1.88, -5.35, 2, 6),
+        (barc.BARC, "averaged squares", 3.64, -10.5, 1, 6),
     ],
 )
 def test_the_verdict_is_the_one_that_is_told(structure, quantity, median, largest, inside, number):
@@ -116,3 +121,20 @@ def test_the_verdict_is_the_one_that_is_told(structure, quantity, median, larges
     assert (len(rows), sum(row.inside for row in rows)) == (number, inside)
     found = np.median(np.abs(off)), off[np.abs(off).argmax()]
     assert_allclose(found, (median, largest), rtol=0.02)
+
+
+@pytest.mark.long
+@pytest.mark.fenicsx
+def test_the_box_moves_where_it_was_measured():
+    """MAC of six modes at 30 points, in the directions that were measured; its beam moves least."""
+    table = np.genfromtxt(
+        record.FOUND / "barc_shapes.csv", delimiter=",", dtype=None, encoding="utf8"
+    )
+    x = np.array([[1e-3 * row[k] for k in range(3)] for row in table])
+    along = np.array([np.eye(3)["xyz".index(row[3])] for row in table])
+    U = np.array([[row[k] for k in range(4, 10)] for row in table])
+    whole = barc.joined(barc.parts(12, *barc.JOINTS["rigid squares"][:1], **barc.SQUARES))
+    rows = Channels(x, along).rows(whole.bodies, "channel")
+    V = rows @ np.vstack([*whole.modes(12).shapes.values()])[:, 6:]
+    mac = np.diag(U.T @ V) ** 2 / np.diag(U.T @ U) / np.diag(V.T @ V)
+    assert_allclose(mac, [0.90, 0.94, 0.96, 0.96, 0.79, 0.82], atol=0.015)
