@@ -225,9 +225,9 @@ def test_options_and_keys_of_a_file_say_the_same(bent, reduced, tmp_path, capsys
     write_op4({"K": reduced.K, "M": reduced.M, "B": 2e-5 * reduced.K}, tmp_path / "a.op4")
     dofs = np.where(reduced.dofs == 0, 1, reduced.dofs)
     (tmp_path / "dofs.csv").write_text("".join(f"{n}, {c}\n" for n, c in dofs))
-    more = [(int(n), np.ones(3)) for n in reduced.modes[:, 0]]
-    rows = [",".join(map(repr, (n, *x.tolist()))) for n, x in [*reduced.nodes.items(), *more]]
-    (tmp_path / "nodes.csv").write_text("\n".join(rows).replace("np.int64", "") + "\n")
+    more = [(n, np.ones(3)) for n in reduced.modes[:, 0]]
+    rows = [",".join(map(str, (n, *x.tolist()))) for n, x in [*reduced.nodes.items(), *more]]
+    (tmp_path / "nodes.csv").write_text("\n".join(rows) + "\n")
     sides = {name: ",".join(map(str, labels)) for name, labels in reduced.sides.items()}
     options = "a.op4:K --mass a.op4:M --damping-matrix a.op4:B --nodes nodes.csv --dofs dofs.csv"
     given = [word for name, text in sides.items()
