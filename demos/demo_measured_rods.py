@@ -5,13 +5,15 @@
 # the measured numbers were opened; the records lie in `tests/measured/`. Here the models run anew,
 # and the picture lays what was measured over them. Nothing was adjusted afterwards.
 #
-# Run: `python demos/demo_measured_rods.py`, in a checkout
+# Run: `python demos/demo_measured_rods.py`, in a checkout; under `mpirun` one process does the work
 # Time: 10 s
 # Writes: `measured_rods.png` into `out/`; another folder with `--out`
 
 import argparse
 import sys
 from pathlib import Path
+
+from mpi4py import MPI
 
 import numpy as np
 
@@ -28,6 +30,8 @@ options = argparse.ArgumentParser(description="rods that others measured")
 options.add_argument("--out", type=Path, default=Path("out"), help="folder, made if missing")
 options.add_argument("-q", "--quiet", action="store_true", help="no tables")
 options = options.parse_args()
+if MPI.COMM_WORLD.rank:
+    raise SystemExit  # rods are work for one process
 options.out.mkdir(parents=True, exist_ok=True)
 say = (lambda *_: None) if options.quiet else print
 
