@@ -48,17 +48,20 @@ def reference_motion(body: BodyData, reference: object) -> Array:
     return np.linalg.solve(from_rigid, from_shapes)
 
 
+def _moved_rigidly(point: Array) -> Array:
+    """(6, 6) translation and rotation at a point under rigid motions about the origin."""
+    return np.block([[np.eye(3), -skew(point)], [np.zeros((3, 3)), np.eye(3)]])
+
+
 def rigid_marker(name: str, point: Array, translation: Array, rotation: Array) -> Marker:
     """An interface that is rigid: its six coordinates are its motion."""
-    rigid = np.block([[np.eye(3), -skew(point)], [np.zeros((3, 3)), np.eye(3)]])
-    hold = np.hstack([rigid, np.vstack([translation, rotation])])
+    hold = np.hstack([_moved_rigidly(point), np.vstack([translation, rotation])])
     return Marker(name, point, translation, rotation, "rbe2", hold)
 
 
 def marker_motion(marker: Marker, r: int) -> tuple[Array, Array]:
     """The six motions of a marker under rigid motions and under the shapes."""
-    rigid = rigid_marker(marker.name, marker.point, *np.zeros((2, 3, 0))).hold
-    return rigid, motion_of(marker).reshape(6, r)
+    return _moved_rigidly(marker.point), motion_of(marker).reshape(6, r)
 
 
 def _pins(points: list[Marker], r: int) -> tuple[Array, Array]:

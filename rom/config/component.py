@@ -230,7 +230,7 @@ def quickly_solved(model: "FEModel") -> "FEModel":
     """The same, large matrices by MUMPS where it is installed."""
     if model.n_dofs < MANY_FOR_SCIPY or find_spec("dolfinx") is None:
         return model
-    from rom.fe.elasticity import by_mumps
+    from rom.fe import by_mumps  # which says so where FEniCSx is there and broken
 
     return by_mumps(model)
 

@@ -122,15 +122,15 @@ def refuse_hostile(archive: zipfile.ZipFile, limit: int, hint: str = LARGER_HINT
             raise UnsafeFileError(f"the member {name[:60]!r} leads elsewhere.")
 
 
-def read_array(archive: zipfile.ZipFile, name: str) -> Array:
-    """One array; the header is compared with the size of the member before memory is taken."""
+def read_array(archive: zipfile.ZipFile, name: str, *, any_order: bool = False) -> Array:
+    """One array, by rows or in any order; its header is checked before memory is taken."""
     info = archive.getinfo(f"{name}.npy")
     try:
         with archive.open(info) as member:
             if npy.read_magic(member) == (1, 0):
-                shape, _, dtype = npy.read_array_header_1_0(member)
+                shape, fortran, dtype = npy.read_array_header_1_0(member)
             else:
-                shape, _, dtype = npy.read_array_header_2_0(member)
+                shape, fortran, dtype = npy.read_array_header_2_0(member)
     except (ValueError, SyntaxError, TypeError, TokenError) as error:
         raise FileFormatError(f"the array {name!r} has a broken header.") from error
     if dtype.str not in ("<f8", "<i8", "|u1"):
@@ -138,7 +138,7 @@ def read_array(archive: zipfile.ZipFile, name: str) -> Array:
             f"the array {name!r} has the type {dtype.str}; such a file holds 8-byte numbers."
         )
     n_bytes = int(np.prod(shape, dtype=object)) * dtype.itemsize
-    if n_bytes > info.file_size:
+    if (fortran and not any_order) or n_bytes > info.file_size:
         raise UnsafeFileError(
             f"the array {name!r} claims {n_bytes} bytes but has {info.file_size}."
         )

@@ -82,6 +82,7 @@ WRONG_MEMBERS = [
     ("manifest.npy", npy(np.zeros(3, np.uint8)), FileFormatError, "manifest cannot be read"),
     ("K.npy", npy(np.array([{}], dtype=object), allow_pickle=True), UnsafeFileError, "type"),
     ("K.npy", npy(np.eye(2, dtype=np.float32)), UnsafeFileError, "type <f4"),
+    ("K.npy", npy(np.asfortranarray([[2.0, 0.0], [1.0, 2.0]])), UnsafeFileError, "'K' claims"),
     ("K.npy", npy(np.eye(2)), FileFormatError, "'K' was changed after writing"),
     ("K.npy", npy(np.eye(3))[:-8], FileFormatError, "cut|claims"),
     ("K.npy", b"not an array", FileFormatError, "broken header"),

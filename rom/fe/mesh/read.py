@@ -47,11 +47,11 @@ if TYPE_CHECKING:
 INCLUDES = {"abaqus": keywords.INCLUDE_PATTERN, "nastran": bulk.INCLUDE_PATTERN}
 LARGEST_FILE = 2**32  # bytes; some ten million nodes
 FACET_SHAPE = {"tetrahedron": "triangle", "hexahedron": "quadrilateral"}
-READERS = {
-    **{".geo": "geo", ".py": "builder", ".step": "step", ".stp": "step", ".msh": "msh"},
-    **{".unv": "unv", ".inp": "abaqus", ".cdb": "ansys", ".med": "med"},
-    **dict.fromkeys((".bdf", ".nas", ".dat", ".fem"), "nastran"),
-}
+ENDINGS = {  # of files, by what reads them
+    "geo": ".geo", "builder": ".py", "step": ".step .stp", "msh": ".msh", "unv": ".unv",
+    "abaqus": ".inp", "nastran": ".bdf .nas .dat .fem", "ansys": ".cdb", "med": ".med",
+}  # fmt: skip
+READERS = {ending: reader for reader, own in ENDINGS.items() for ending in own.split()}
 DECKS = ("abaqus", "nastran", "ansys")  # may say what regions are made of
 
 
