@@ -113,6 +113,7 @@ from rom.mbs.analysis.inverse_dynamics import inverse_dynamics as inverse_dynami
 from rom.mbs.analysis.law_check import check_law as check_law
 from rom.mbs.analysis.linearize import linearize as linearize
 from rom.mbs.analysis.local_equations import snapshot as snapshot
+from rom.mbs.analysis.motion_certificate import certify_motion as certify_motion
 from rom.mbs.analysis.response import frequency_response as frequency_response
 from rom.mbs.analysis.response import transmissibility as transmissibility
 from rom.mbs.analysis.sensitivity import equilibrium_sensitivity as equilibrium_sensitivity

@@ -45,7 +45,8 @@ io: files archive native fields matrices sid programs fmu bodies history export 
 mbs: compiler kernels parts connections elements mechanism equations results integrate control
   analysis
 mbs.analysis: local_equations rotors few_modes tangent equilibrium linearize campbell
-  response steady_motion sensitivity inverse_dynamics law_check
+  response steady_motion sensitivity inverse_dynamics law_check small_errors
+  motion_certificate
 mbs.elements: field family law_calls joint_forces springs loads laws formulas motors contact
   joint_laws bushings nonlinear solids
 components.gear_mesh: gears compliance tooth_elements contact tooth_loads symbols keys field

@@ -110,6 +110,27 @@ def at_instants(solution: AnySolution) -> Iterator[Work]:
         yield W
 
 
+def residuals_along(solution: AnySolution) -> Array:
+    """(n_t, n) what is left of the equations of motion at each instant."""
+    packed, found = solution.packed, np.zeros_like(solution.v)
+    if packed.asked:
+        return np.array([W.residual.copy() for W in at_instants(solution)])
+    motion = solution.q, solution.v, solution.a, solution.lam
+    W, base = workspace(packed.seen, len(packed.signals)), packed.places.before(solution.base)
+    track_residuals(packed.seen, W, motion, base, solution.signals, found)
+    return found
+
+
+@kernel
+def track_residuals(s, W, motion, base, signals, out):
+    """Fill the residuals."""
+    Q, V, A, L = motion
+    for k in range(Q.shape[0]):
+        evaluate_at(s, W, Q[k], V[k], base[k], signals[k])
+        residual(s, W, Q[k], V[k], A[k], L[k])
+        copy(W.residual, out[k])
+
+
 def stress_in_motion(
     recovery: Any, q: Array, A: Array, omega: Array, a: Array, gravity: Array
 ) -> Array:
