@@ -47,7 +47,7 @@ TASKS: dict[str, tuple[str, str]] = {
     ),
     "Check": (
         "How far a model, a body, a motion or a law can be trusted.",
-        """check Report audit check_law eigen.mac eigen.residual_errors io.check_sid""",
+        """check Report audit certify_motion check_law eigen.mac eigen.residual_errors io.check_sid""",
     ),
     "Assemble": (
         "Bodies put together before any motion.",

@@ -1,12 +1,14 @@
 """The flexible body: everything a floating-frame integrator needs, independent of the mesh."""
 
 from dataclasses import dataclass
+from typing import Annotated, Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import finite, typed, whole
+from rom.arguments import AnySolution, Between, finite, typed, whole
 from rom.body.conversion import converted
+from rom.body.for_motion import for_motion
 from rom.body.frame import on_mean_axes, seen_from
 from rom.body.nonlinear.quartic import Quartic
 from rom.body.nonlinear.sampled import Sampled
@@ -140,6 +142,34 @@ class FlexibleBody(BodyData):
             'mean-axis'
         """
         return on_mean_axes(self)
+
+    def for_motion(
+        self,
+        motion: AnySolution,
+        *,
+        name: str | None = None,
+        goal: Literal["stress", "deformation"] = "deformation",
+        tol: Annotated[float, Between(0, 1, "()")] = 0.01,
+    ) -> "FlexibleBody":
+        """The body with its static shapes and the fewest modes that a motion needs.
+
+        Modes with all interfaces held are kept in the order of what they are worth to the goal,
+        whatever their frequency. Stress keeps the static share of those left out where the body
+        knows it. ``provenance["for motion"]`` has the table: frequency [Hz], worth as a share of
+        the goal, whether kept. `rom.certify_motion` tells how far the smaller body serves.
+
+        Args:
+            motion: of this body; also ``motion`` of a `rom.certify_motion` to which it was the
+                richer one.
+            name: of the body in the motion; its own if missing.
+            goal: largest stress, of components on the surface, or displacement of the surface.
+            tol: what all modes left out may add to the goal, over its largest value [1].
+
+        Raises:
+            ConfigError: if the motion is not one of this body, or it does not know its stress.
+            ModelError: for a basis of free-free modes alone, or a body without a surface.
+        """
+        return for_motion(self, motion, name or self.name, goal, tol)
 
     def surface_areas(self, where: Where = None) -> Array:
         """(s,) area that belongs to each point of the surface, undeformed [m^2].

@@ -40,14 +40,14 @@ def _moves_around_rest(body: Body) -> bool:
 
 def seen_from(body: Body, reference: object) -> Body:
     """The body in another frame, see `FlexibleBody.with_reference`."""
-    return _on_normal_modes(moved_to(body, reference))[0]
+    return on_normal_modes(moved_to(body, reference))[0]
 
 
 def at_large_deflection(
     body: Body, reference: object, E: Array, model: FEModel, ops: Operators
 ) -> tuple[Body, Array]:
     """The body in another frame with its energy at finite strain, and its shapes E there."""
-    X, (found, V) = reference_motion(body, reference), _on_normal_modes(moved_to(body, reference))
+    X, (found, V) = reference_motion(body, reference), on_normal_modes(moved_to(body, reference))
     shapes = (E - rigid_motions(own_points(ops, model.points)) @ X) @ V
     energy = Quartic.from_gram(model.stresses.large_strain().gram(shapes), found.n_modes)
     markers = {
@@ -85,7 +85,7 @@ def reference_label(reference: object) -> str:
     return "mean-axis" if reference == "free" else str(reference)
 
 
-def _on_normal_modes(body: Body) -> tuple[Body, Array]:
+def on_normal_modes(body: Body) -> tuple[Body, Array]:
     """The body with its normal modes as elastic coordinates, q = V q_new, and V (r, r)."""
     smallest = np.linalg.eigvalsh(body.M).min(initial=np.inf)
     if smallest <= 0:

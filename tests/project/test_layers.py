@@ -54,8 +54,8 @@ components.wheels: faces sector rotation modes travelling reduced wheel_body bla
 components.updating: frf_data measured responses airframe models methods family_model
   normal_equations verdict estimate comparison placement observers pictures verb field
 components.journal_bearing: films closed_forms oil_film statics record keys field
-body: recovery nonlinear records inertia reference stiffening conversion frame rotating surface
-  flexible prestress projection damping spread
+body: recovery nonlinear records inertia reference stiffening conversion frame for_motion
+  rotating surface flexible prestress projection damping spread
 stages: bodies deflection
 reduction: bases interfaces full_model
 view: canvas figures scenes

@@ -59,7 +59,7 @@ class MotionReport(Report):
         motion: the motion as richer bodies would make it, to first order.
     """
 
-    curves: Mapping[str, Curve] = field(default_factory=dict, compare=False)
+    curves: Mapping[str, Curve] = field(default_factory=dict, compare=False, repr=False)
     motion: Any = field(default=None, compare=False, repr=False)
 
 
