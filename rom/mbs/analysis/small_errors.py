@@ -12,6 +12,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 from scipy.linalg import block_diag, qr
 
 from rom.mbs.elements.family import apply_laws
@@ -121,7 +122,6 @@ class Piece(NamedTuple):
     dN: Array
     M: Array  # (n, n)
     forces: Array  # (n, 2 f) of z and z'
-    reaction: Array  # (n, m)
     spins: tuple[Array, ...]  # see `_equations`
 
 
@@ -135,14 +135,14 @@ def _piece(
     """
     span, step = times
     M, C, K, *spins = _equations(rich, W, k, A)
-    _, N, reaction = _allowed(rich, W, k, A)
+    N = _allowed(rich, W, k, A).free
     metric = M + (CARRIED * step) ** 2 * _elastic_stiffness(rich.packed)
     N = _nearest(N, ends[0], metric)
     there = _nearest(ends[1], N, metric)
     dN = (there - ends[0]) / span
     forces = np.hstack([K @ N + C @ dN, C @ N + 2 * M @ dN])
     P = np.linalg.solve(N.T @ M @ N, N.T)
-    return Piece(P @ -forces, P, N, dN, M, forces, reaction, tuple(spins)), there
+    return Piece(P @ -forces, P, N, dN, M, forces, tuple(spins)), there
 
 
 def _motions(piece: Piece, y: Array, f: Array, s: Array) -> tuple[Array, Array, Array]:
@@ -160,7 +160,7 @@ def corrected(rich: Solution, R: Array, pieces: int) -> Solution:
     packed, t, axes = rich.packed, rich.t, axes_of_bodies(rich)
     W, unit = workspace(packed.system, len(packed.signals)), packed.unit[:, None]
     R, ends = _turned(rich, R, axes), _ends(rich, W, axes, pieces)
-    moved, dlam = np.zeros((3, *R.shape)), np.zeros_like(rich.lam)
+    moved, pull = np.zeros((3, *R.shape)), R.copy()
     here = _allowed(rich, W, 0, axes[0]).free
     y = _start(rich, here, R[0])
     for first, end in pairwise(ends):
@@ -172,15 +172,32 @@ def corrected(rich: Solution, R: Array, pieces: int) -> Solution:
         found = answers(piece.A, y, t[rows], f)
         moved[:, rows] = _motions(piece, found, f, t[rows] - t[first] - span / 2)
         inertia = (found @ piece.A.T + f) @ (piece.M @ piece.N).T
-        dlam[rows] = -(R[rows] + inertia + found @ piece.forces.T) @ piece.reaction
+        pull[rows] = R[rows] + inertia + found @ piece.forces.T
         back, here = np.linalg.lstsq(there / unit, last / unit, rcond=None)[0], there
         y = (found[-1].reshape(2, -1) @ back.T).ravel()
     d, rate, second = (_turned(rich, x, axes.swapaxes(-1, -2)) for x in moved)
     q = np.empty_like(rich.q)
     for k, step in enumerate(d):
         retract(packed.system, rich.q[k], step, q[k])
-    v, a, lam = rich.v + rate, rich.a + second, rich.lam + dlam
+    v, a, lam = rich.v + rate, rich.a + second, rich.lam - _multipliers(rich, W, axes, pull)
     return replace(rich, q=q, v=v, a=a, lam=lam, _tracks={})
+
+
+def _multipliers(rich: Solution, W: Work, axes: Array, pull: Array) -> Array:
+    """(n_t, m) of forces (n_t, n) that joints take up; rows of joints turn with the bodies."""
+    spins = [
+        np.linalg.norm(rich.v[:, at + 3 : at + 6], axis=1) for at in rich.packed.system.bodies.v_at
+    ]
+    turned = cumulative_trapezoid(np.max(spins, axis=0), rich.t, initial=0.0)
+    looks = np.unique(np.r_[np.unique(turned // MAX_TURN, return_index=True)[1], rich.t.size - 1])
+    found = np.zeros_like(rich.lam)
+    here = _allowed(rich, W, 0, axes[0]).reaction
+    for first, end in pairwise(looks):
+        there = _allowed(rich, W, end, axes[end]).reaction
+        rows, share = slice(first, end + 1), np.linspace(0.0, 1.0, end - first + 1)[:, None]
+        found[rows] = (1 - share) * (pull[rows] @ here) + share * (pull[rows] @ there)
+        here = there
+    return found
 
 
 def _elastic_stiffness(packed: Packed) -> Array:

@@ -77,7 +77,7 @@ def arm(body, f=6.0, load=1.0, other=None):
     return mech, 0.4
 
 
-def run_up(body):
+def run_up(body, speed=80.0):
     """A shaft with a wheel beside its axis, brought to a speed below its critical one."""
     mech = rom.Mechanism(gravity=(0, 0, -9.81))
     shaft = mech.add_flexible("shaft", body)
@@ -86,7 +86,7 @@ def run_up(body):
     )
     mech.revolute("bearing", mech.ground.marker((0, 0, 0)), shaft.marker("root"), axis=(1, 0, 0))
     mech.fixed("seat", shaft.marker("tip"), wheel.marker("hub"))
-    mech.drive("motor", "bearing", lambda t: 80 * t * ramp(t, 0.3))
+    mech.drive("motor", "bearing", lambda t: speed * t * ramp(t, 0.3))
     return mech, 0.5
 
 

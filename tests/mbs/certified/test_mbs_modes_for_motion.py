@@ -83,6 +83,23 @@ def test_what_cannot_be_chosen_from_is_refused():
 
 
 @pytest.mark.fenicsx
+def test_the_static_stress_of_modes_left_out_is_that_of_a_body_that_never_had_them():
+    """Rows of the frame, products of angular velocities included: finite elements know them."""
+    model = rom.fe.model(ROOT / "meshes" / "flexure.geo", material=STEEL)
+    how = {"interfaces": {"base": "rbe2", "drive": "rbe2"}, "certify": False, "stress": True}
+    whole, bare = (rom.reduce(model, method=rom.CraigBampton(n), **how) for n in (12, 0))
+    mech = rom.Mechanism()
+    mech.add_flexible("body", whole)
+    chosen = whole.for_motion(rom.simulate(mech, t_end=1e-3, dt=1e-3), goal="stress", tol=0.99)
+    assert chosen.n_modes == bare.n_modes == 6
+    at, beside = chosen.stress.inertial[:, :12], bare.stress.inertial[:, :12]
+    assert_allclose(at, beside, rtol=0, atol=1e-5 * np.abs(beside).max(axis=0).min())
+    turn = np.linalg.lstsq(bare.surface.shape, chosen.surface.shape, rcond=None)[0]
+    at, beside = chosen.stress.inertial[:, 12:], bare.stress.inertial[:, 12:] @ turn
+    assert_allclose(at, beside, rtol=0, atol=1e-5 * np.abs(beside).max())
+
+
+@pytest.mark.fenicsx
 @pytest.mark.parametrize("part", few(1, [[x] for x in PARTS]))
 def test_one_per_cent_of_stress_takes_fewer_modes_than_by_frequency(part):
     """At most 60 % of those that Craig-Bampton by frequency needs, whose number misses it."""
