@@ -69,7 +69,7 @@ def test_a_shaft_that_turns_nearly_as_fast_as_it_rings_is_told(speed, beams):
     report = rom.certify_motion(motion, {"shaft": more})
     for goal, (told, true, alike) in compared(motion, truth, report).items():
         assert 0.8 < told / true < 1.2, goal
-        assert alike > 0.95, goal
+        assert alike > 0.9, goal
 
 
 def test_the_corrected_motion_is_one(beams):
