@@ -186,10 +186,13 @@ def stands(masonry: Masonry, loads: Sequence[Load] = (), *, t: float = 0.0) -> b
 
 
 @typed
-def load_factor(masonry: Masonry, loads: Sequence[Load], *, t: float = 0.0) -> float:
+def load_factor(
+    masonry: Masonry, loads: Sequence[Load], *, dead: Sequence[Load] = (), t: float = 0.0
+) -> float:
     """Largest factor [1] of loads that rigid stones bear, under their weight too; infinite if any.
 
-    Loads are taken at a time t [s]; of a motion of the ground its inertia is multiplied.
+    Loads are taken at a time t [s]; of a motion of the ground its inertia is multiplied. Those that
+    are ``dead``, as a fill, act as they are.
 
     Raises:
         ConfigError: if a load cannot be; if the stones do not even bear their weight.
@@ -199,7 +202,7 @@ def load_factor(masonry: Masonry, loads: Sequence[Load], *, t: float = 0.0) -> f
         Livesley (1978), as above.
     """
     system, load = _joint_forces(masonry), _applied(masonry, loads, t)
-    found = _solve(system, system.weight, load[:, None])
+    found = _solve(system, system.weight + _applied(masonry, dead, t), load[:, None])
     if found.status == 2:
         raise ConfigError("the masonry does not stand by itself; it needs thickness or friction.")
     return float(found.x[-1]) if found.status == 0 else np.inf
