@@ -194,7 +194,7 @@ def gives_way(what: Arch, bond: float, friction: float = 0.6, time: float = 4.0)
     return float(most * run.t[moved.argmax()] / time) if moved.any() else np.inf
 
 
-def plastic(  # noqa: PLR0913  all that a section knows
+def plastic(
     one: Ring,
     loads: list[Load],
     dead: list[Load],
@@ -317,13 +317,16 @@ ARCHES = Structure(
      "depth": (0.165, 0.03), "soil": (1.0, 0.1), "spread": (0.5, 0.25), "passive": (1 / 3, 1 / 3),
      "angle": (30.0, 5.0), "cohesion": (5e3, 5e3)},
     (1, 2),
-    "Density 1800 kg/m3 where none is told, and 57, 48, 98 courses where they are not counted. Bond:\n"
+    "Density 1800 kg/m3 where none is told, and 57, 48, 98 courses where they are not "
+    "counted. Bond:\n"
     "shear strength, and flexural strength that a code gives any mortar with clay bricks. Glued\n"
     "joints give way all at once, brittle ones bear less: joints of the moving arches, BRITTLE.\n"
-    "The ring that no tension holds and that does not stand alone bears 0. Carozzi's load stands\n"
+    "The ring that no tension holds and that does not stand alone bears 0. Carozzi's load "
+    "stands\n"
     "0.556 m from the abutment, about a quarter of the span: both are here. Fill pushes with a\n"
     "third of Rankine's passive pressure on the half away from the load; where it yields it\n"
     "pushes with anything between active and passive pressure and cohesion. Known before: the\n"
     "bridge fell under 228 kN, arch U_A had its first hinge near 1.9 kN and the order of its\n"
-    "hinges; others compute 40.6 kN for the ring alone and take 0.03 MPa of tension for Borri's.",
+    "hinges; others compute 40.6 kN for the ring alone and take 0.03 MPa of tension for "
+    "Borri's.",
 )  # fmt: skip
