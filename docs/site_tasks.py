@@ -151,5 +151,5 @@ SUBJECTS = {
     "Gears and bearings": "planetary transmission two_stage oil_inlet",
     "Wind turbines": "wind_turbine whole_turbine wind_power",
     "Models and measurements": "updating bolted_frame virtual_sensing measured_rods",
-    "Stones and rocks": "masonry rockfall",
+    "Stones and rocks": "masonry measured_arches rockfall",
 }

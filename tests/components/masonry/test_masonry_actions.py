@@ -429,6 +429,20 @@ def test_steps_settle_with_friction_of_one_and_more(mu, cuts):
     assert motion.cuts < cuts
 
 
+def test_a_dead_load_holds_a_block_down_and_is_not_multiplied():
+    """F h = (W + D) b / 2 with D in the middle; F h = W b / 2 + D b / 4 at a quarter."""
+    b, h, D = 0.5, 2.0, 3e3
+    model = on_ground(stone(box(b, h), **SOFT), friction=4.0)
+    load, W = PointLoad(1, (0.0, h), (1.0, 0.0)), 2000 * b * h * G
+    for x in (b / 2, 3 * b / 4):
+        dead = [PointLoad(1, (x, h), (0.0, -D))]
+        needed = (W * b / 2 + D * (b - x)) / h
+        assert masonry.load_factor(model, [load], dead=dead) == pytest.approx(needed, rel=1e-6)
+    pushed = [PointLoad(1, (0.0, h), (W, 0.0))]
+    with pytest.raises(ConfigError, match="not stand by"):
+        masonry.load_factor(model, [load], dead=pushed)
+
+
 @pytest.mark.parametrize(("y", "force"), [(2.0, 1.0), (2.0, -1.0), (0.4, 1.0)])
 def test_a_horizontal_force_tips_a_block_by_its_lever_about_the_ground(y, force):
     """F y = W b / 2, on whatever side and below or above the mass centre; friction of 4 holds."""
