@@ -147,6 +147,17 @@ def test_the_fill_weighs_what_lies_above_the_ring():
     assert_allclose(sum(f[0] for _, _, f in push), -thrust, rtol=1e-9)
 
 
+def test_columns_of_fill_weigh_in_their_centroids():
+    found = one("Prestwood", 6)
+    x, z = found.back()[:, 0], arches.depths(found, 0.165)
+    for k, point, force in arches.weight_of_fill(found, 0.165, 2000.0):
+        s, w = np.polynomial.legendre.leggauss(3)
+        at = (x[k] + x[k + 1]) / 2 + s * (x[k + 1] - x[k]) / 2
+        w = w * (x[k + 1] - x[k]) / 2 * np.interp(at, x, z)
+        exact = w @ at / w.sum(), -2000.0 * arches.GRAVITY * w.sum()
+        assert_allclose((point[0], force[1]), exact, rtol=1e-9)
+
+
 def test_earth_that_may_push_only_one_way_is_a_dead_load():
     """Thrust between equal bounds against the same thrust by hand."""
     found = one("Prestwood")
