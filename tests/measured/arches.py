@@ -158,6 +158,24 @@ def push_of_fill(one: Ring, crown: float, density: float, ratio: float) -> list[
     return [(k, middle[k], np.array([force[k], 0.0])) for k in np.flatnonzero(way < 0)]
 
 
+def earth_that_yields(
+    one: Ring, crown: float, density: float, angle: float, cohesion: float
+) -> tuple[Array, Array, Array]:
+    """Least and largest inward thrust on each voussoir [N/m] after Rankine, and its way."""
+    pressure, height, way = upright(one, crown, density)
+    most = passive(angle)
+    return (
+        pressure * height / most,
+        (most * pressure + 2 * cohesion * np.sqrt(most)) * height,
+        way,
+    )
+
+
+def passive(angle: float) -> float:
+    """Horizontal over vertical pressure of fill that is pushed, friction in degrees."""
+    return float(np.tan(np.pi / 4 + np.radians(angle) / 2) ** 2)
+
+
 def stones(one: Ring, friction: float, bond: float, E: float = 2e9) -> Masonry:
     """The component's arch; bond is shear and flexural strength, of joints of a metre of depth.
 
@@ -294,12 +312,10 @@ def bridge(mesh: int, shape: Numbers, p: Numbers) -> Numbers:
     x, crown, density = (what.at + p["at"] - 0.5) * what.span, p["depth"], p["soil"] * FILL
     deep = float(np.interp(x, one.back()[:, 0], depths(one, crown)))
     near, load = spread(one, x, PATCH), spread(one, x, PATCH + 2 * p["spread"] * deep)
-    most = np.tan(np.pi / 4 + np.radians(p["angle"]) / 2) ** 2  # Rankine
     weight = weight_of_fill(one, crown, density)
-    push = weight + push_of_fill(one, crown, density, p["passive"] * most)
-    pressure, height, way = upright(one, crown, density)
-    largest = (most * pressure + 2 * p["cohesion"] * np.sqrt(most)) * height
-    earth, strength = (pressure * height / most, largest, way), p["strength"] * what.strength
+    push = weight + push_of_fill(one, crown, density, p["passive"] * passive(p["angle"]))
+    earth = earth_that_yields(one, crown, density, p["angle"], p["cohesion"])
+    strength = p["strength"] * what.strength
     model = stones(one, friction, 0.0)
     loads = {
         "ring alone": borne(model, near, []),

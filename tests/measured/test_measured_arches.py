@@ -158,6 +158,34 @@ def test_columns_of_fill_weigh_in_their_centroids():
         assert_allclose((point[0], force[1]), exact, rtol=1e-9)
 
 
+def test_earth_yields_between_the_pressures_of_rankine():
+    """At 30 degrees a third and three times the weight above, and twice c sqrt 3."""
+    found = one("Prestwood")
+    deep = arches.depths(found, 0.165)[0]
+    weight = 2000.0 * arches.GRAVITY * (deep**2 - 0.165**2) / 2
+    least, largest, way = arches.earth_that_yields(found, 0.165, 2000.0, 30.0, 5e3)
+    for side in (-1, 1):
+        assert_allclose(least[way == side].sum(), weight / 3, rtol=1e-9)
+        exact = 3 * weight + 2 * 5e3 * np.sqrt(3) * (deep - 0.165)
+        assert_allclose(largest[way == side].sum(), exact, rtol=1e-9)
+
+
+def test_the_bridge_bears_its_width_of_a_load_that_spreads_through_the_fill():
+    """A patch of 0.3 m at the quarter, by half of the depth wider on either side."""
+    found, shape = one("Prestwood"), dict.fromkeys(("thickness", "rise", "density"), 1.0)
+    numbers = arches.bridge(1, shape | {"datum": 0.0}, KNOWN | {"passive": 0.0})
+    R, x = found.radius + 0.11, 6.55 / 4
+    deep = 0.165 + R - np.sqrt(R**2 - x**2)
+    load = arches.spread(found, -x, 0.3 + deep)
+    dead = arches.weight_of_fill(found, 0.165, 2040.0)
+    force = 3.8e-3 * arches.plastic(found, load, dead, friction=0.6)
+    assert_allclose(numbers["Prestwood, fill weighs [kN]"], force, rtol=1e-3)
+    assert_allclose(numbers["Prestwood, fill pushes [kN]"], force, rtol=1e-3)
+    load = arches.spread(found, -x, 0.3)
+    force = 3.8e-3 * arches.plastic(found, load, [], friction=0.6)
+    assert_allclose(numbers["Prestwood, ring alone [kN]"], force, rtol=1e-3)
+
+
 def test_earth_that_may_push_only_one_way_is_a_dead_load():
     """Thrust between equal bounds against the same thrust by hand."""
     found = one("Prestwood")
