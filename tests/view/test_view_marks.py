@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from cases.mbs.drawn import lattice_bar, swinging
 from rom import view
 from rom.mbs.analysis.campbell import Campbell
+from rom.mbs.analysis.motion_certificate import Curve
 from rom.view.canvas.picture import ScaledTicks
 from rom.view.figures.things import actors_of
 
@@ -123,3 +124,15 @@ def test_several_scenes_stand_below_each_other_beside_curves():
     areas = page.subplots(1, 3)
     view.history(X, [("a [m]", {"one": X})], beside=scenes, ax=list(areas))
     assert [len(axes.images) for axes in areas] == [0, 1, 1]
+
+
+def test_a_curve_with_an_error_has_a_band_as_wide():
+    """Of what `rom.certify_motion` gives: above and below, whatever the sign of the error."""
+    value, error = np.sin(X), 0.1 * np.cos(X)
+    figure = view.history(X, [("energy [1]", {"rod": Curve(X, value, error)})])
+    (band,) = figure.axes[0].collections
+    x, y = band.get_paths()[0].vertices.T
+    for k in (5, 20, 30):
+        edges = y[np.isclose(x, X[k])]
+        size = abs(error[k])
+        np.testing.assert_allclose([edges.min(), edges.max()], [value[k] - size, value[k] + size])

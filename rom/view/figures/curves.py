@@ -58,8 +58,9 @@ def history(  # noqa: PLR0913  keywords of one picture
         t: (n,) time [s], or values of what is named by ``over``; or a motion.
         panels: (label of the axis with its unit, {name: (n,) values}) from top to bottom; of a
             motion names of what is asked, as "slider", "crank.pin" or "pivot angle"; a pair
-            (times, values) is drawn as points, a single number as a thin level line; values that
-            are words become rows, the first word lowest.
+            (times, values) is drawn as points, a curve of a `rom.certify_motion` with a band as wide
+            as its error, a single number as a thin level line; values that are words become rows,
+            the first word lowest.
         path: picture to write, .png; None to write nothing.
         title: heading.
         caption: what a stranger has to know; not written into axes of yours.
@@ -120,7 +121,12 @@ def _histories(
     lines, looks = [], []
     for (name, values), number in zip(curves.items(), numbers, strict=True):
         look, where = line_look(number), t
-        if isinstance(values, tuple):
+        if isinstance(values, tuple) and len(values) == 3:
+            where, values, error = (np.asarray(x, dtype=float) for x in values)
+            one_each(f"values of {name!r}", values.shape, "times", where.shape)
+            edges = values - np.abs(error), values + np.abs(error)
+            axes.fill_between(where, *edges, color=look["color"], alpha=0.25, lw=0)
+        elif isinstance(values, tuple):
             where, values = values
             look |= {"ls": "none", "marker": "o", "ms": 7, "clip_on": False}
         elif (given := np.asarray(values)).ndim == 0:
