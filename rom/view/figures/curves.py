@@ -58,7 +58,7 @@ def history(  # noqa: PLR0913  keywords of one picture
         t: (n,) time [s], or values of what is named by ``over``; or a motion.
         panels: (label of the axis with its unit, {name: (n,) values}) from top to bottom; of a
             motion names of what is asked, as "slider", "crank.pin" or "pivot angle"; a pair
-            (times, values) is drawn as points, a curve of a `rom.certify_motion` with a band as wide
+            (times, values) is drawn as points, a curve of `rom.certify_motion` with a band as wide
             as its error, a single number as a thin level line; values that are words become rows,
             the first word lowest.
         path: picture to write, .png; None to write nothing.
