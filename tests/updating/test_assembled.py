@@ -101,6 +101,30 @@ def test_a_spring_reaches_a_body_that_is_apart_by_a_rigid_arm(bolted):
     assert_allclose(moved @ K @ moved, 5.0 * 2.0**2 + 3.0 * y**2)
 
 
+def test_bolts_that_are_alike_share_one_factor(bolted):
+    """Two at one place are twice as stiff; at two places each feels its own motion, by a turn."""
+    tip, root = ("frame", "tip"), ("arm", "root")
+    twice = JointSpring((tip, tip), (root, root), (1e3, 0, 0), 0.1, 10.0)
+    half = 7850.0 * 0.5 * 0.1 * 0.08
+    found = modal(model_of(bolted, {"bolts": twice}, fixed=()).at(np.zeros(3)), ()).lam[11]
+    assert_allclose(found, 2 * 2 * 1e3 / half, rtol=1e-5)
+    ends = (tip, ("frame", "root")), (root, ("arm", "tip"))
+    parts, k = Parts.of(bolted), (3.0, 4.0, 5.0)
+    K, _ = JointSpring(*ends, k, 0.1, 10.0).term(parts)
+    moved = np.zeros(parts.n)
+    moved[parts.columns["arm"].start + np.array([2, 5])] = 2.0, 1.0  # along and about z
+    at = np.array([(0.5, 0.05), (0.0, 0.05)])  # of the tip and the root: the turn is (-y, x)
+    by_hand = sum(3.0 * y**2 + 4.0 * x**2 + 5.0 * 2.0**2 for x, y in at)
+    assert_allclose(moved @ K @ moved, by_hand)
+    refuse(
+        (
+            lambda: JointSpring(ends[0], ends[1][:1], k, 0.1, 10.0).term(parts),
+            "1 places of the other",
+        ),
+        (lambda: JointSpring((), (), k, 0.1, 10.0).term(parts), r"must be \(body, interface\) of"),
+    )
+
+
 def test_a_joint_and_both_moduli_are_found(bolted):
     true = {"frame.E": 1.2, "arm.E": 0.85, "bolts": 0.5}
     attached = {"bolts": BOLTS}

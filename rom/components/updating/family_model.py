@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import block_diag
 
-from rom.arguments import Positive, typed
+from rom.arguments import Positive, one_each, typed
 from rom.assembly.assembly import Assembly
 from rom.body.flexible import FlexibleBody
 from rom.body.records import Marker, still_motions
@@ -176,21 +176,26 @@ class JointSpring(UnknownPart):
     It acts where the first one is; the second one reaches there by a rigid arm.
 
     Attributes:
-        one, other: (body, interface).
-        stiffness: as of `GroundSpring` [N/m, N m/rad].
+        one, other: (body, interface); or of several bolts that are alike ((body, interface), ...).
+        stiffness: of each, as of `GroundSpring` [N/m, N m/rad].
     """
 
-    one: tuple[str, str]
-    other: tuple[str, str]
+    one: tuple[str, str] | tuple[tuple[str, str], ...]
+    other: tuple[str, str] | tuple[tuple[str, str], ...]
     stiffness: npt.ArrayLike
     low: Factor
     high: Factor
 
     def _acts(self, parts: Parts) -> tuple[Array, Array]:
-        arm = np.eye(6)
-        arm[:3, 3:] = -skew(parts.marker(self.one)[1].point - parts.marker(self.other)[1].point)
-        motion = parts.motion(self.one) - arm @ parts.motion(self.other)
-        return motion, _stiffness(self.one, self.stiffness)
+        sides = [x if x and isinstance(x[0], tuple) else (x,) for x in (self.one, self.other)]
+        one_each("places of the other side", len(sides[1]), "places of one", len(sides[0]))
+        motions = []
+        for one, other in zip(*sides, strict=True):
+            arm = np.eye(6)
+            arm[:3, 3:] = -skew(parts.marker(one)[1].point - parts.marker(other)[1].point)
+            motions.append(parts.motion(one) - arm @ parts.motion(other))
+        k = _stiffness(sides[0][0], self.stiffness)
+        return np.vstack(motions), block_diag(*[k] * len(motions))
 
 
 @typed
