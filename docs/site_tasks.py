@@ -150,6 +150,6 @@ SUBJECTS = {
     lost_tip bent_blade rotor""",
     "Gears and bearings": "planetary transmission two_stage oil_inlet",
     "Wind turbines": "wind_turbine whole_turbine wind_power",
-    "Models and measurements": "updating bolted_frame virtual_sensing measured_rods",
+    "Models and measurements": "updating bolted_frame virtual_sensing measured_rods barc",
     "Stones and rocks": "masonry measured_arches rockfall",
 }

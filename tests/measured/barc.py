@@ -1,5 +1,6 @@
 """The box with a removable component (BARC), free: solids in parts, reduced and joined."""
 
+import tomllib
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -119,6 +120,14 @@ class Shapes:
         return (own.T @ found) ** 2 / np.outer((own**2).sum(axis=0), (found**2).sum(axis=0))
 
 
+def shares(bodies, factor):
+    """(m,) of the elastic energy of each elastic mode that is in the springs, by Rayleigh."""
+    low, high = (
+        omega[6:] for omega, _ in (bolted(bodies, factor * (1 + x)) for x in (-0.01, 0.01))
+    )
+    return 2 * np.log(high / low) / np.log(1.01 / 0.99)
+
+
 def rebuilt(families, shapes, f, factor=1.0, damping=0.03, error=0.05, floor=1.0):
     """Responses beside measured frequencies f (n,) [Hz], as far as a test by modes tells them.
 
@@ -183,3 +192,8 @@ BARC_JOINT = Structure(
     "modes are predicted. The spreads are wider than those of the first prediction, by what modes\n"
     "4 to 6 then taught: walls as mills roll them, masses of bolts that nobody weighed.",
 )  # fmt: skip
+
+
+def damping():
+    """(6,) measured ratios [1]."""
+    return np.array(tomllib.loads((FOUND / "barc_joint.toml").read_text())["damping"])

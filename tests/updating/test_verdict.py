@@ -5,6 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom.components.updating.frf_data as frf
+from rom.components.updating.models import likeness
 from rom.components.updating.normal_equations import Data, Sums
 from rom.components.updating.verdict import chi_row, scores, unseen_directions, verdict
 
@@ -72,3 +73,14 @@ def test_limits_are_those_of_all_trials_and_allow_for_what_is_not_known_of_varia
 def test_noise_has_the_level_of_both_parts_together():
     H = frf.noisy(np.full(200_000, 3.0 + 4.0j), 0.1, np.random.default_rng(0))
     assert_allclose(np.sqrt(np.mean(np.abs(H / (3 + 4j) - 1) ** 2)), 0.1, rtol=0.01)
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_sensor_that_does_not_count_is_no_part_of_the_likeness():
+    """Two of three FRAC stay: one, and that of lines in quadrature to half of the others."""
+    used = np.ones((2, 3, 1), dtype=bool)
+    used[:, 2] = False
+    H, G = np.ones((2, 3, 1), dtype=complex), np.ones((2, 3, 1), dtype=complex)
+    G[0, 1] = 0.0  # |1 + 0|^2 / (2 1)
+    G[:, 2] = np.nan
+    assert_allclose(likeness(H, G, used).value, 1 - (1.0 + 0.5) / 2)

@@ -269,7 +269,8 @@ def sensor_dofs(model: ParametricModel) -> Index:
 
 def likeness(H: Complex, measured: Complex, used: Mask) -> Row:
     """One less the median FRAC of all pairs of channels (n_f, n_s, n_e), over lines that count."""
-    value = frac(H * used, np.where(used, measured, 0.0))[used.any(axis=0)]
+    seen = used.any(axis=0)  # of the others it is 0 / 0
+    value = frac(*(np.where(used, x, 0.0)[:, seen, None] for x in (H, measured)))
     return row("one less the median FRAC", 1.0 - float(np.median(value)), MAX_UNLIKE)
 
 

@@ -16,7 +16,7 @@ MESHED = [path for path in DEMOS if "rom.fe" in path.read_text()]
 LONG_DEMOS = {
     f"demo_{name}"
     for name in (
-        "assembly beam bent_blade best_matching bladed_disk bladed_rotor bolted_frame "
+        "assembly barc beam bent_blade best_matching bladed_disk bladed_rotor bolted_frame "
         "compressor_blade exchange flexible_arm flexure forming hand isotropy large_deflection "
         "large_mesh lost_tip masonry measured_arches measured_rods mistuning oil_inlet parameters "
         "pendulum_chain periodic planetary robot_arm rockfall rolling_wheel rotating_blade "
