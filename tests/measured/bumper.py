@@ -21,10 +21,10 @@ def masses(mech):
     )
 
 
-def chain(gap=None, *, contact=2.1e6, offset=0.0, push=None):
+def chain(gap=None, *, contact=2.1e6, offset=0.0, rail=13.5e3, push=None):
     """Four masses on a rail with the first swaying frequency of the whole frame."""
     whole = frame(2)
-    target, m, rail = swaying(whole)[0][0], masses(whole), 13.5e3
+    target, m = swaying(whole)[0][0], masses(whole)
     links = np.diff(np.eye(4), axis=0)
     low, high = 1e5, 1e6
     while high / low > 1 + 1e-9:  # frequencies rise with the stiffness

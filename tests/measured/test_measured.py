@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from measured import barc, record, rods
+from measured import barc, bumper, jim_beam, lanl, record, rods
 from numpy.testing import assert_allclose
 from scipy.linalg import eigh
 
@@ -13,10 +13,10 @@ from rom.components.cosserat import equilibrium, loads
 from rom.updating import Channels
 
 ALL = [pytest.param(one, id=one.name) for one in rods.RODS]
-ALL += [
-    pytest.param(one, id=one.name, marks=[pytest.mark.long, pytest.mark.fenicsx])
-    for one in (barc.BARC, barc.BARC_JOINT)
-]
+SOLIDS = (barc.BARC, barc.BARC_JOINT, jim_beam.JIM_BEAM, jim_beam.JIM_CORNERS, lanl.LANL,
+          lanl.LANL_FITTED, lanl.LANL_RAILS, bumper.BUMPER)  # fmt: skip
+ALL += [pytest.param(one, id=one.name, marks=[pytest.mark.long, pytest.mark.fenicsx])
+        for one in SOLIDS]  # fmt: skip
 
 
 @pytest.mark.parametrize("structure", ALL)
