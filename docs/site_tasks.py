@@ -47,7 +47,8 @@ TASKS: dict[str, tuple[str, str]] = {
     ),
     "Check": (
         "How far a model, a body, a motion or a law can be trusted.",
-        """check Report audit certify_motion check_law eigen.mac eigen.residual_errors io.check_sid""",
+        """check Report audit certify_motion check_law eigen.mac eigen.residual_errors
+        io.check_sid""",
     ),
     "Assemble": (
         "Bodies put together before any motion.",
@@ -150,6 +151,7 @@ SUBJECTS = {
     lost_tip bent_blade rotor""",
     "Gears and bearings": "planetary transmission two_stage oil_inlet",
     "Wind turbines": "wind_turbine whole_turbine wind_power",
-    "Models and measurements": "updating bolted_frame virtual_sensing measured_rods barc",
+    "Models and measurements": """updating bolted_frame virtual_sensing measured_rods
+    measured_frames barc""",
     "Stones and rocks": "masonry measured_arches rockfall",
 }
