@@ -9,7 +9,7 @@ import numpy.typing as npt
 from rom.arguments import finite, whole
 from rom.errors import ConfigError, MeshError, TagError
 from rom.fe.mesh.solid import SolidMesh
-from rom.fe.mesh.topology import faces_of, row_ids
+from rom.fe.mesh.topology import faces_of, find_rows
 from rom.model import Array, Index, Mask
 from rom.names import named
 
@@ -122,13 +122,10 @@ def _piece(mesh: SolidMesh, piece: Index, k: int, cuts: Cuts, name: str) -> Soli
 
 def _named_facets(mesh: SolidMesh, own: Mask, name: str) -> dict[str, Index]:
     """Those surfaces of the mesh that are faces of the cells of one piece."""
-    kind, n = mesh.kind, len(mesh.points)
-    listed = mesh.corners[own][:, np.array(kind.faces)].reshape(-1, kind.corners_per_face)
-    found = {}
+    c, found = mesh.kind.corners_per_face, {}
+    listed = mesh.corners[own][:, np.array(mesh.kind.faces)].reshape(-1, c)
     for key, rows in mesh.facets.items():
-        corners = rows[:, : kind.corners_per_face]
-        both, _ = row_ids(np.sort(np.vstack([listed, corners]), axis=1), n)
-        inside = np.isin(both[len(listed) :], both[: len(listed)])
+        inside = find_rows(rows[:, :c], listed, len(mesh.points)) >= 0
         if inside.all():
             found[key] = rows
         elif inside.any():

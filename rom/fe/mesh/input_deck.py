@@ -16,8 +16,8 @@ from rom.errors import InterfaceError, MeshError, TagError
 from rom.fe.mesh.cell_types import CELL_TYPES, DECK_EDGES
 from rom.fe.mesh.solid import SolidMesh
 from rom.fe.mesh.sources.abaqus import SIDES
-from rom.fe.mesh.topology import row_ids
-from rom.model import Index, Material, Orthotropic
+from rom.fe.mesh.topology import find_rows
+from rom.model import Material, Orthotropic
 from rom.names import ORIGIN_MARK, check_known, named
 
 STEPS = {"frequencies": "*FREQUENCY\n{n}", "matrices": "*FREQUENCY, SOLVER=MATRIXSTORAGE"}
@@ -95,25 +95,17 @@ def _elements(mesh: SolidMesh) -> Iterator[str]:
 
 
 def _interfaces(mesh: SolidMesh) -> Iterator[str]:
-    sides, supports = SIDES[4], mesh.kind.supports
+    sides, supports, n = SIDES[4], mesh.kind.supports, len(mesh.points)
     on_side = [[k for k, s in enumerate(supports) if set(s) <= set(side)] for side in sides]
     for name, facets in mesh.facets.items():
-        cell, side = _owners(mesh, facets[:, :3], np.array(sides))
+        owned = find_rows(facets[:, :3], mesh.cells[:, np.array(sides)].reshape(-1, 3), n)
+        cell, side = np.divmod(owned, len(sides))
         nodes = np.unique(mesh.cells[cell[:, None], np.array(on_side)[side]]) + 1
         yield f"*NSET, NSET={name}"
         for k in range(0, nodes.size, PER_LINE):
             yield ", ".join(map(str, nodes[k : k + PER_LINE]))
         yield f"*SURFACE, NAME={name}, TYPE=ELEMENT"
         yield from (f"{c + 1}, S{s + 1}" for c, s in zip(cell, side, strict=True))
-
-
-def _owners(mesh: SolidMesh, facets: Index, sides: Index) -> tuple[Index, Index]:
-    """A cell of each facet, and which of its sides the facet is."""
-    all_sides = mesh.cells[:, sides].reshape(-1, 3)
-    number, _ = row_ids(np.sort(np.vstack([all_sides, facets]), axis=1), len(mesh.points))
-    known, first = np.unique(number[: len(all_sides)], return_index=True)
-    place = first[np.searchsorted(known, number[len(all_sides) :])]
-    return place // len(sides), place % len(sides)
 
 
 def _materials(mesh: SolidMesh, material: Materials) -> Iterator[str]:

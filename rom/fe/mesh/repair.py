@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 
 from rom.errors import MeshError
-from rom.fe.mesh.cell_types import CellType, jacobians
+from rom.fe.mesh.cell_types import jacobians
 from rom.fe.mesh.solid import SolidMesh, compact
-from rom.fe.mesh.topology import row_ids
-from rom.model import Array, Index
+from rom.fe.mesh.topology import find_rows, row_ids
+from rom.model import Index
 
 # Serendipity shape functions at the centre of a face, and of the cell: corners, then mid-edges.
-FACE_CORNER, FACE_EDGE, CELL_CORNER, CELL_EDGE = -0.25, 0.5, -0.25, 0.25
+AT_FACE, AT_MIDDLE = 4 * (-0.25,) + 4 * (0.5,), 8 * (-0.25,) + 12 * (0.25,)
 
 
 def repair(mesh: SolidMesh) -> SolidMesh:
@@ -60,32 +60,17 @@ def _complete(mesh: SolidMesh) -> SolidMesh:
     kind, cells, x = mesh.kind, mesh.cells, mesh.points
     if cells.shape[1] != kind.n_nodes:
         raise MeshError(f"a 20-node hexahedron needs 20 nodes, got {cells.shape[1]}.")
-    n, m = x.shape[0], cells.shape[0]
-    faces = cells[:, np.array(kind.faces)]
-    number, n_faces = row_ids(np.sort(faces.reshape(-1, 4), axis=1), n)
+    n, m = len(x), len(cells)
+    faces = cells[:, np.array(kind.face_nodes)].reshape(-1, 8)
+    number, n_faces = row_ids(np.sort(faces[:, :4], axis=1), n)
     centres = np.empty((n_faces, 3))
-    centres[number] = _face_centres(x, cells, kind).reshape(-1, 3)
-    middle = CELL_CORNER * x[cells[:, :8]].sum(axis=1) + CELL_EDGE * x[cells[:, 8:]].sum(axis=1)
+    centres[number] = sum(w * x[faces[:, k]] for k, w in enumerate(AT_FACE))
+    middles = sum(w * x[cells[:, k]] for k, w in enumerate(AT_MIDDLE))
     full = np.hstack([cells, n + number.reshape(m, 6), n + n_faces + np.arange(m)[:, None]])
-    facets = {name: _complete_facets(f, faces, number, n) for name, f in mesh.facets.items()}
-    points = np.vstack([x, centres, middle])
+    facets = {}
+    for name, rows in mesh.facets.items():
+        place = find_rows(rows[:, :4], faces[:, :4], n)
+        known = (place >= 0).all()  # else the checks tell
+        facets[name] = np.hstack([rows, n + number[place][:, None]]) if known else rows
+    points = np.vstack([x, centres, middles])
     return replace(mesh, points=points, cells=full, cell_type="hex27", facets=facets)
-
-
-def _face_centres(x: Array, cells: Index, kind: CellType) -> Array:
-    """(m, 6, 3) centres of the faces."""
-    centres = []
-    for nodes in map(list, kind.face_nodes):
-        corner, edge = (x[cells[:, some]].sum(axis=1) for some in (nodes[:4], sorted(nodes[4:])))
-        centres.append(FACE_CORNER * corner + FACE_EDGE * edge)
-    return np.stack(centres, axis=1)
-
-
-def _complete_facets(facets: Index, faces: Index, number: Index, n: int) -> Index:
-    """(f, 9) facets with the centre of their face; (f, 8) ones of no face come back unchanged."""
-    known = np.sort(faces.reshape(-1, 4), axis=1)
-    both, _ = row_ids(np.vstack([known, np.sort(facets[:, :4], axis=1)]), n)
-    face = np.full(both.max(initial=0) + 1, -1)
-    face[both[: len(known)]] = number
-    centre = face[both[len(known) :]]
-    return facets if (centre < 0).any() else np.hstack([facets, n + centre[:, None]])

@@ -8,7 +8,7 @@ from rom.fe.mesh.cad import Axis
 from rom.fe.mesh.cell_types import DECK_EDGES
 from rom.fe.mesh.quality import aspect_ratio, cell_volumes, scaled_jacobian
 from rom.fe.mesh.solid import Notes, SolidMesh
-from rom.fe.mesh.topology import faces_of, row_ids
+from rom.fe.mesh.topology import find_rows, outer_facets
 from rom.model import Array, Index
 
 COUNTED_CELLS = ("curved cells", "straightened cells")  # where the mesh was made here
@@ -64,38 +64,23 @@ def surface_triangles(mesh: SolidMesh) -> dict[str, Index]:
 
     Facets of cells of second order come in pieces between their corners and middles of edges.
     """
-    faces = faces_of(mesh.cells, mesh.kind, len(mesh.points))
-    skin = faces.corners[faces.count == 1]
-    named = {name: rows[:, : mesh.kind.corners_per_face] for name, rows in mesh.facets.items()}
-    every = np.sort(np.vstack([skin, *named.values()]), axis=1)
-    number, _ = row_ids(every, len(mesh.points))
-    rest = skin[~np.isin(number[: len(skin)], number[len(skin) :])]
-    return {name: _pieces(mesh, rows) for name, rows in (named | {"": rest}).items()}
+    n, c = len(mesh.points), mesh.kind.corners_per_face
+    skin = outer_facets(mesh.cells, mesh.kind, n)
+    named = np.vstack([skin[:0], *mesh.facets.values()])
+    rest = skin[find_rows(skin[:, :c], named[:, :c], n) < 0]
+    return {name: _pieces(rows, c) for name, rows in (mesh.facets | {"": rest}).items()}
 
 
-def _pieces(mesh: SolidMesh, rows: Index) -> Index:
-    """Triangles of facets, given by their corners."""
-    k = rows.shape[1]
-    inner, around = rows, np.empty((0, 3), dtype=np.int64)
-    if mesh.kind.degree == 2:
-        after = np.roll(rows, -1, axis=1)
-        inner = _edge_middles(mesh, np.stack([rows, after], axis=-1).reshape(-1, 2)).reshape(-1, k)
-        around = np.stack([np.roll(inner, 1, axis=1), rows, inner], axis=-1).reshape(-1, 3)
-    if k == 4:
+def _pieces(facets: Index, c: int) -> Index:
+    """Triangles of facets with c corners, which nodes amid their edges may follow."""
+    corners = inner = facets[:, :c]
+    around = np.empty((0, 3), dtype=np.int64)
+    if facets.shape[1] > c:
+        inner = facets[:, c : 2 * c]
+        around = np.stack([np.roll(inner, 1, axis=1), corners, inner], axis=-1).reshape(-1, 3)
+    if c == 4:
         inner = np.vstack([inner[:, [0, 1, 2]], inner[:, [0, 2, 3]]])
     return np.vstack([inner, around])
-
-
-def _edge_middles(mesh: SolidMesh, edges: Index) -> Index:
-    """(m,) node in the middle of each edge (m, 2) of cells of second order."""
-    n, supports = len(mesh.points), mesh.kind.supports
-    middle = {i: list(s) for i, s in enumerate(supports) if len(s) == 2}
-    pairs = np.vstack([np.sort(mesh.cells[:, ends], axis=1) for ends in middle.values()])
-    keys, first = np.unique(pairs[:, 0] * n + pairs[:, 1], return_index=True)
-    wanted = np.sort(edges, axis=1)
-    nodes = mesh.cells[:, list(middle)].T.ravel()[first]
-    found: Index = nodes[np.searchsorted(keys, wanted[:, 0] * n + wanted[:, 1])]
-    return found
 
 
 def _axis(axis: Axis | None) -> Notes:

@@ -35,6 +35,14 @@ def row_ids(rows: Index, n: int) -> tuple[Index, int]:
     return key, values.size
 
 
+def find_rows(wanted: Index, known: Index, n: int) -> Index:
+    """(k,) which of the known rows has the nodes of each wanted one (k, c), in any order, or -1."""
+    number, n_rows = row_ids(np.sort(np.vstack([known, wanted]), axis=1), n)
+    place = np.full(n_rows, -1)
+    place[number[: len(known)]] = np.arange(len(known))
+    return place[number[len(known) :]]
+
+
 def _direction(faces: Index) -> Integers:
     """(k,) +1 or -1: whether the list runs from its smallest node to the smaller neighbour."""
     k, c = faces.shape
@@ -57,6 +65,12 @@ def faces_of(cells: Index, kind: CellType, n_points: int) -> Faces:
         count=np.bincount(number, minlength=n_faces),
         corners=corners,
     )
+
+
+def outer_facets(cells: Index, kind: CellType, n_points: int) -> Index:
+    """(f, kf) all nodes of the faces that one cell alone has, in the order of gmsh."""
+    faces, listed = faces_of(cells, kind, n_points), cells[:, np.array(kind.face_nodes)]
+    return listed[faces.count[faces.of_cell] == 1]
 
 
 def parts(touched: Index) -> tuple[int, Index]:

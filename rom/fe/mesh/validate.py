@@ -16,7 +16,7 @@ from rom.fe.mesh.cell_types import CELL_TYPES
 from rom.fe.mesh.quality import check_shape
 from rom.fe.mesh.repair import repair
 from rom.fe.mesh.solid import SolidMesh, cell_names, refuse_cells, shown
-from rom.fe.mesh.topology import Faces, faces_of, parts, row_ids
+from rom.fe.mesh.topology import Faces, faces_of, find_rows, parts, row_ids
 from rom.names import check_text, named
 from rom.plausible import SIZE, far_doubt
 
@@ -153,11 +153,9 @@ def _coincident_nodes(mesh: SolidMesh, faces: Faces) -> int:
 
 
 def _check_facets(mesh: SolidMesh, faces: Faces) -> None:
-    n_faces, n = faces.count.size, mesh.points.shape[0]
     for name, rows in mesh.facets.items():
-        corners = np.sort(rows[:, : mesh.kind.corners_per_face], axis=1)
-        both, _ = row_ids(np.vstack([np.sort(faces.corners, axis=1), corners]), n)
-        alien = ~np.isin(both[n_faces:], both[:n_faces])
+        corners = rows[:, : mesh.kind.corners_per_face]
+        alien = find_rows(corners, faces.corners, len(mesh.points)) < 0
         if alien.any():
             raise TagError(
                 f"{alien.sum()} of {alien.size} facets of surface {name!r} are not faces of any "

@@ -8,7 +8,7 @@ from rom.decks.rigid import Element, hung
 from rom.errors import FileFormatError, MeshError, TagError
 from rom.fe.mesh.cell_types import DECK_EDGES, READ_TYPES
 from rom.fe.mesh.solid import Notes
-from rom.fe.mesh.topology import faces_of
+from rom.fe.mesh.topology import outer_facets
 from rom.model import Array, Index
 from rom.names import named
 
@@ -66,9 +66,7 @@ def facets_of_nodes(
     cells: Index, sets: Mapping[str, Index], cell_type: str, n_points: int
 ) -> tuple[dict[str, Index], list[str]]:
     """Outer facets all of whose corners are in a node set, and remarks on sets left out."""
-    faces = faces_of(cells, READ_TYPES[cell_type], n_points)
-    listed = cells[:, np.array(READ_TYPES[cell_type].face_nodes)]
-    outer = listed[faces.count[faces.of_cell] == 1]
+    outer = outer_facets(cells, READ_TYPES[cell_type], n_points)
     facets, remarks = {}, []
     for name, nodes in sets.items():
         chosen = np.zeros(n_points, dtype=bool)
