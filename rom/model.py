@@ -51,6 +51,11 @@ class Rotations:
         return Rotations(place[here], self.axes[here], self.dofs[here]) if here.size else None
 
 
+def moved_rigidly(x: Array) -> Array:
+    """(6, 6) displacement and rotation at a point (3,) of a rigid body by those at zero."""
+    return np.vstack([rigid_motions(np.reshape(x, (1, 3))), np.eye(6)[3:]])
+
+
 def rigid_motions(points: Array, rotations: Rotations | None = None, n: int | None = None) -> Array:
     """(n, 6) motions of points (k, 3) [m]: unit translations [1], rotations about zero [m].
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from rom.body.records import Body, BodyData, Marker, motion_of
 from rom.errors import ConfigError, ModelError
-from rom.model import Array
+from rom.model import Array, moved_rigidly
 from rom.names import named
 from rom.plausible import far_doubt
 from rom.rotation import crossed, skew, skew_tensor
@@ -48,20 +48,15 @@ def reference_motion(body: BodyData, reference: object) -> Array:
     return np.linalg.solve(from_rigid, from_shapes)
 
 
-def _moved_rigidly(point: Array) -> Array:
-    """(6, 6) translation and rotation at a point under rigid motions about the origin."""
-    return np.block([[np.eye(3), -skew(point)], [np.zeros((3, 3)), np.eye(3)]])
-
-
 def rigid_marker(name: str, point: Array, translation: Array, rotation: Array) -> Marker:
     """An interface that is rigid: its six coordinates are its motion."""
-    hold = np.hstack([_moved_rigidly(point), np.vstack([translation, rotation])])
+    hold = np.hstack([moved_rigidly(point), np.vstack([translation, rotation])])
     return Marker(name, point, translation, rotation, "rbe2", hold)
 
 
 def marker_motion(marker: Marker, r: int) -> tuple[Array, Array]:
     """The six motions of a marker under rigid motions and under the shapes."""
-    return _moved_rigidly(marker.point), motion_of(marker).reshape(6, r)
+    return moved_rigidly(marker.point), motion_of(marker).reshape(6, r)
 
 
 def _pins(points: list[Marker], r: int) -> tuple[Array, Array]:

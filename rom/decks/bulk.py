@@ -7,7 +7,7 @@ Source:
 
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
 
@@ -62,6 +62,18 @@ class Card:
         return FileFormatError(f"this {self.name} is not read: {why}.", where=at(self.place))
 
 
+class Cards(dict[str, list[Card]]):
+    """Cards by their names."""
+
+    def add(self, card: Card) -> None:
+        """Put a card to those of its name."""
+        self.setdefault(card.name, []).append(card)
+
+    def of(self, *names: str) -> list[Card]:
+        """All cards of some names."""
+        return [card for name in names for card in self.get(name, ())]
+
+
 def cards(path: str | Path) -> Iterator[Card]:
     """All cards of the bulk data of a file and those it includes, continuations joined.
 
@@ -112,54 +124,61 @@ def _fields(line: str, place: Place) -> tuple[str, list[str], str]:
     return line[:PER_LINE].strip(), fields, line[72:80].strip()
 
 
-def grids(
-    found: dict[str, list[Card]],
-) -> tuple[Index, Array, Array, Callable[[int, Card], System]]:
-    """Labels (k,), positions (k, 3), and axes of displacements (k, 3, 3), in the basic system.
+@dataclass(slots=True)
+class Systems:
+    """Systems of coordinates of a deck."""
 
-    Of the cards of `POINTS` by their names; axes are columns. Last comes what finds the system of a
-    number that a card names.
-    """
-    default = next(iter(found.get("GRDSET", ())), Card("GRDSET", [], (Path(), 0)))
-    own, turned = default.whole(1, 0), default.whole(5, 0)
-    grid: dict[int, tuple[int, list[float], int]] = {}
-    for card in found.get("GRID", ()):
-        row = card.whole(1, own), card.reals(2, 3, 4), card.whole(5, turned)
-        if grid.setdefault(card.whole(0), row) is not row:
-            raise card.wrong(f"node {card.whole(0)} is defined twice")
-    systems = [card for name in POINTS[2:] for card in found.get(name, ())]
-    places = [(card, k) for card in systems for k in (0, 4) if not k or card.text(k)]
-    axes = {card.whole(k): (card, k) for card, k in places if not k or card.name[4] == "1"}
-    known: dict[int, System | None] = {0: BASIC_SYSTEM}  # None while it is being resolved
+    grid: dict[int, tuple[int, list[float], int]]  # {label: system, coordinates, that of motions}
+    axes: dict[int, tuple[Card, int]]  # {number: card, and its field with the number}
+    known: dict[int, System | None] = field(default_factory=lambda: {0: BASIC_SYSTEM})
 
-    def resolved(number: int, by: Card) -> System:
-        if number not in known:
-            if number not in axes:
+    def of(self, number: int, by: Card) -> System:
+        """That of a number that a card names."""
+        if number not in self.known:
+            if number not in self.axes:
                 raise by.wrong(f"the coordinate system {number} is not defined")
-            known[number] = None
-            card, start = axes[number]
+            self.known[number] = None  # while it is being resolved
+            card, start = self.axes[number]
             if card.name[4] == "2":
                 x = np.array(card.reals(*range(2, 11))).reshape(3, 3)
-                corners = resolved(card.whole(1, 0), card).basic(x)
+                corners = self.of(card.whole(1, 0), card).basic(x)
             else:
-                corners = np.vstack([point(card.whole(start + k), card) for k in (1, 2, 3)])
-            known[number] = system(2, corners, card.name[5], at(card.place))
-        if (found := known[number]) is None:
+                corners = np.vstack([self._point(card.whole(start + k), card) for k in (1, 2, 3)])
+            self.known[number] = system(2, corners, card.name[5], at(card.place))
+        if (found := self.known[number]) is None:
             raise by.wrong(f"the coordinate system {number} is defined by itself")
         return found
 
-    def point(label: int, by: Card) -> Array:
-        if label not in grid:
+    def _point(self, label: int, by: Card) -> Array:
+        if label not in self.grid:
             raise by.wrong(f"node {label} is not defined")
-        return resolved(grid[label][0], by).basic(np.array([grid[label][1]]))
+        return self.of(self.grid[label][0], by).basic(np.array([self.grid[label][1]]))
 
+
+def grids(found: Cards) -> tuple[Index, Array, Array, Systems]:
+    """Labels (k,), positions (k, 3), and axes of displacements (k, 3, 3), in the basic system.
+
+    Of the cards of `POINTS`; axes are columns.
+    """
+    default = next(iter(found.of("GRDSET")), Card("GRDSET", [], (Path(), 0)))
+    own, turned = default.whole(1, 0), default.whole(5, 0)
+    grid: dict[int, tuple[int, list[float], int]] = {}
+    for card in found.of("GRID"):
+        row = card.whole(1, own), card.reals(2, 3, 4), card.whole(5, turned)
+        if grid.setdefault(card.whole(0), row) is not row:
+            raise card.wrong(f"node {card.whole(0)} is defined twice")
+    places = [(card, k) for card in found.of(*POINTS[2:]) for k in (0, 4) if not k or card.text(k)]
+    known = {card.whole(k): (card, k) for card, k in places if not k or card.name[4] == "1"}
+    systems = Systems(grid, known)
     used, moved = np.array([row[::2] for row in grid.values()], np.int64).reshape(-1, 2).T
     x = np.array([row[1] for row in grid.values()]).reshape(-1, 3)
-    moves = np.tile(np.eye(3), (len(x), 1, 1))
-    for number in np.unique(used):
-        here = used == number
-        x[here] = resolved(int(number), found["GRID"][int(here.argmax())]).basic(x[here])
-    for number in np.unique(moved[moved > 0]):
-        here = moved == number
-        moves[here] = resolved(int(number), found["GRID"][int(here.argmax())]).axes_at(x[here])
-    return np.array(list(grid), dtype=np.int64), x, moves, resolved
+    axes = np.tile(np.eye(3), (len(x), 1, 1))
+    for numbers in (used, np.maximum(moved, 0)):
+        for number in np.unique(numbers):
+            here = numbers == number
+            one = systems.of(int(number), found["GRID"][int(here.argmax())])
+            if numbers is used:
+                x[here] = one.basic(x[here])
+            else:
+                axes[here] = one.axes_at(x[here])
+    return np.array(list(grid), dtype=np.int64), x, axes, systems

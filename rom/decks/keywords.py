@@ -109,6 +109,10 @@ class Sets:
         self.names.setdefault(name.upper(), name)
         self.members.setdefault(name.upper(), []).extend(members)
 
+    def meant(self, word: str) -> Index:
+        """The one number that a word is, or those in the set it names."""
+        return np.array([int(word)], dtype=np.int64) if is_whole(word) else self.of(word.strip('"'))
+
     def of(self, name: str) -> Index:
         """Ascending numbers in a set, those of the sets it names included."""
         key = name.upper()

@@ -13,7 +13,7 @@ import numpy as np
 
 from rom.decks.lines import Place, at
 from rom.errors import FileFormatError
-from rom.model import Array, rigid_motions
+from rom.model import Array, moved_rigidly
 
 DISPLACED, ALL = set("123"), set("123456")
 RIGID_KIND, AVERAGE_KIND, LOOSE_KIND = "rbe2", "rbe3", ""
@@ -206,11 +206,6 @@ def _check_plain(masses: list[PointMass], node: int, solid: Set[int]) -> None:
             raise one.wrong(text, "Hang it on the reference node of a rigid element.")
 
 
-def arm(x: Array) -> Array:
-    """(6, 6) displacement and rotation at x (3,) of a rigid piece by those at zero."""
-    return np.vstack([rigid_motions(x[None]), np.eye(6)[3:]])
-
-
 def _sprung(
     found: Hung, one: Spring, solid: Set[int], turning: dict[int, str], x: Callable[[int], Array]
 ) -> None:
@@ -226,7 +221,7 @@ def _sprung(
     line = (b - a) * (np.linalg.norm(b - a) > APART_RTOL * np.abs([a, b]).max())
     unit = np.repeat([1.0, np.linalg.norm(line) or 1.0], 3)  # of rotations, as displacements
     felt = np.array([turns for n in nodes for turns in (True, n in turning)]).repeat(3)
-    rigid = (np.vstack([np.eye(6), arm(line)]) * np.tile(unit, 2)[:, None] / unit)[felt]
+    rigid = (np.vstack([np.eye(6), moved_rigidly(line)]) * np.tile(unit, 2)[:, None] / unit)[felt]
     given, W = one.stretch[k > 0.0] / np.tile(unit, 2), np.zeros((np.count_nonzero(k), 12))
     W[:, felt] = given[:, felt] @ (np.eye(len(rigid)) - rigid @ np.linalg.pinv(rigid, 1e-9))
     if (np.abs(W - given) > ASKEW_RTOL * np.abs(given).max(axis=1, keepdims=True)).any():
@@ -236,7 +231,7 @@ def _sprung(
     for end, node, own in zip(ends, nodes, (W[:, :6], W[:, 6:]), strict=True):
         if end not in found.ties:
             _add(found, replace(one, name=end), LOOSE_KIND, {node: 1.0}, node, x)
-        own[:] = own @ arm(x(node) - found.ties[end]["origin"])
+        own[:] = own @ moved_rigidly(x(node) - found.ties[end]["origin"])
     found.nodes.update(nodes)
     K = (W.T * k[k > 0.0] @ W).tolist()
     found.springs.append({"name": one.name, "ends": ends, "stiffness": K})

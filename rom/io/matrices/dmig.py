@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from scipy.sparse import coo_matrix, csc_matrix, csr_matrix
 
-from rom.decks.bulk import POINTS, Card, cards, grids
+from rom.decks.bulk import POINTS, Cards, cards, grids
 from rom.decks.lines import at, real, whole
 from rom.errors import FileFormatError
 from rom.io.files import check_last_line, damaged, need, write_lines
@@ -56,10 +56,10 @@ def read_grids(path: str | Path) -> tuple[Index, Array, Array]:
     Raises:
         FileFormatError: naming the line, for a damaged card.
     """
-    found: dict[str, list[Card]] = {}
+    found = Cards()
     for card in cards(path):
         if card.name in POINTS:
-            found.setdefault(card.name, []).append(card)
+            found.add(card)
     return grids(found)[:3]
 
 

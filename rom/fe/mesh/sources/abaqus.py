@@ -26,22 +26,15 @@ from rom.decks.nodes import NODE_KEYWORDS, SET_OPTIONS, Nodes, Table
 from rom.decks.rigid import ALL, DISPLACED, Average, PointMass, Rigid, Spring
 from rom.errors import FileFormatError
 from rom.fe.mesh.cell_types import READ_TYPES
-from rom.fe.mesh.solid import Read, packed
-from rom.fe.mesh.sources.deck import (
-    facets_of_nodes,
-    hung_on,
-    of_materials,
-    only_type,
-    positions,
-    regions_of,
-    to_gmsh,
-)
+from rom.fe.mesh.solid import Read
+from rom.fe.mesh.sources.deck import Solid, of_materials, positions, regions_of
 from rom.model import Index
 from rom.names import is_whole, named
 
 SOLIDS = {4: "tet4", 10: "tet10", 8: "hex8", 20: "hex20"}
 SKIN_TYPES = tuple("S3 S4 S6 S8 STRI3 STRI65 M3D3 M3D4 M3D6 M3D8 SFM3D CPS".split())
 LINE_TYPES = ("T3D2", "T3D3")  # without a section, as gmsh writes curves
+SECTION = "SOLID SECTION"
 COUPLINGS = ("KINEMATIC", "DISTRIBUTING")  # what follows *COUPLING
 BODY_SETS = ("NSET", "TIE NSET", "PIN NSET")  # of nodes of a *RIGID BODY
 USUAL = {"WEIGHTING METHOD": "UNIFORM", "COUPLING": "CONTINUUM"}
@@ -61,20 +54,22 @@ class Deck(Nodes):
     """What a deck says, in its own numbers.
 
     Solids are {number: (cell type, nodes)}, skin {number: nodes}, at_nodes {number: (type, nodes)},
-    surfaces {name: (type, rows)}; rigid has what ties nodes and hangs on them, own are names of the
-    element sets of ``*ELEMENT``, laws what is said of materials.
+    surfaces {name: (type, rows)}; own are names of the element sets of ``*ELEMENT``, kept are
+    sections, materials, what ties nodes and what hangs on them.
     """
 
     aside: Unread = field(default_factory=Unread)
     solids: dict[int, tuple[str, list[int]]] = field(default_factory=dict)
     skin: dict[int, list[int]] = field(default_factory=dict)
     at_nodes: dict[int, tuple[str, list[int]]] = field(default_factory=dict)
-    rigid: list[Block] = field(default_factory=list)
     cell_sets: Sets = field(default_factory=lambda: Sets("elements"))
     surfaces: dict[str, tuple[str, list[list[str]]]] = field(default_factory=dict)
     own: list[str] = field(default_factory=list)
-    sections: list[Block] = field(default_factory=list)
-    laws: list[Block] = field(default_factory=list)
+    kept: list[Block] = field(default_factory=list)
+
+    def of(self, *keywords: str) -> list[Block]:
+        """Blocks of some keywords that are kept."""
+        return [block for block in self.kept if block.keyword in keywords]
 
 
 def read(path: str) -> Read:
@@ -84,28 +79,23 @@ def read(path: str) -> Read:
         if block.keyword in MESH_KEYWORDS:
             deck.take(block, MESH_KEYWORDS)
         elif block.keyword in LAWS:
-            deck.laws.append(block)
+            deck.kept.append(block)
         elif block.keyword not in HARMLESS_KEYWORDS:
             counted = deck.aside if block.keyword in LOAD_KEYWORDS else deck.unread
             counted.add(f"*{block.keyword}", block.place)
     ties = _ties(deck)
     deck.unread.refuse()
-    cell_type = only_type(kind for kind, _ in deck.solids.values())
-    ids = np.array(list(deck.solids), dtype=np.int64)
-    raw = np.array([nodes for _, nodes in deck.solids.values()], dtype=np.int64)
-    node_ids, points = deck.placed()
-    cells = to_gmsh(positions(node_ids, raw, "node"), cell_type)
-    names, regions = _regions(deck, ids)
-    facets, remarks = _facets(deck, ids, cells, cell_type, node_ids)
-    labels = {name: node_ids[np.unique(rows)].tolist() for name, rows in facets.items()}
+    types, nodes = zip(*deck.solids.values(), strict=True) if deck.solids else ((), ())
+    solid = Solid.of(*deck.placed(), list(deck.solids), types, nodes)
+    names, regions = _regions(deck, solid.ids)
+    facets, remarks = _facets(deck, solid)
+    labels = {name: solid.labels[np.unique(rows)].tolist() for name, rows in facets.items()}
     elements = [*_points(deck), *(one for tie in ties for one in _tied(deck, *tie, labels))]
-    turned = (b.options["ROT NODE"] for b in deck.rigid if "ROT NODE" in b.options)
-    rotating = [node for word in turned for node in _members(deck.node_sets, word).tolist()]
-    told, more = hung_on(elements, node_ids, points, cells, rotating)
-    remarks = [*deck.aside.remark(), *remarks, *more]
-    told |= {"region_names": names, "warnings": remarks, "provenance": {"parameters": {}}}
-    told |= of_materials(_materials, deck)
-    return packed(points, cells, cell_type, regions, ids, facets=facets, **told)
+    turned = (b.options["ROT NODE"] for b in deck.kept if "ROT NODE" in b.options)
+    rotating = [node for word in turned for node in deck.node_sets.meant(word).tolist()]
+    remarks = [*deck.aside.remark(), *remarks]
+    told = of_materials(_materials, deck)
+    return solid.read(names, regions, facets, remarks, elements, rotating, **told)
 
 
 def _element(deck: Deck, block: Block) -> None:
@@ -185,8 +175,8 @@ def _surface(deck: Deck, block: Block) -> None:
     rows.extend(block.rows)
 
 
-def _rigid(deck: Deck, block: Block) -> None:
-    deck.rigid.append(block)
+def _keep(deck: Deck, block: Block) -> None:
+    deck.kept.append(block)
 
 
 MESH_KEYWORDS: Table = {
@@ -196,16 +186,15 @@ MESH_KEYWORDS: Table = {
     "ELSET": (lambda deck, block: deck.cell_sets.add(block.option("ELSET"), block.members()),
               ("ELSET", *SET_OPTIONS)),
     "SURFACE": (_surface, ("NAME", "TYPE", "INTERNAL")),
-    "SOLID SECTION": (lambda deck, block: deck.sections.append(block),
-                      ("ELSET", "MATERIAL", "ORIENTATION", "CONTROLS")),
-    "MASS": (_rigid, ("ELSET",)),
-    "ROTARY INERTIA": (_rigid, ("ELSET",)),
-    "SPRING": (_rigid, ("ELSET",)),
-    "RIGID BODY": (_rigid, (*BODY_SETS, "ELSET", "REF NODE", "ROT NODE")),
-    "COUPLING": (_rigid, ("CONSTRAINT NAME", "REF NODE", "SURFACE")),
-    "KINEMATIC": (_rigid, ()),
-    "DISTRIBUTING": (_rigid, ("WEIGHTING METHOD", "COUPLING")),
-    "MPC": (_rigid, ()),
+    SECTION: (_keep, ("ELSET", "MATERIAL", "ORIENTATION", "CONTROLS")),
+    "MASS": (_keep, ("ELSET",)),
+    "ROTARY INERTIA": (_keep, ("ELSET",)),
+    "SPRING": (_keep, ("ELSET",)),
+    "RIGID BODY": (_keep, (*BODY_SETS, "ELSET", "REF NODE", "ROT NODE")),
+    "COUPLING": (_keep, ("CONSTRAINT NAME", "REF NODE", "SURFACE")),
+    "KINEMATIC": (_keep, ()),
+    "DISTRIBUTING": (_keep, ("WEIGHTING METHOD", "COUPLING")),
+    "MPC": (_keep, ()),
     "SURFACE SECTION": (lambda deck, block: None, ("ELSET",)),  # without a density
 }  # fmt: skip
 # of materials, with the options of each that may be there
@@ -222,7 +211,7 @@ LOAD_KEYWORDS = set("STEP,BOUNDARY,INITIAL CONDITIONS,CLOAD,DLOAD,DSLOAD,TEMPERA
 
 def _regions(deck: Deck, ids: Index) -> tuple[dict[int, str], Index]:
     """{region number: name} and the region number of each cell."""
-    sets = [section.option("ELSET") for section in deck.sections] or deck.own
+    sets = [section.option("ELSET") for section in deck.of(SECTION)] or deck.own
     chosen = {}
     for name in dict.fromkeys(sets):
         members = deck.cell_sets.of(name)
@@ -240,13 +229,13 @@ def _materials(deck: Deck) -> dict[str, list[float]]:
     """{region: E, nu and rho} of the material of each section, in units of the deck."""
     laws: dict[str, dict[str, Block]] = {}
     own: dict[str, Block] = {}
-    for block in deck.laws:
+    for block in deck.of(*LAWS):
         if block.keyword == "MATERIAL":
             own = laws.setdefault(block.option("NAME").upper(), {})
         if own.setdefault(block.keyword, block) is not block:
             raise block.wrong("it is defined twice")
     unread, numbers = Unread(), {}
-    for section in deck.sections:
+    for section in deck.of(SECTION):
         own = laws.get(section.options.get("MATERIAL", "").upper(), {})
         for name in ("ELASTIC", "DENSITY"):
             kind = _unlike(own[name]) if name in own else f"*SOLID SECTION without *{name}"
@@ -267,22 +256,18 @@ def _unlike(block: Block) -> str:
     return ", ".join([f"*{block.keyword}", *odd]) if odd else ""
 
 
-def _facets(
-    deck: Deck, ids: Index, cells: Index, cell_type: str, node_ids: Index
-) -> tuple[dict[str, Index], list[str]]:
-    n = node_ids.size
+def _facets(deck: Deck, solid: Solid) -> tuple[dict[str, Index], list[str]]:
     facets: dict[str, Index] = {}
     known = deck.node_sets.names.items()
     sets = {name: deck.node_sets.of(key) for key, name in known if name not in deck.surfaces}
     for name, (kind, rows) in deck.surfaces.items():
         if kind == "NODE":
-            sets[name] = np.concatenate([_members(deck.node_sets, row[0]) for row in rows])
+            sets[name] = np.concatenate([deck.node_sets.meant(row[0]) for row in rows])
         else:
-            facets[name] = np.vstack([_sides(deck, row, ids, cells, cell_type) for row in rows])
+            facets[name] = np.vstack([_sides(deck, row, solid) for row in rows])
     for name, nodes in _skin_nodes(deck).items():
         sets.setdefault(name, nodes)
-    found = {name: positions(node_ids, members, "node") for name, members in sets.items()}
-    by_nodes, remarks = facets_of_nodes(cells, found, cell_type, n)
+    by_nodes, remarks = solid.facets(sets)
     return facets | by_nodes, remarks
 
 
@@ -297,15 +282,10 @@ def _skin_nodes(deck: Deck) -> dict[str, Index]:
     return found
 
 
-def _members(sets: Sets, word: str) -> Index:
-    """Numbers in a set, or the one number."""
-    return np.array([int(word)], dtype=np.int64) if is_whole(word) else sets.of(word.strip('"'))
-
-
 def _points(deck: Deck) -> Iterator[PointMass | Spring]:
     """Of ``*MASS`` and ``*ROTARY INERTIA``, whose products of inertia are entries of the tensor."""
     open_ = dict(deck.at_nodes)
-    for block in (b for b in deck.rigid if b.keyword in POINT_TYPES.values()):
+    for block in deck.of(*POINT_TYPES.values()):
         for label in deck.cell_sets.of(block.option("ELSET")).tolist():
             kind, nodes = open_.pop(label, ("", []))
             if POINT_TYPES.get(kind) != block.keyword:
@@ -340,7 +320,7 @@ def _spring(deck: Deck, block: Block, kind: str, label: int, nodes: list[int]) -
 def _ties(deck: Deck) -> list[tuple[Block, Block]]:
     """Blocks that tie, and those that say how; others are counted as not read."""
     found, coupling = [], None
-    for block in [*deck.rigid, Block("", {}, (deck.deck, 0))]:
+    for block in [*deck.kept, Block("", {}, (deck.deck, 0))]:
         if coupling and block.keyword not in COUPLINGS:
             deck.unread.add("*COUPLING that says no kind", coupling.place)
         elif block.keyword in COUPLINGS and not coupling:
@@ -385,7 +365,9 @@ def _tied(
         for r, row in enumerate(block.rows):
             if len(row) != 3:
                 raise block.wrong("a row is BEAM, a node or set that follows, one that leads", r)
-            leads.setdefault(_one(deck, block, row[2]), []).extend(_nodes(deck, row[1]))
+            leads.setdefault(_one(deck, block, row[2]), []).extend(
+                deck.node_sets.meant(row[1]).tolist()
+            )
         for node, led in leads.items():
             yield Rigid(f"MPC {node}", block.place, node, led, turning=True)
         return
@@ -399,13 +381,9 @@ def _tied(
         yield Rigid(name, block.place, lead, led, turning)
 
 
-def _nodes(deck: Deck, word: str) -> list[int]:
-    return _members(deck.node_sets, word).tolist()
-
-
 def _one(deck: Deck, block: Block, word: str) -> int:
     """The one node that a word says."""
-    if len(nodes := _nodes(deck, word)) != 1:
+    if len(nodes := deck.node_sets.meant(word).tolist()) != 1:
         raise block.wrong(f"{word!r} is {len(nodes)} nodes instead of one")
     return nodes[0]
 
@@ -416,8 +394,9 @@ def _coupled(deck: Deck, block: Block, labels: dict[str, list[int]]) -> tuple[st
     if (name := names.get(block.option("SURFACE").upper(), "")) not in deck.surfaces:
         raise block.wrong(f"the surface {block.option('SURFACE')!r} is unknown")
     kind, rows = deck.surfaces[name]
-    listed = {node for row in rows if kind == "NODE" for node in _nodes(deck, row[0])}
-    return name, sorted(listed) if kind == "NODE" else labels[name]
+    if kind != "NODE":
+        return name, labels[name]
+    return name, np.unique(np.concatenate([deck.node_sets.meant(row[0]) for row in rows])).tolist()
 
 
 def _body(deck: Deck, block: Block) -> tuple[str, list[int]]:
@@ -435,13 +414,12 @@ def _body(deck: Deck, block: Block) -> tuple[str, list[int]]:
     return known[names[0].upper()], sorted(found)
 
 
-def _sides(deck: Deck, row: list[str], ids: Index, cells: Index, cell_type: str) -> Index:
+def _sides(deck: Deck, row: list[str], solid: Solid) -> Index:
     """(f, kf) facets of one line ``element or set, S1``."""
-    members = _members(deck.cell_sets, row[0])
-    kind = READ_TYPES[cell_type]
-    sides = [set(side) for side in SIDES[kind.n_corners]]
-    label = row[1].upper() if len(row) > 1 else ""
-    if label not in {f"S{i + 1}" for i in range(len(sides))}:
+    kind, label = solid.kind, row[1].upper() if len(row) > 1 else ""
+    sides = {f"S{k}": set(side) for k, side in enumerate(SIDES[kind.n_corners], 1)}
+    if label not in sides:
         raise FileFormatError(f"{label!r} is no face of a {kind.shape}; S1 to S{len(sides)} are.")
-    face = next(i for i, f in enumerate(kind.faces) if set(f) == sides[int(label[1:]) - 1])
-    return cells[positions(ids, members, "element")][:, kind.face_nodes[face]]
+    face = next(i for i, f in enumerate(kind.faces) if set(f) == sides[label])
+    wanted = positions(solid.ids, deck.cell_sets.meant(row[0]), "element")
+    return solid.cells[wanted][:, kind.face_nodes[face]]

@@ -19,15 +19,8 @@ import numpy as np
 
 from rom.decks.lines import Place, Unread, at, real, whole
 from rom.errors import FileFormatError, MeshError
-from rom.fe.mesh.solid import Read, packed
-from rom.fe.mesh.sources.deck import (
-    facets_of_nodes,
-    hung_on,
-    of_materials,
-    only_type,
-    positions,
-    to_gmsh,
-)
+from rom.fe.mesh.solid import Read
+from rom.fe.mesh.sources.deck import Solid, of_materials, only_type
 from rom.names import named
 
 SOLID_TYPES = (45, 64, 73, 92, 95, 185, 186, 187, 285)
@@ -93,20 +86,15 @@ def read(path: str) -> Read:
         elif command.name in LOST or (command.name == "EN" and "-1" not in command.fields):
             deck.unread.add(command.name, command.place)
     deck.unread.refuse()
-    shapes = {CELLS.get(len(nodes), "wedge or pyramid") for _, nodes in deck.solids.values()}
-    if (cell_type := only_type(shapes)) not in CELLS.values():
+    materials, nodes = zip(*deck.solids.values(), strict=True) if deck.solids else ((), ())
+    types = [CELLS.get(len(cell), "wedge or pyramid") for cell in nodes]
+    if only_type(types) not in CELLS.values():
         raise MeshError("the cells are wedges or pyramids; tetrahedra or hexahedra are needed.")
-    ids, labels = (np.array(list(rows), dtype=np.int64) for rows in (deck.solids, deck.nodes))
-    materials, raw = map(np.array, zip(*deck.solids.values(), strict=True))
-    cells, n = to_gmsh(positions(labels, raw, "node"), cell_type), len(labels)
-    sets = {name: positions(labels, np.array(rows), "node") for name, rows in deck.sets.items()}
-    facets, remarks = facets_of_nodes(cells, sets, cell_type, n)
+    labels, points = np.array(list(deck.nodes)), np.array([*deck.nodes.values()])
+    solid = Solid.of(labels, points, list(deck.solids), types, nodes)
     names = {int(number): f"material_{number}" for number in np.unique(materials)}
-    points = np.array([*deck.nodes.values()])
-    told, more = hung_on((), labels, points, cells)
-    told |= {"region_names": names, "warnings": [*remarks, *more]}
-    told |= {"provenance": {"parameters": {}}} | of_materials(_materials, deck.laws, names)
-    return packed(points, cells, cell_type, materials, ids, facets=facets, **told)
+    told = of_materials(_materials, deck.laws, names)
+    return solid.read(names, np.array(materials), *solid.facets(deck.sets), **told)
 
 
 def _commands(path: Path) -> Iterator[Command]:

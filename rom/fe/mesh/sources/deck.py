@@ -1,25 +1,18 @@
 """What files of other programs share: node order, regions, faces by number and by node set."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from rom.decks.rigid import Element, hung
 from rom.errors import FileFormatError, MeshError, TagError
-from rom.fe.mesh.cell_types import DECK_EDGES, READ_TYPES
-from rom.fe.mesh.solid import Notes
+from rom.fe.mesh.cell_types import DECK_EDGES, READ_TYPES, CellType
+from rom.fe.mesh.solid import Notes, Read, packed
 from rom.fe.mesh.topology import outer_facets
-from rom.model import Array, Index
+from rom.model import Array, Index, Integers
 from rom.names import named
-
-Edges = tuple[tuple[int, int], ...]
-
-
-def to_gmsh(cells: Index, cell_type: str, edges: Edges | None = None) -> Index:
-    """Cells in gmsh order from cells in deck order, mid-edge nodes as in Abaqus or as given."""
-    kind = READ_TYPES[cell_type]
-    places = kind.among(edges or DECK_EDGES.get(cell_type, ()))
-    return cells[:, [*range(kind.n_corners), *(kind.n_corners + np.argsort(places))]]
 
 
 def only_type(found: Iterable[str]) -> str:
@@ -62,24 +55,6 @@ def of_materials(read: Callable[..., Notes], *deck: object) -> dict[str, Notes]:
         return {"unread": {"message": error.message, "where": error.where, "hint": hint}}
 
 
-def facets_of_nodes(
-    cells: Index, sets: Mapping[str, Index], cell_type: str, n_points: int
-) -> tuple[dict[str, Index], list[str]]:
-    """Outer facets all of whose corners are in a node set, and remarks on sets left out."""
-    outer = outer_facets(cells, READ_TYPES[cell_type], n_points)
-    facets, remarks = {}, []
-    for name, nodes in sets.items():
-        chosen = np.zeros(n_points, dtype=bool)
-        chosen[nodes] = True
-        rows = outer[chosen[outer[:, : READ_TYPES[cell_type].corners_per_face]].all(axis=1)]
-        if 0 < len(rows) < len(outer):
-            facets[name] = rows
-        else:
-            what = "contains no complete facet" if not len(rows) else "is the whole surface"
-            remarks.append(f"the node set {name!r} {what} and is no interface.")
-    return facets, remarks
-
-
 def positions(ids: Index, wanted: Index, what: str) -> Index:
     """Rows of the wanted numbers among those of a deck, in any order; refused twice, or missing."""
     order = np.argsort(ids, kind="stable")
@@ -96,21 +71,80 @@ def positions(ids: Index, wanted: Index, what: str) -> Index:
     return order[place]
 
 
-def hung_on(
-    elements: Iterable[Element], ids: Index, points: Array, cells: Index, known: Iterable[int] = ()
-) -> tuple[Notes, list[str]]:
-    """Ties, what they carry, and springs as notes; a remark on nodes of no known use."""
-    solid = np.zeros(ids.size, dtype=bool)
-    solid[cells] = True
-    row = dict(zip(ids.tolist(), range(ids.size), strict=True))
+@dataclass(frozen=True, slots=True)
+class Solid:
+    """Nodes and cells of a deck, the latter of one type, as rows of nodes in the order of gmsh."""
 
-    def place(node: int) -> Array:
-        if node not in row:
-            raise FileFormatError(f"node {node} is used but not defined.")
-        return points[row[node]]
+    labels: Index  # (n,) of the nodes
+    points: Array  # (n, 3)
+    ids: Index  # (m,) of the cells
+    kind: CellType
+    cells: Index  # (m, k)
 
-    found = hung(elements, set(ids[solid].tolist()), place)
-    lonely = ids[~solid & ~np.isin(ids, [*found.nodes, *known])]
-    text = f"{lonely.size} nodes belong to no solid and are left out: {named(lonely.tolist())}"
-    remarks = [f"{text}; check that no element is missing."] if lonely.size else []
-    return {"ties": found.ties, "carried": found.carried, "springs": found.springs}, remarks
+    @classmethod
+    def of(
+        cls,
+        labels: Integers,
+        points: npt.ArrayLike,
+        ids: npt.ArrayLike,
+        types: Iterable[str],
+        nodes: Sequence[Sequence[int]] | Index,
+        edges: Mapping[str, tuple[tuple[int, int], ...]] = DECK_EDGES,
+    ) -> "Solid":
+        """That of cells with nodes in the order of decks, those amid edges as in Abaqus or given.
+
+        Raises:
+            MeshError: where there are no cells, or several types.
+            FileFormatError: where a node is not defined.
+        """
+        kind = READ_TYPES[only_type(types)]
+        cells = positions(labels, np.array(nodes, dtype=np.int64), "node")
+        places, n = kind.among(edges.get(kind.name, ())), kind.n_corners
+        cells = cells[:, [*range(n), *(n + np.argsort(places))]]
+        return cls(labels, np.asarray(points), np.array(ids, dtype=np.int64), kind, cells)
+
+    def facets(
+        self, sets: Mapping[str, Sequence[int] | Index]
+    ) -> tuple[dict[str, Index], list[str]]:
+        """Outer facets all of whose corners are in a set of nodes, and remarks on sets left out."""
+        outer, n = outer_facets(self.cells, self.kind, self.labels.size), self.kind.corners_per_face
+        facets, remarks = {}, []
+        for name, nodes in sets.items():
+            chosen = np.zeros(self.labels.size, dtype=bool)
+            chosen[positions(self.labels, np.array(nodes, dtype=np.int64), "node")] = True
+            rows = outer[chosen[outer[:, :n]].all(axis=1)]
+            if 0 < len(rows) < len(outer):
+                facets[name] = rows
+            else:
+                what = "contains no complete facet" if not len(rows) else "is the whole surface"
+                remarks.append(f"the node set {name!r} {what} and is no interface.")
+        return facets, remarks
+
+    def read(
+        self,
+        names: Mapping[int, str],
+        regions: Integers,
+        facets: Mapping[str, Index],
+        remarks: Iterable[str],
+        elements: Iterable[Element] = (),
+        known: Iterable[int] = (),
+        **notes: Notes,
+    ) -> Read:
+        """Arrays and notes, with what hangs on nodes; a remark on nodes of no known use."""
+        used = np.zeros(self.labels.size, dtype=bool)
+        used[self.cells] = True
+        row = dict(zip(self.labels.tolist(), range(self.labels.size), strict=True))
+
+        def place(node: int) -> Array:
+            if node not in row:
+                raise FileFormatError(f"node {node} is used but not defined.")
+            return self.points[row[node]]
+
+        found = hung(elements, set(self.labels[used].tolist()), place)
+        lonely = self.labels[~used & ~np.isin(self.labels, [*found.nodes, *known])]
+        text = f"{lonely.size} nodes belong to no solid and are left out: {named(lonely.tolist())}"
+        more = [f"{text}; check that no element is missing."] if lonely.size else []
+        told = {"ties": found.ties, "carried": found.carried, "springs": found.springs}
+        told |= {"region_names": names, "warnings": [*remarks, *more]} | notes
+        told |= {"facets": facets, "provenance": {"parameters": {}}}
+        return packed(self.points, self.cells, self.kind.name, regions, self.ids, **told)

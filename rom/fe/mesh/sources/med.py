@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from rom.errors import FileFormatError
-from rom.fe.mesh.solid import Read, packed
-from rom.fe.mesh.sources.deck import facets_of_nodes, only_type, regions_of, to_gmsh
+from rom.fe.mesh.solid import Read
+from rom.fe.mesh.sources.deck import Solid, only_type, regions_of
 from rom.model import Index
 from rom.names import named
 
@@ -47,18 +47,16 @@ def _mesh(step: Group, groups: dict[str, dict[int, list[str]]]) -> Read:
     cell_type = only_type(SOLIDS.get(kind, kind) for kind in blocks if kind not in SKINS)
     if cell_type not in SOLIDS.values():
         raise FileFormatError(f"cells are {cell_type}, none of {named(list(SOLIDS))}.")
-    (solid,) = (block for kind, block in blocks.items() if kind in SOLIDS)
-    cells = to_gmsh(_nodes(solid), cell_type)
-    ids = solid["NUM"][()] if "NUM" in solid else np.arange(len(cells)) + 1
-    names, regions = regions_of(_members(solid, groups["ELEME"]), ids, "group")
+    (block,) = (block for kind, block in blocks.items() if kind in SOLIDS)
+    ids = block["NUM"][()] if "NUM" in block else np.arange(int(block["NOD"].attrs["NBR"])) + 1
+    solid = Solid.of(np.arange(len(points)), points, ids, [cell_type], _nodes(block))
+    names, regions = regions_of(_members(block, groups["ELEME"]), ids, "group")
     facets: dict[str, Index] = {}
     for kind in sorted(blocks.keys() & set(SKINS)):
         skin, members = _nodes(blocks[kind]), _members(blocks[kind], groups["ELEME"])
         facets |= {name: skin[rows] for name, rows in members.items()}
-    nodes = _members(step["NOE"], groups["NOEUD"])
-    found, remarks = facets_of_nodes(cells, nodes, cell_type, len(points))
-    told = {"warnings": remarks, "provenance": {"parameters": {}}, "region_names": names}
-    return packed(points, cells, cell_type, regions, ids, facets=found | facets, **told)
+    found, remarks = solid.facets(_members(step["NOE"], groups["NOEUD"]))
+    return solid.read(names, regions, found | facets, remarks)
 
 
 def _nodes(block: Group) -> Index:

@@ -12,32 +12,26 @@ Source:
     RBE2, RBE3.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from rom.decks.bulk import POINTS, Card, cards, grids
+from rom.decks.bulk import POINTS, Card, Cards, Systems, cards, grids
 from rom.decks.lines import Unread, at
-from rom.decks.rigid import ALL, DISPLACED, Average, Element, PointMass, Rigid, Spring, arm
-from rom.decks.systems import System, system
-from rom.fe.mesh.cell_types import LOWER_EDGES, UPPER_EDGES, UPRIGHT_EDGES
-from rom.fe.mesh.solid import Read, packed
-from rom.fe.mesh.sources.deck import (
-    facets_of_nodes,
-    hung_on,
-    of_materials,
-    only_type,
-    positions,
-    to_gmsh,
-)
-from rom.model import Array, Index
+from rom.decks.rigid import ALL, DISPLACED, Average, Element, PointMass, Rigid, Spring
+from rom.decks.systems import system
+from rom.fe.mesh.cell_types import DECK_EDGES, LOWER_EDGES, UPPER_EDGES, UPRIGHT_EDGES
+from rom.fe.mesh.solid import Read
+from rom.fe.mesh.sources.deck import Solid, of_materials, positions
+from rom.model import Array, Index, moved_rigidly
 from rom.names import is_whole
+from rom.rotation import axial
 
 SOLIDS = {"CTETRA": {4: "tet4", 10: "tet10"}, "CHEXA": {8: "hex8", 20: "hex20"}}
 # mid-edge nodes where not as in Abaqus
-EDGES = {"hex20": (*LOWER_EDGES, *UPRIGHT_EDGES, *UPPER_EDGES)}
+EDGES = DECK_EDGES | {"hex20": (*LOWER_EDGES, *UPRIGHT_EDGES, *UPPER_EDGES)}
 SKIN_CARDS = {"CTRIA3": 3, "CTRIA6": 3, "CQUAD4": 4, "CQUAD8": 4}  # corners
 LINES = ("CBAR",)  # without a property, as gmsh writes curves
 MASSES, TIES = ("CONM1", "CONM2"), ("RBE2", "RBAR", "RBE3")
@@ -56,44 +50,32 @@ LOAD_CARDS = set(
     "TEMPP1 SPCD SPCADD SUPORT SUPORT1 FREQ FREQ1 FREQ2 FREQ3 FREQ4 TSTEP TSTEPNL NLPARM TIC "
     "ASET ASET1 BSET BSET1 CSET CSET1 QSET QSET1 OMIT OMIT1 SPOINT".split()
 )
-Cards = dict[str, list[Card]]  # by name
 At = dict[int, Array]  # by node
-Systems = Callable[[int, Card], System]
 
 
 def read(path: str) -> Read:
     """Read bulk data, or refuse cards whose mass or stiffness would be lost."""
     found, ties, remarks = _sorted(Path(path))
-    ids, points, moves, systems = grids(found)
-    solids = [card for name in SOLIDS for card in found.get(name, ())]
+    labels, points, axes, systems = grids(found)
+    solids, springs = found.of(*SOLIDS), found.of(*SPRINGS)
     nodes = [_nodes(card) for card in solids]
-    cell_type = only_type(_type(*solid) for solid in zip(solids, nodes, strict=True))
-    raw = np.array(nodes, dtype=np.int64)
-    properties = np.array([_property(card) for card in solids], dtype=np.int64)
-    springs = [card for name in SPRINGS for card in found.get(name, ())]
     numbers = np.array([card.whole(0) for card in (*solids, *springs)], dtype=np.int64)
     positions(numbers, numbers[:1], "element")  # refuses a number given twice
-    numbers = numbers[: len(solids)]
-    cells = to_gmsh(positions(ids, raw, "node"), cell_type, EDGES.get(cell_type))
-    labels = {name: np.array(nodes, dtype=np.int64) for name, nodes in _sets(found, ids).items()}
-    sets = {name: positions(ids, nodes, "node") for name, nodes in labels.items()}
-    facets, left = facets_of_nodes(cells, sets, cell_type, len(points))
-    names = {int(p): f"property_{p}" for p in np.unique(properties)}
-    cards = [card for name in MASSES for card in found.get(name, ())]
-    place = dict(zip(ids.tolist(), points, strict=True)) if cards or springs else {}
-    turned = dict(zip(ids.tolist(), moves, strict=True)) if springs else {}
-    masses = [_mass(card, place, systems, _per_weight(found)) for card in cards]
-    between = _springs(found, place, turned, systems)
-    told, more = hung_on([*ties, *masses, *between], ids, points, cells)
-    told |= {"region_names": names, "warnings": [*remarks, *left, *more]}
-    told |= {"provenance": {"parameters": {}}} | of_materials(_materials, found, list(names))
-    return packed(points, cells, cell_type, properties, numbers, facets=facets, **told)
+    types = (_type(*one) for one in zip(solids, nodes, strict=True))
+    solid = Solid.of(labels, points, numbers[: len(solids)], types, nodes, EDGES)
+    regions = np.array([_property(card) for card in solids], dtype=np.int64)
+    names = {int(p): f"property_{p}" for p in np.unique(regions)}
+    facets, left = solid.facets(_sets(found, labels))
+    place, moves = (dict(zip(labels.tolist(), some, strict=True)) for some in (points, axes))
+    masses = (_mass(card, place, systems, _per_weight(found)) for card in found.of(*MASSES))
+    elements = [*ties, *masses, *_springs(found, place, moves, systems)]
+    told = of_materials(_materials, found, names)
+    return solid.read(names, regions, facets, [*remarks, *left], elements, **told)
 
 
 def _sorted(path: Path) -> tuple[Cards, list[Element], list[str]]:
-    """Cards that are read, by name, ties, and remarks on those that need not be."""
-    found: Cards = {}
-    unread, aside, ties = Unread(), Unread(), list[Element]()
+    """Cards that are read, ties, and remarks on those that need not be."""
+    found, unread, aside, ties = Cards(), Unread(), Unread(), list[Element]()
     for card in cards(path):
         for word in _beside(card) if card.name in (*SPRINGS, *OF_SPRINGS) else ():
             (aside if word in ("B", "GE") else unread).add(f"{card.name}, {word}", card.place)
@@ -106,7 +88,7 @@ def _sorted(path: Path) -> tuple[Cards, list[Element], list[str]]:
             else:
                 ties.append(tie)
         elif card.name in (*MESH_CARDS, *SECTIONS, "PARAM") or card.name.startswith(MATERIALS):
-            found.setdefault(card.name, []).append(card)
+            found.add(card)
         elif card.name in LOAD_CARDS or card.name in LINES:
             aside.add(card.name, card.place)
         elif not card.name.startswith(HARMLESS_CARDS):
@@ -167,7 +149,7 @@ def _averaged(card: Card) -> Average | str:
 def _mass(card: Card, place: At, systems: Systems, per_weight: float) -> PointMass:
     """CONM1 or CONM2, in the axes that its coordinate system has at its node."""
     (node,), number = _ends(card, place, 1), card.whole(2, 0)
-    Q = np.eye(3) if number <= 0 else systems(number, card).axes_at(place[node][None])[0]
+    Q = np.eye(3) if number <= 0 else systems.of(number, card).axes_at(place[node][None])[0]
     mass, arm, J = _of_matrix(card) if card.name == "CONM1" else _of_body(card)
     offset = arm - place[node] if number == -1 and card.name == "CONM2" else Q @ arm
     J = Q @ J @ Q.T * per_weight
@@ -185,10 +167,10 @@ def _beside(card: Card) -> list[str]:
 
 def _springs(found: Cards, place: At, moves: At, systems: Systems) -> Iterator[Spring]:
     """CELAS1 and CELAS2 between components of two nodes, CBUSH between their whole motions."""
-    halves = [(c, k) for c in found.get("PELAS", ()) for k in (0, 4) if c.text(k)]
+    halves = [(card, k) for card in found.of("PELAS") for k in (0, 4) if card.text(k)]
     elastic = [replace(card, fields=card.fields[k:]) for card, k in halves]
-    pairs = [(card, card) for card in found.get("CELAS2", ())]
-    for name, some in (("CELAS1", elastic), ("CBUSH", found.get("PBUSH", []))):
+    pairs = [(card, card) for card in found.of("CELAS2")]
+    for name, some in (("CELAS1", elastic), ("CBUSH", found.of("PBUSH"))):
         if users := found.get(name):
             wanted = [card.whole(1, card.whole(0)) for card in users]
             pairs += zip(users, _numbered(some, wanted, f"property of a {name}"), strict=True)
@@ -210,7 +192,7 @@ def _bush(card: Card, own: Card, place: At, moves: At, systems: Systems) -> Spri
         return one
     line, beside = place[b] - place[a], [n for n in (4, 5, 6) if card.text(n)]
     if card.text(7):
-        axes = systems(card.whole(7), card).axes_at(place[a][None])[0]
+        axes = systems.of(card.whole(7), card).axes_at(place[a][None])[0]
     elif np.linalg.norm(line) < NO_LINE:
         raise one.wrong("its nodes lie in one place, so it needs a CID")
     elif beside or not one.stiffness[[1, 2, 4, 5]].any():
@@ -221,7 +203,7 @@ def _bush(card: Card, own: Card, place: At, moves: At, systems: Systems) -> Spri
     else:
         raise one.wrong("it has more than K1 and K4, so it needs a CID, GO or a vector")
     share = card.reals(8)[0] if card.text(8) else 0.5
-    ends = np.hstack([-arm(share * line), arm((share - 1.0) * line)])
+    ends = np.hstack([-moved_rigidly(share * line), moved_rigidly((share - 1.0) * line)])
     return replace(one, stretch=np.vstack([axes.T @ ends[:3], axes.T @ ends[3:]]))
 
 
@@ -245,18 +227,17 @@ def _of_matrix(card: Card) -> tuple[float, Array, Array]:
     M = np.zeros((6, 6))
     M[np.tril_indices(6)] = card.reals(*range(3, 24))
     M += np.tril(M, -1).T
-    m, S = M[0, 0], M[3:, :3]
-    arm = np.array([S[2, 1], S[0, 2], S[1, 0]]) / (m or 1.0)
-    skew = np.cross(np.eye(3), m * arm)
-    off = max(np.abs(M[:3, :3] - m * np.eye(3)).max(), np.abs(S - skew).max())
-    if off > BODY_RTOL * np.abs(M).max():
+    m, centre = M[0, 0], axial(M[3:, :3]) / (M[0, 0] or 1.0)
+    to_centre = moved_rigidly(-centre)
+    own = to_centre.T @ M @ to_centre
+    if np.abs(own[:3] - m * np.eye(3, 6)).max() > BODY_RTOL * np.abs(M).max():
         raise card.wrong("its matrix is not that of a rigid body")
-    return m, arm, M[3:, 3:] - m * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+    return m, centre, own[3:, 3:]
 
 
 def _per_weight(found: Cards) -> float:
     """Mass of what is given as a weight, PARAM WTMASS."""
-    factors = {card.reals(1)[0] for card in found.get("PARAM", ()) if card.text(0) == "WTMASS"}
+    factors = {card.reals(1)[0] for card in found.of("PARAM") if card.text(0) == "WTMASS"}
     if len(factors) > 1:
         raise found["PARAM"][0].wrong(f"WTMASS has the values {sorted(factors)}")
     return factors.pop() if factors else 1.0
@@ -283,19 +264,17 @@ def _property(card: Card) -> int:
     return card.whole(1)
 
 
-def _materials(found: Cards, properties: list[int]) -> dict[str, list[float]]:
+def _materials(found: Cards, names: dict[int, str]) -> dict[str, list[float]]:
     """{region: E, nu and rho} of the material of each property, in units of the deck."""
-    sections = _numbered([card for name in SECTIONS for card in found.get(name, ())], properties)
+    sections = _numbered(found.of(*SECTIONS), list(names))
     used, unread = [card.whole(1) for card in sections], Unread()
     for name in sorted(found.keys() - OF_MAT1):
         for card in found[name]:
             if name.startswith(MATERIALS) and card.whole(0) in used:
                 unread.add(name, card.place)
     unread.refuse()
-    solids = (
-        _isotropic(card, _per_weight(found)) for card in _numbered(found.get("MAT1", []), used)
-    )
-    return {f"property_{p}": numbers for p, numbers in zip(properties, solids, strict=True)}
+    solids = (_isotropic(card, _per_weight(found)) for card in _numbered(found.of("MAT1"), used))
+    return dict(zip(names.values(), solids, strict=True))
 
 
 def _numbered(some: list[Card], wanted: list[int], none: str = "MAT1") -> list[Card]:
@@ -322,10 +301,10 @@ def _sets(found: Cards, ids: Index) -> dict[str, list[int]]:
     """Nodes of skin elements by property, and of SPC and SPC1 cards by set number."""
     sets: dict[str, list[int]] = {}
     for name, n_corners in SKIN_CARDS.items():
-        for card in found.get(name, ()):
+        for card in found.of(name):
             corners = [card.whole(k) for k in range(2, 2 + n_corners)]
             sets.setdefault(f"property_{_property(card)}", []).extend(corners)
-    for card in [*found.get("SPC", ()), *found.get("SPC1", ())]:
+    for card in found.of("SPC", "SPC1"):
         sets.setdefault(f"spc_{card.whole(0)}", []).extend(_held(card, ids))
     return sets
 
