@@ -17,6 +17,7 @@ from rom.errors import TagError
 from rom.fe.mesh.cad import Axis, Face, Vector
 from rom.fe.mesh.picks import EVERY_FACE, Pick, picks
 from rom.fe.mesh.solid import MAX_SHOWN, Notes, shown
+from rom.fe.mesh.sources.gmsh_groups import elements
 from rom.model import Array, Index
 
 KINDS = {kind: kind.lower() for kind in ("Plane", "Cylinder", "Cone", "Sphere", "Torus")}
@@ -46,16 +47,17 @@ def faces(gmsh: ModuleType) -> list[Face]:
         for _, group in gmsh.model.getPhysicalGroups(2)
         for tag in gmsh.model.getEntitiesForPhysicalGroup(2, group)
     }
-    outward = _Outward(gmsh)
-    return [_face(gmsh, tag, outward, names.get(tag, "")) for tag in surfaces(gmsh)]
+    cells = {volume: next(elements(gmsh, 3, volume))[2] for _, volume in gmsh.model.getEntities(3)}
+    return [_face(gmsh, tag, cells, names.get(tag, "")) for tag in surfaces(gmsh)]
 
 
-def _face(gmsh: ModuleType, tag: int, outward: "_Outward", name: str) -> Face:
+def _face(gmsh: ModuleType, tag: int, cells: dict[int, Index], name: str) -> Face:
     kind = kind_of(gmsh, tag)
     area, middle = gmsh.model.occ.getMass(2, tag), gmsh.model.occ.getCenterOfMass(2, tag)
     found: Notes = {}
     if kind == "plane":
-        found = {"normal": vector(outward.normal(tag))}
+        volume = int(gmsh.model.getAdjacencies(2, tag)[0][0])
+        found = {"normal": vector(_outward(gmsh, tag, cells[volume]))}
     elif kind != "other":
         found = _of_revolution(gmsh, tag, kind)
     return Face(tag, kind, float(area), vector(middle), name=name, **found)
@@ -138,40 +140,17 @@ def _ends(gmsh: ModuleType, tag: int) -> tuple[Array, Array]:
     return _circle_at(gmsh, tag, u, low).centre, _circle_at(gmsh, tag, u, high).centre
 
 
-class _Outward:
-    """Normals that point out of the meshed solid."""
-
-    def __init__(self, gmsh: ModuleType) -> None:
-        self.gmsh = gmsh
-        self.cells: dict[int, Index] = {}  # corner nodes of the cells, by volume
-
-    def normal(self, tag: int) -> Array:
-        """(3,) unit normal of a plane surface."""
-        gmsh = self.gmsh
-        at = np.mean(gmsh.model.getParametrizationBounds(2, tag), axis=0)
-        normal = np.array(gmsh.model.getNormal(tag, list(at)))
-        corner, inside = self._beside(tag)
-        return normal if normal @ (corner - inside) > 0 else -normal
-
-    def _beside(self, tag: int) -> tuple[Array, Array]:
-        """A corner of a facet, and the corner of its cell that is not on the facet."""
-        facet = _corners(self.gmsh, 2, tag)[0]
-        volume = int(self.gmsh.model.getAdjacencies(2, tag)[0][0])
-        if volume not in self.cells:
-            self.cells[volume] = _corners(self.gmsh, 3, volume)
-        cells = self.cells[volume]
-        near = cells[(cells == facet[0]).any(axis=1)]
-        cell = near[np.isin(near, facet).sum(axis=1).argmax()]
-        nodes = facet[0], cell[~np.isin(cell, facet)][0]
-        corner, inside = (np.array(self.gmsh.model.mesh.getNode(int(n))[0]) for n in nodes)
-        return corner, inside
-
-
-def _corners(gmsh: ModuleType, dim: int, tag: int) -> Index:
-    """(m, c) corner nodes of the elements of an entity."""
-    kinds, _, nodes = gmsh.model.mesh.getElements(dim, tag)
-    *_, n_nodes, _, n_corners = gmsh.model.mesh.getElementProperties(kinds[0])
-    return nodes[0].reshape(-1, n_nodes)[:, :n_corners]
+def _outward(gmsh: ModuleType, tag: int, cells: Index) -> Array:
+    """(3,) unit normal of a plane surface, away from those (m, k) of its volume."""
+    at = np.mean(gmsh.model.getParametrizationBounds(2, tag), axis=0)
+    normal = np.array(gmsh.model.getNormal(tag, list(at)))
+    facet = next(elements(gmsh, 2, tag))[2][0]
+    near = cells[(cells == facet[0]).any(axis=1)]
+    cell = near[np.isin(near, facet).sum(axis=1).argmax()]
+    middles = [
+        np.mean([gmsh.model.mesh.getNode(int(n))[0] for n in x], axis=0) for x in (facet, cell)
+    ]
+    return normal if normal @ (middles[0] - middles[1]) > 0 else -normal
 
 
 def vector(values: Iterable[float]) -> Vector:
@@ -233,14 +212,11 @@ class Picker:
         return order[:1]
 
     def _distance(self, tag: int, point: tuple[float, ...]) -> float:
-        mesh = self.gmsh.model.mesh
-        nodes, x, _ = mesh.getNodes(2, tag, includeBoundary=True)
-        x, order = x.reshape(-1, 3), np.argsort(nodes)
-        centres = []
-        for kind, _, corners in zip(*mesh.getElements(2, tag), strict=True):
-            size = mesh.getElementProperties(kind)[3]
-            rows = order[np.searchsorted(nodes, corners, sorter=order)].reshape(-1, size)
-            centres.append(x[rows].mean(axis=1))
+        nodes, x, _ = self.gmsh.model.mesh.getNodes(2, tag, includeBoundary=True)
+        nodes, first = np.unique(nodes.astype(np.int64), return_index=True)
+        x = x.reshape(-1, 3)[first]
+        blocks = elements(self.gmsh, 2, tag)
+        centres = [x[np.searchsorted(nodes, rows)].mean(axis=1) for _, _, rows in blocks]
         return float(np.linalg.norm(np.vstack([x, *centres]) - point, axis=1).min())
 
     def _radius(self, wish: Pick) -> list[int]:

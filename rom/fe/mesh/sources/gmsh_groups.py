@@ -4,6 +4,7 @@ Of plane sections, triangles, curves and surfaces.
 """
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
 
@@ -20,7 +21,6 @@ NAMES = re.compile(rb'^\s*([0-3])\s+(\d{1,18})\s+"([^"\r\n]*)"\s*$', re.MULTILIN
 LINE, TRIANGLE = 1, 2  # likewise
 FLAT_RTOL = 1e-9  # height over the extent of a plane section
 DIMENSIONS = ("point", "curve", "surface", "volume")
-Blocks = dict[int, tuple[Index, Index]]  # numbers and nodes of the elements of each volume
 Groups = dict[tuple[int, int], str]  # names by dimension and tag
 
 
@@ -63,10 +63,9 @@ def collect(gmsh: ModuleType, declared: Path, *, strict: bool, repeated: bool) -
     # of a .unv, gmsh puts all that is in no group into one of the number 0
     groups = {key: name for key, name in _group_names(gmsh).items() if key[1] or strict}
     tags, points = _nodes(gmsh)
-    kind, blocks = _solids(gmsh)
-    region = _regions(gmsh, blocks, groups, strict=strict)
-    cells = np.vstack([nodes for _, nodes in blocks.values()])
-    counts = [len(ids) for ids, _ in blocks.values()]
+    volumes, kinds, ids, cells = zip(*_solids(gmsh), strict=True)
+    sizes = dict(zip(volumes, map(len, ids), strict=True))
+    region = _regions(gmsh, sizes, groups, strict=strict)
     facets = {
         name: positions(tags, _facets(gmsh, tag, name, repeated=repeated), "node")
         for (dim, tag), name in groups.items()
@@ -74,14 +73,21 @@ def collect(gmsh: ModuleType, declared: Path, *, strict: bool, repeated: bool) -
     }
     return packed(
         points,
-        positions(tags, cells, "node"),
-        SOLIDS[kind],
-        np.repeat([region[volume] for volume in blocks], counts),
-        np.concatenate([ids for ids, _ in blocks.values()]),
+        positions(tags, np.vstack(cells), "node"),
+        SOLIDS[kinds[0]],
+        np.repeat([region[volume] for volume in volumes], list(sizes.values())),
+        np.concatenate(ids),
         facets=facets,
         region_names={tag: name for (dim, tag), name in groups.items() if dim == 3} or {1: "body"},
         warnings=_remarks(groups) if strict else [],
     )
+
+
+def elements(gmsh: ModuleType, dim: int, entity: int = -1) -> Iterator[tuple[int, Index, Index]]:
+    """Type, numbers (m,) and tags of nodes (m, k) of elements, of one entity or all of its kind."""
+    for kind, ids, nodes in zip(*gmsh.model.mesh.getElements(dim, entity), strict=True):
+        size = gmsh.model.mesh.getElementProperties(kind)[3]
+        yield int(kind), ids.astype(np.int64), nodes.astype(np.int64).reshape(-1, size)
 
 
 def _nodes(gmsh: ModuleType) -> tuple[Index, Array]:
@@ -102,7 +108,7 @@ def _group_names(gmsh: ModuleType) -> Groups:
     return names
 
 
-def _check_names(names: dict[tuple[int, int], str]) -> None:
+def _check_names(names: Groups) -> None:
     """A name must stand for one group."""
     seen: dict[str, str] = {}
     for (dim, tag), name in names.items():
@@ -113,7 +119,7 @@ def _check_names(names: dict[tuple[int, int], str]) -> None:
         seen[name] = what
 
 
-def _remarks(groups: dict[tuple[int, int], str]) -> list[str]:
+def _remarks(groups: Groups) -> list[str]:
     found = [
         f"physical {DIMENSIONS[dim]} {name!r} is ignored: interfaces are surfaces."
         for (dim, _), name in groups.items()
@@ -124,31 +130,28 @@ def _remarks(groups: dict[tuple[int, int], str]) -> list[str]:
     return found
 
 
-def _solids(gmsh: ModuleType) -> tuple[int, Blocks]:
-    """Element type in gmsh, and element numbers and nodes of each volume."""
-    blocks, kinds = {}, set()
-    for _, volume in gmsh.model.getEntities(3):
-        if gmsh.model.getType(3, volume).startswith("Ghost"):  # copies for the neighbours of a part
-            continue
-        types, ids, nodes = gmsh.model.mesh.getElements(3, volume)
-        kinds |= {int(t) for t in types}
-        if len(types) == 1:
-            blocks[volume] = ids[0].astype(np.int64), nodes[0].astype(np.int64)
-    if not kinds:
+def _solids(gmsh: ModuleType) -> list[tuple[int, int, Index, Index]]:
+    """Volumes with type in gmsh, numbers and nodes of their elements, all of one type."""
+    found = [
+        (volume, *block)
+        for _, volume in gmsh.model.getEntities(3)
+        if not gmsh.model.getType(3, volume).startswith("Ghost")  # copies for neighbours of a part
+        for block in elements(gmsh, 3, volume)
+    ]
+    if not found:
         raise _no_solid(gmsh)
+    kinds = {kind for _, kind, *_ in found}
     name = only_type(gmsh.model.mesh.getElementProperties(kind)[0] for kind in kinds)
     if not kinds <= SOLIDS.keys():
         raise MeshError(
             f"cells of type {name} are not supported.",
             hint="Supported are tetrahedra and hexahedra of first and second order.",
         )
-    size = gmsh.model.mesh.getElementProperties(min(kinds))[3]
-    return kinds.pop(), {v: (ids, nodes.reshape(-1, size)) for v, (ids, nodes) in blocks.items()}
+    return found
 
 
 def _no_solid(gmsh: ModuleType) -> MeshError:
-    types = gmsh.model.mesh.getElements(2)[1]
-    n = sum(len(ids) for ids in types)
+    n = sum(len(ids) for _, ids, _ in elements(gmsh, 2))
     if not n:
         return MeshError(
             "there are no volume cells: the geometry is not meshed.",
@@ -162,20 +165,20 @@ def _no_solid(gmsh: ModuleType) -> MeshError:
     )
 
 
-def _regions(gmsh: ModuleType, blocks: Blocks, groups: Groups, *, strict: bool) -> dict[int, int]:
+def _regions(
+    gmsh: ModuleType, sizes: dict[int, int], groups: Groups, *, strict: bool
+) -> dict[int, int]:
     """{volume: region number}; every volume in exactly one group, or no group at all."""
-    if not any(dim == 3 for dim, _ in groups):
-        if groups and strict and any(dim == 2 for dim, _ in groups):
-            raise TagError(
-                f"the surfaces {sorted(n for (d, _), n in groups.items() if d == 2)} are named, "
-                "but no volume is.",
-                hint='Add Physical Volume("body") = {...};',
-            )
-        return dict.fromkeys(blocks, 1)
-    return {volume: _region(gmsh, volume, blocks, groups) for volume in blocks}
+    volumes, surfaces = (sorted(n for (d, _), n in groups.items() if d == k) for k in (3, 2))
+    if surfaces and strict and not volumes:
+        text = f"the surfaces {surfaces} are named, but no volume is."
+        raise TagError(text, hint='Add Physical Volume("body") = {...};')
+    if not volumes:
+        return dict.fromkeys(sizes, 1)
+    return {v: _region(gmsh, v, n, groups, volumes) for v, n in sizes.items()}
 
 
-def _region(gmsh: ModuleType, volume: int, blocks: Blocks, groups: Groups) -> int:
+def _region(gmsh: ModuleType, volume: int, n: int, groups: Groups, others: list[str]) -> int:
     tags = [int(t) for t in gmsh.model.getPhysicalGroupsForEntity(3, volume)]
     if min(tags, default=1) < 1:
         why = f"is in the physical group {min(tags)}: numbers of groups start at 1"
@@ -185,8 +188,7 @@ def _region(gmsh: ModuleType, volume: int, blocks: Blocks, groups: Groups) -> in
         why = f"is in the physical groups {one!r} and {other!r}"
         hint = "Each part of the body has one material: one group per volume."
     elif not tags:
-        others = sorted(name for (dim, _), name in groups.items() if dim == 3)
-        why = f"with {len(blocks[volume][0])} cells is in no physical group, while {others} exist"
+        why = f"with {n} cells is in no physical group, while {others} exist"
         hint = "Put every volume into a group, or remove what does not belong to the body."
     else:
         return tags[0]
@@ -204,9 +206,7 @@ def _facets(gmsh: ModuleType, tag: int, name: str, *, repeated: bool) -> Index:
     found = []
     for surface in _surfaces(gmsh, tag):
         groups = len(gmsh.model.getPhysicalGroupsForEntity(2, surface))
-        for kind, _, nodes in zip(*gmsh.model.mesh.getElements(2, surface), strict=True):
-            size = gmsh.model.mesh.getElementProperties(kind)[3]
-            rows = nodes.astype(np.int64).reshape(-1, size)
+        for _, _, rows in elements(gmsh, 2, surface):
             if groups > 1 and repeated:
                 _check_copies(rows, groups, name)
             found.append(rows)
@@ -230,18 +230,16 @@ def _check_copies(rows: Index, groups: int, name: str) -> None:
 def triangles(gmsh: ModuleType) -> Read:
     """Arrays and notes as `collect` returns them, of triangles in z = 0, facets being curves."""
     tags, points = _nodes(gmsh)
-    cells, ids = _triangles(gmsh, tags)
+    ids, cells = _triangles(gmsh)
     surfaces = _plane_surfaces(gmsh, ids)
-    used, cells = np.unique(cells, return_inverse=True)
-    points, cells = points[used], cells.reshape(-1, 3)
+    used = np.unique(cells)
+    points, cells = points[positions(tags, used, "node")], np.searchsorted(used, cells)
     extent = np.ptp(points, axis=0)
     if (height := np.abs(points[:, 2]).max()) > FLAT_RTOL * extent.max():
         text = f"the mesh leaves the plane z = 0 by {height:.3g} m."
         raise MeshError(text, hint="Draw a plane section in x and y.")
-    place = np.full(tags.size, -1)
-    place[used] = np.arange(used.size)
     curves = {
-        gmsh.model.getPhysicalName(dim, tag) or f"curve_{tag}": _lines(gmsh, tag, tags, place)
+        gmsh.model.getPhysicalName(dim, tag) or f"curve_{tag}": _lines(gmsh, tag, used)
         for dim, tag in gmsh.model.getPhysicalGroups(1)
     }
     told = {"region_names": {1: "body"}, "surface_names": list(surfaces), "warnings": []}
@@ -250,17 +248,17 @@ def triangles(gmsh: ModuleType) -> Read:
     return arrays | {f"surface {i}": rows for i, rows in enumerate(surfaces.values())}, notes
 
 
-def _triangles(gmsh: ModuleType, tags: Index) -> tuple[Index, Index]:
-    """Corners as positions among the tags, and numbers, of all triangles."""
-    kinds, ids, nodes = gmsh.model.mesh.getElements(2)
-    others = [gmsh.model.mesh.getElementProperties(kind)[0] for kind in kinds if kind != TRIANGLE]
-    if others:
-        text = f"cells of the type {others[0]}: triangles with three nodes are needed."
+def _triangles(gmsh: ModuleType) -> tuple[Index, Index]:
+    """Numbers (m,) and tags of the corners (m, 3) of all triangles."""
+    found = {kind: (ids, rows) for kind, ids, rows in elements(gmsh, 2)}
+    if others := found.keys() - {TRIANGLE}:
+        name = gmsh.model.mesh.getElementProperties(min(others))[0]
+        text = f"cells of the type {name}: triangles with three nodes are needed."
         raise MeshError(text, hint="Leave out Recombine, and keep Mesh.ElementOrder = 1.")
-    if not len(kinds):
+    if not found:
         text = "there are no triangles: the geometry has no plane surface."
         raise MeshError(text, hint="Add Plane Surface(1) = {...};")
-    return np.searchsorted(tags, nodes[0].astype(np.int64)).reshape(-1, 3), ids[0].astype(np.int64)
+    return found[TRIANGLE]
 
 
 def _plane_surfaces(gmsh: ModuleType, ids: Index) -> dict[str, Index]:
@@ -272,20 +270,14 @@ def _plane_surfaces(gmsh: ModuleType, ids: Index) -> dict[str, Index]:
         single = len(parts) == 1
         named |= {name if single else f"{name} {k}": part for k, part in enumerate(parts, 1)}
     named = named or {f"surface {tag}": tag for _, tag in gmsh.model.getEntities(2)}
-    found, order = {}, np.argsort(ids, kind="stable")
-    for name, tag in named.items():
-        kinds = [x.astype(np.int64) for x in gmsh.model.mesh.getElements(2, tag)[1]]
-        some = np.concatenate([np.zeros(0, dtype=np.int64), *kinds])
-        found[name] = order[np.searchsorted(ids[order], some)]
-    return found
+    blocks = {name: [own for _, own, _ in elements(gmsh, 2, tag)] for name, tag in named.items()}
+    return {name: positions(ids, np.hstack([ids[:0], *own]), "") for name, own in blocks.items()}
 
 
-def _lines(gmsh: ModuleType, tag: int, tags: Index, place: Array) -> Index:
-    """(k, 2) nodes of the sides of a physical curve."""
-    found = [np.zeros((0, 2), dtype=np.int64)]
-    for curve in gmsh.model.getEntitiesForPhysicalGroup(1, tag):
-        kinds, _, nodes = gmsh.model.mesh.getElements(1, curve)
-        for kind, rows in zip(kinds, nodes, strict=True):
-            if kind == LINE:
-                found.append(place[np.searchsorted(tags, rows.astype(np.int64))].reshape(-1, 2))
-    return np.vstack(found)
+def _lines(gmsh: ModuleType, tag: int, used: Index) -> Index:
+    """(k, 2) nodes, as places in those used, of the sides of a physical curve."""
+    curves = gmsh.model.getEntitiesForPhysicalGroup(1, tag)
+    blocks = (block for curve in curves for block in elements(gmsh, 1, curve))
+    found = [rows for kind, _, rows in blocks if kind == LINE]
+    sides = np.vstack([np.zeros((0, 2), dtype=np.int64), *found])
+    return np.searchsorted(used, sides[np.isin(sides, used).all(axis=1)])
