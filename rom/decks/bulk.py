@@ -7,7 +7,7 @@ Source:
 
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
@@ -74,6 +74,9 @@ class Cards(dict[str, list[Card]]):
         return [card for name in names for card in self.get(name, ())]
 
 
+Systems = Callable[[int, Card], System]  # finds that of a number that a card names
+
+
 def cards(path: str | Path) -> Iterator[Card]:
     """All cards of the bulk data of a file and those it includes, continuations joined.
 
@@ -124,37 +127,6 @@ def _fields(line: str, place: Place) -> tuple[str, list[str], str]:
     return line[:PER_LINE].strip(), fields, line[72:80].strip()
 
 
-@dataclass(slots=True)
-class Systems:
-    """Systems of coordinates of a deck."""
-
-    grid: dict[int, tuple[int, list[float], int]]  # {label: system, coordinates, that of motions}
-    axes: dict[int, tuple[Card, int]]  # {number: card, and its field with the number}
-    known: dict[int, System | None] = field(default_factory=lambda: {0: BASIC_SYSTEM})
-
-    def of(self, number: int, by: Card) -> System:
-        """That of a number that a card names."""
-        if number not in self.known:
-            if number not in self.axes:
-                raise by.wrong(f"the coordinate system {number} is not defined")
-            self.known[number] = None  # while it is being resolved
-            card, start = self.axes[number]
-            if card.name[4] == "2":
-                x = np.array(card.reals(*range(2, 11))).reshape(3, 3)
-                corners = self.of(card.whole(1, 0), card).basic(x)
-            else:
-                corners = np.vstack([self._point(card.whole(start + k), card) for k in (1, 2, 3)])
-            self.known[number] = system(2, corners, card.name[5], at(card.place))
-        if (found := self.known[number]) is None:
-            raise by.wrong(f"the coordinate system {number} is defined by itself")
-        return found
-
-    def _point(self, label: int, by: Card) -> Array:
-        if label not in self.grid:
-            raise by.wrong(f"node {label} is not defined")
-        return self.of(self.grid[label][0], by).basic(np.array([self.grid[label][1]]))
-
-
 def grids(found: Cards) -> tuple[Index, Array, Array, Systems]:
     """Labels (k,), positions (k, 3), and axes of displacements (k, 3, 3), in the basic system.
 
@@ -168,17 +140,37 @@ def grids(found: Cards) -> tuple[Index, Array, Array, Systems]:
         if grid.setdefault(card.whole(0), row) is not row:
             raise card.wrong(f"node {card.whole(0)} is defined twice")
     places = [(card, k) for card in found.of(*POINTS[2:]) for k in (0, 4) if not k or card.text(k)]
-    known = {card.whole(k): (card, k) for card, k in places if not k or card.name[4] == "1"}
-    systems = Systems(grid, known)
+    axes = {card.whole(k): (card, k) for card, k in places if not k or card.name[4] == "1"}
+    known: dict[int, System | None] = {0: BASIC_SYSTEM}  # None while it is being resolved
+
+    def resolved(number: int, by: Card) -> System:
+        if number not in known:
+            if number not in axes:
+                raise by.wrong(f"the coordinate system {number} is not defined")
+            known[number] = None
+            card, start = axes[number]
+            if card.name[4] == "2":
+                x = np.array(card.reals(*range(2, 11))).reshape(3, 3)
+                corners = resolved(card.whole(1, 0), card).basic(x)
+            else:
+                corners = np.vstack([point(card.whole(start + k), card) for k in (1, 2, 3)])
+            known[number] = system(2, corners, card.name[5], at(card.place))
+        if (found := known[number]) is None:
+            raise by.wrong(f"the coordinate system {number} is defined by itself")
+        return found
+
+    def point(label: int, by: Card) -> Array:
+        if label not in grid:
+            raise by.wrong(f"node {label} is not defined")
+        return resolved(grid[label][0], by).basic(np.array([grid[label][1]]))
+
     used, moved = np.array([row[::2] for row in grid.values()], np.int64).reshape(-1, 2).T
     x = np.array([row[1] for row in grid.values()]).reshape(-1, 3)
-    axes = np.tile(np.eye(3), (len(x), 1, 1))
-    for numbers in (used, np.maximum(moved, 0)):
-        for number in np.unique(numbers):
-            here = numbers == number
-            one = systems.of(int(number), found["GRID"][int(here.argmax())])
-            if numbers is used:
-                x[here] = one.basic(x[here])
-            else:
-                axes[here] = one.axes_at(x[here])
-    return np.array(list(grid), dtype=np.int64), x, axes, systems
+    moves = np.tile(np.eye(3), (len(x), 1, 1))
+    for number in np.unique(used):
+        here = used == number
+        x[here] = resolved(int(number), found["GRID"][int(here.argmax())]).basic(x[here])
+    for number in np.unique(moved[moved > 0]):
+        here = moved == number
+        moves[here] = resolved(int(number), found["GRID"][int(here.argmax())]).axes_at(x[here])
+    return np.array(list(grid), dtype=np.int64), x, moves, resolved

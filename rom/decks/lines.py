@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from rom.errors import FileFormatError
@@ -59,6 +59,11 @@ def real(text: str) -> float:
     if not math.isfinite(value):
         raise ValueError(f"{text.strip()[:20]!r} is no finite number")
     return value
+
+
+def row(values: Iterable[float]) -> str:
+    """Numbers as a line of a deck, in fourteen digits."""
+    return ", ".join(f"{v:.13e}" for v in values)
 
 
 def whole(text: str) -> int:

@@ -82,12 +82,26 @@ class Spring(Element):
 class Hung:
     """What the elements of a deck make of the nodes of its solid, in what fits into JSON."""
 
+    solid: Set[int]
+    x: Callable[[int], Array]  # (3,) position of any node
     # {interface: kind, points (k, 3), weights (k,), origin (3,)}
     ties: dict[str, dict[str, Any]] = field(default_factory=dict)
     carried: list[dict[str, Any]] = field(default_factory=list)  # as `rom.Attachment`
     # name, ends, stiffness (12, 12) of the motions at their origins
     springs: list[dict[str, Any]] = field(default_factory=list)
     nodes: set[int] = field(default_factory=set)  # that are of use without an element
+    turning: dict[int, str] = field(default_factory=dict)  # {node that turns: its interface}
+
+    def tie(self, element: Element, kind: str, weights: dict[int, float], origin: int) -> None:
+        """Make an interface of nodes."""
+        if element.name in self.ties:
+            raise element.wrong("another has this name")
+        self.ties[element.name] = {
+            "kind": kind,
+            "points": [self.x(node).tolist() for node in weights],
+            "weights": list(weights.values()),
+            "origin": self.x(origin).tolist(),
+        }
 
 
 def hung(elements: Iterable[Element], solid: Set[int], x: Callable[[int], Array]) -> Hung:
@@ -100,25 +114,24 @@ def hung(elements: Iterable[Element], solid: Set[int], x: Callable[[int], Array]
         FileFormatError: naming the element: nodes that depend twice, circles, hinges, masses that
             hang on nothing, negative ones, inertia without mass, springs that resist rigid motion.
     """
-    elements = list(elements)
-    found, turning = Hung(), dict[int, str]()  # node that turns -> its interface
-    pieces = _pieces([e for e in elements if isinstance(e, Rigid)])
-    for lead, parts in pieces.items():
+    elements, found = list(elements), Hung(solid, x)
+    turning, rigid = found.turning, [e for e in elements if isinstance(e, Rigid)]
+    for lead, parts in _pieces(rigid).items():
         followers = {node for part in parts for node in (part.node, *part.nodes)}
         tied = sorted(followers & solid)
         if not tied:
             raise parts[0].wrong("none of its nodes belongs to the solid")
-        _add(found, parts[0], RIGID_KIND, dict.fromkeys(tied, 1.0), lead, x)
+        found.tie(parts[0], RIGID_KIND, dict.fromkeys(tied, 1.0), lead)
         led = {node for part in parts if part.turning for node in part.nodes if node not in solid}
-        turning |= dict.fromkeys({lead, *led}, parts[0].name)
+        turning.update(dict.fromkeys({lead, *led}, parts[0].name))
         found.nodes.update(followers)
-    dependent = {node for parts in pieces.values() for part in parts for node in part.nodes}
+    dependent = {node for part in rigid for node in part.nodes}
     for one in (e for e in elements if isinstance(e, Average)):
         if one.node in solid | turning.keys() | dependent:
             raise one.wrong(f"its reference node {one.node} moves with something else as well")
         if strange := sorted(one.weights.keys() - solid):
             raise one.wrong(f"its node {strange[0]} does not belong to the solid")
-        _add(found, one, AVERAGE_KIND, one.weights, one.node, x)
+        found.tie(one, AVERAGE_KIND, one.weights, one.node)
         found.ties[one.name] |= {"of area": True} if one.of_area else {}
         turning[one.node] = one.name
         found.nodes.add(one.node)
@@ -131,10 +144,10 @@ def hung(elements: Iterable[Element], solid: Set[int], x: Callable[[int], Array]
             continue
         if node not in turning:
             _check_plain(some, node, solid)
-            _add(found, some[0], LOOSE_KIND, {node: 1.0}, node, x)
+            found.tie(some[0], LOOSE_KIND, {node: 1.0}, node)
         found.carried.append({"interface": turning.get(node, some[0].name)} | body)
     for spring in (e for e in elements if isinstance(e, Spring)):
-        _sprung(found, spring, solid, turning, x)
+        _spring(found, spring)
     return found
 
 
@@ -158,25 +171,6 @@ def _pieces(rigid: list[Rigid]) -> dict[int, list[Rigid]]:
             passed.append(top)
         pieces.setdefault(top.node, []).append(one)
     return pieces
-
-
-def _add(
-    found: Hung,
-    element: Element,
-    kind: str,
-    weights: dict[int, float],
-    origin: int,
-    x: Callable[[int], Array],
-) -> None:
-    """Make an interface of nodes."""
-    if element.name in found.ties:
-        raise element.wrong("another has this name")
-    found.ties[element.name] = {
-        "kind": kind,
-        "points": [x(node).tolist() for node in weights],
-        "weights": list(weights.values()),
-        "origin": x(origin).tolist(),
-    }
 
 
 def _as_one(masses: list[PointMass], x: Array) -> dict[str, Any] | None:
@@ -206,32 +200,30 @@ def _check_plain(masses: list[PointMass], node: int, solid: Set[int]) -> None:
             raise one.wrong(text, "Hang it on the reference node of a rigid element.")
 
 
-def _sprung(
-    found: Hung, one: Spring, solid: Set[int], turning: dict[int, str], x: Callable[[int], Array]
-) -> None:
+def _spring(found: Hung, one: Spring) -> None:
     """Put a spring between two interfaces, or refuse what would resist rigid motion."""
     nodes, k = (one.node, one.other), one.stiffness
     if not all(nodes):
         raise one.wrong("an end of it is at ground", "Springs to ground stand in the mechanism.")
     if k.min() < 0.0 or not (k @ one.stretch).any():
         raise one.wrong(f"its stiffness is {k.min():g}, not above zero, or without direction")
-    if loose := set(nodes) - turning.keys() - solid:
+    if loose := set(nodes) - found.turning.keys() - found.solid:
         raise one.wrong(f"node {min(loose)} belongs neither to the solid nor to what turns with it")
-    a, b = map(x, nodes)
+    a, b = map(found.x, nodes)
     line = (b - a) * (np.linalg.norm(b - a) > APART_RTOL * np.abs([a, b]).max())
     unit = np.repeat([1.0, np.linalg.norm(line) or 1.0], 3)  # of rotations, as displacements
-    felt = np.array([turns for n in nodes for turns in (True, n in turning)]).repeat(3)
+    felt = np.array([turns for n in nodes for turns in (True, n in found.turning)]).repeat(3)
     rigid = (np.vstack([np.eye(6), moved_rigidly(line)]) * np.tile(unit, 2)[:, None] / unit)[felt]
     given, W = one.stretch[k > 0.0] / np.tile(unit, 2), np.zeros((np.count_nonzero(k), 12))
     W[:, felt] = given[:, felt] @ (np.eye(len(rigid)) - rigid @ np.linalg.pinv(rigid, 1e-9))
     if (np.abs(W - given) > ASKEW_RTOL * np.abs(given).max(axis=1, keepdims=True)).any():
         text = "it would hold the body against rigid motion, or turn a node of the solid"
         raise one.wrong(text, "Use a CBUSH between reference nodes of rigid elements.")
-    ends, W = [turning.get(n, f"node {n}") for n in nodes], W * np.tile(unit, 2)
+    ends, W = [found.turning.get(n, f"node {n}") for n in nodes], W * np.tile(unit, 2)
     for end, node, own in zip(ends, nodes, (W[:, :6], W[:, 6:]), strict=True):
         if end not in found.ties:
-            _add(found, replace(one, name=end), LOOSE_KIND, {node: 1.0}, node, x)
-        own[:] = own @ moved_rigidly(x(node) - found.ties[end]["origin"])
+            found.tie(replace(one, name=end), LOOSE_KIND, {node: 1.0}, node)
+        own[:] = own @ moved_rigidly(found.x(node) - found.ties[end]["origin"])
     found.nodes.update(nodes)
     K = (W.T * k[k > 0.0] @ W).tolist()
     found.springs.append({"name": one.name, "ends": ends, "stiffness": K})

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from rom.errors import FileFormatError
 from rom.model import Array
@@ -33,25 +34,15 @@ class System:
 
         Around an axis or a centre they are those of the point; on the axis, of the system itself.
         """
-        inner = (x - self.origin) @ self.axes
-        away = np.hypot(inner[:, 0], inner[:, 1])
-        one = np.where(away > 0.0, np.arctan2(inner[:, 1], inner[:, 0]), 0.0)
-        around_z = _turns(one, 2)
+        x, y, z = ((x - self.origin) @ self.axes).T
         if self.kind == "R":
-            return np.tile(self.axes, (len(x), 1, 1))
+            return np.tile(self.axes, (z.size, 1, 1))
+        away = np.hypot(x, y)
+        around = np.where(away > 0.0, np.arctan2(y, x), 0.0)
         if self.kind == "C":
-            return self.axes @ around_z
-        tilt = _turns(np.arctan2(away, inner[:, 2]), 1)
-        return self.axes @ around_z @ tilt @ np.array([[0.0, 1, 0], [0, 0, 1], [1, 0, 0]])
-
-
-def _turns(angle: Array, axis: int) -> Array:
-    """(k, 3, 3) rotations by angles (k,) about y (1) or z (2)."""
-    turn = np.tile(np.eye(3), (angle.size, 1, 1))
-    a, b = (2, 0) if axis == 1 else (0, 1)
-    turn[:, a, a] = turn[:, b, b] = np.cos(angle)
-    turn[:, b, a], turn[:, a, b] = np.sin(angle), -np.sin(angle)
-    return turn
+            return self.axes @ Rotation.from_euler("z", around).as_matrix()
+        tilted = Rotation.from_euler("ZY", np.column_stack([around, np.arctan2(away, z)]))
+        return self.axes @ tilted.as_matrix() @ np.array([[0.0, 1, 0], [0, 0, 1], [1, 0, 0]])
 
 
 BASIC_SYSTEM = System(np.zeros(3), np.eye(3))

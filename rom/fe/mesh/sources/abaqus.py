@@ -109,15 +109,11 @@ def _element(deck: Deck, block: Block) -> None:
         else:
             deck.skin |= {row[0]: row[1:] for row in rows}
     elif kind in POINT_TYPES:
-        rows = _table(block, 2 + (kind in SPRINGS))
-        deck.cell_sets.add(block.options.get("ELSET", kind), [row[0] for row in rows])
-        for label, *nodes in rows:
-            if label in deck.solids or label in deck.at_nodes:
-                raise block.wrong(f"element {label} is defined twice")
-            deck.at_nodes[label] = kind, nodes
+        _put(deck, block, deck.at_nodes, kind, _table(block, 2 + (kind in SPRINGS)))
     elif kind.startswith("C3D") and is_whole(digits) and int(digits) in SOLIDS:
         cell_type = SOLIDS[int(digits)]
-        _new_cells(deck, block, cell_type, _table(block, 1 + READ_TYPES[cell_type].n_nodes))
+        rows = _table(block, 1 + READ_TYPES[cell_type].n_nodes)
+        _put(deck, block, deck.solids, cell_type, rows)
     else:
         deck.unread.add(f"*ELEMENT, TYPE={kind}", block.place)
 
@@ -136,15 +132,22 @@ def _table(block: Block, width: int) -> list[list[int]]:
     return [numbers[k : k + width] for k in range(0, len(numbers), width)]
 
 
-def _new_cells(deck: Deck, block: Block, cell_type: str, rows: list[list[int]]) -> None:
-    """Solids, in a set that is a region where there are no sections."""
+def _put(
+    deck: Deck,
+    block: Block,
+    found: dict[int, tuple[str, list[int]]],
+    kind: str,
+    rows: list[list[int]],
+) -> None:
+    """Elements in a set, which of solids is a region where there are no sections."""
     for label, *nodes in rows:
         if label in deck.solids or label in deck.at_nodes:
             raise block.wrong(f"element {label} is defined twice")
-        deck.solids[label] = cell_type, nodes
-    name = block.options.get("ELSET", "body")
+        found[label] = kind, nodes
+    solid = found is deck.solids
+    name = block.options.get("ELSET", "body" if solid else kind)
     deck.cell_sets.add(name, [row[0] for row in rows])
-    deck.own.append(name)
+    deck.own += [name] * solid
 
 
 def _copies(deck: Deck, block: Block) -> None:
@@ -164,7 +167,7 @@ def _copies(deck: Deck, block: Block) -> None:
         by_node, by_cell = (steps @ np.array([row[k] for row in given]) for k in (1, 2))
         shifts = zip(by_cell.tolist(), by_node.tolist(), strict=True)
         rows = [[master + c, *(n + node for node in nodes)] for c, n in shifts]
-        _new_cells(deck, block, cell_type, rows)
+        _put(deck, block, deck.solids, cell_type, rows)
         if "ELSET" in block.options:
             deck.cell_sets.add(block.option("ELSET"), [master])
 

@@ -149,7 +149,7 @@ def _averaged(card: Card) -> Average | str:
 def _mass(card: Card, place: At, systems: Systems, per_weight: float) -> PointMass:
     """CONM1 or CONM2, in the axes that its coordinate system has at its node."""
     (node,), number = _ends(card, place, 1), card.whole(2, 0)
-    Q = np.eye(3) if number <= 0 else systems.of(number, card).axes_at(place[node][None])[0]
+    Q = np.eye(3) if number <= 0 else systems(number, card).axes_at(place[node][None])[0]
     mass, arm, J = _of_matrix(card) if card.name == "CONM1" else _of_body(card)
     offset = arm - place[node] if number == -1 and card.name == "CONM2" else Q @ arm
     J = Q @ J @ Q.T * per_weight
@@ -192,7 +192,7 @@ def _bush(card: Card, own: Card, place: At, moves: At, systems: Systems) -> Spri
         return one
     line, beside = place[b] - place[a], [n for n in (4, 5, 6) if card.text(n)]
     if card.text(7):
-        axes = systems.of(card.whole(7), card).axes_at(place[a][None])[0]
+        axes = systems(card.whole(7), card).axes_at(place[a][None])[0]
     elif np.linalg.norm(line) < NO_LINE:
         raise one.wrong("its nodes lie in one place, so it needs a CID")
     elif beside or not one.stiffness[[1, 2, 4, 5]].any():
