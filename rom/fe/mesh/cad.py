@@ -1,10 +1,10 @@
 """What the CAD knows of faces, in records: kind, radius, axis, area."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
 Vector = tuple[float, float, float]
-LENGTHS = ("middle", "point", "radius")
+POWERS = {"middle": 1, "point": 1, "radius": 1, "area": 2}  # of lengths
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,20 +38,12 @@ class Axis:
 Record = TypeVar("Record", Face, Axis)
 
 
-def scaled(record: Record, scale: float) -> Record:
-    """The same with all lengths multiplied."""
-    changes: dict[str, Any] = {}
-    for name in LENGTHS:
-        value = getattr(record, name, None)
-        if value is not None:
-            along = isinstance(value, tuple)
-            changes[name] = tuple(scale * x for x in value) if along else scale * value
-    if isinstance(record, Face):
-        changes["area"] = record.area * scale**2
-    return replace(record, **changes)
+def from_plain(kind: type[Record], values: dict[str, Any], scale: float) -> Record:
+    """A record from what `dataclasses.asdict` and JSON made of it, all lengths multiplied."""
 
+    def sized(name: str, value: Any) -> Any:
+        if isinstance(value, list):
+            return tuple(sized(name, x) for x in value)
+        return value if value is None or name not in POWERS else value * scale ** POWERS[name]
 
-def from_plain(kind: type[Record], values: dict[str, Any]) -> Record:
-    """A record from what `dataclasses.asdict` and JSON made of it."""
-    known: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in values.items()}
-    return kind(**known)
+    return kind(**{name: sized(name, value) for name, value in values.items()})

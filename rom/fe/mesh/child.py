@@ -133,22 +133,19 @@ def _died(done: child.Ended, request: Request, limits: child.Limits) -> BaseExce
 
 def _too_long(request: Request, limits: child.Limits) -> RomError:
     if request["reader"] in GEOMETRIES:
-        return ResourceError(
-            f"meshing did not end within the limit of {limits.seconds:g} s.",
-            hint="Does the geometry loop without end? Else use larger elements, or raise the limit "
-            "by --time-limit SECONDS or time_limit=.",
-        )
+        text = f"meshing did not end within the limit of {limits.seconds:g} s."
+        hint = "Does the geometry loop without end? Else use larger elements, or raise the limit by"
+        return ResourceError(text, hint=f"{hint} --time-limit SECONDS or time_limit=.")
     text = "reading did not end within the time a file of this size needs."
     return FileFormatError(text, hint=WRITE_AGAIN)
 
 
 def _too_large(request: Request, limits: child.Limits) -> RomError:
     if request["reader"] in GEOMETRIES:
-        return ResourceError(
-            f"meshing needs more than the limit of {limits.memory / BYTES_PER_GIGABYTE:.3g} GB.",
-            hint="Use larger elements, or raise the limit by --memory-limit GIGABYTES or "
-            "memory_limit= [bytes].",
-        )
+        size = limits.memory / BYTES_PER_GIGABYTE
+        text = f"meshing needs more than the limit of {size:.3g} GB."
+        hint = "Use larger elements, or raise the limit by --memory-limit GIGABYTES or"
+        return ResourceError(text, hint=f"{hint} memory_limit= [bytes].")
     return FileFormatError("asks for more memory than its size can need.", hint=WRITE_AGAIN)
 
 

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from rom.arguments import one_of, whole
+from rom.decks.lines import row
 from rom.errors import InterfaceError, MeshError, TagError
 from rom.fe.mesh.cell_types import CELL_TYPES, DECK_EDGES
 from rom.fe.mesh.solid import SolidMesh
@@ -82,8 +83,7 @@ def _of_degree(mesh: SolidMesh, degree: int) -> SolidMesh:
 def _nodes(mesh: SolidMesh) -> Iterator[str]:
     yield f"** {ORIGIN_MARK}: lengths in m, forces in N, masses in kg"
     yield "*NODE"
-    for k, (x, y, z) in enumerate(mesh.points, 1):
-        yield f"{k}, {x:.13e}, {y:.13e}, {z:.13e}"
+    yield from (f"{k}, {row(x)}" for k, x in enumerate(mesh.points, 1))
 
 
 def _elements(mesh: SolidMesh) -> Iterator[str]:
@@ -119,12 +119,12 @@ def _materials(mesh: SolidMesh, material: Materials) -> Iterator[str]:
             axes = np.asarray(solid.axes, dtype=np.float64)[:2].ravel()
             turned = f", ORIENTATION={name}"
             first, last = (*solid.E, *solid.nu, *solid.G[:2]), solid.G[2:]
-            yield f"*ELASTIC, TYPE=ENGINEERING CONSTANTS\n{_numbers(first)}\n{_numbers(last)}"
+            yield f"*ELASTIC, TYPE=ENGINEERING CONSTANTS\n{row(first)}\n{row(last)}"
         else:
-            yield f"*ELASTIC\n{_numbers((solid.E, solid.nu))}"
-        yield f"*DENSITY\n{_numbers((solid.rho,))}"
+            yield f"*ELASTIC\n{row((solid.E, solid.nu))}"
+        yield f"*DENSITY\n{row((solid.rho,))}"
         if turned:
-            yield f"*ORIENTATION, NAME={name}, SYSTEM=RECTANGULAR\n{_numbers(axes)}"
+            yield f"*ORIENTATION, NAME={name}, SYSTEM=RECTANGULAR\n{row(axes)}"
         yield f"*SOLID SECTION, ELSET={name}, MATERIAL={name}{turned}"
 
 
@@ -133,10 +133,6 @@ def _step(fixed: Sequence[str], kind: str) -> Iterator[str]:
         yield "*BOUNDARY"
         yield from (f"{name}, 1, 3" for name in fixed)
     yield f"*STEP\n{kind}\n*NODE FILE\nU\n*END STEP"
-
-
-def _numbers(values: Iterable[float]) -> str:
-    return ", ".join(f"{v:.13e}" for v in values)
 
 
 def _check_names(names: Iterable[str]) -> None:

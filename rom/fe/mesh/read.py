@@ -23,7 +23,7 @@ from rom.errors import (
     UnsafeFileError,
     in_file,
 )
-from rom.fe.mesh.cad import Axis, Face, from_plain, scaled
+from rom.fe.mesh.cad import Axis, Face, from_plain
 from rom.fe.mesh.cell_types import CELL_TYPES
 from rom.fe.mesh.child import read_apart
 from rom.fe.mesh.curving import without_middles
@@ -259,10 +259,7 @@ def _solid(
         facets=_tables(arrays, "facets", notes["facet_names"]),
         provenance=provenance,
         cell_ids=arrays["cell_ids"],
-        axes={
-            name: scaled(from_plain(Axis, axis), scale)
-            for name, axis in notes.get("axes", {}).items()
-        },
+        axes={k: from_plain(Axis, axis, scale) for k, axis in notes.get("axes", {}).items()},
         materials={
             name: (E * unit.pressure, nu, rho * unit.density)
             for name, (E, nu, rho) in notes.get("materials", {}).items()
@@ -271,7 +268,7 @@ def _solid(
         ties={name: _tie(tie, scale) for name, tie in notes.get("ties", {}).items()},
         carried=tuple(_carried(body, scale, unit) for body in notes.get("carried", ())),
         springs=tuple(_spring(spring, unit) for spring in notes.get("springs", ())),
-        faces=tuple(scaled(from_plain(Face, face), scale) for face in notes.get("faces", ())),
+        faces=tuple(from_plain(Face, face, scale) for face in notes.get("faces", ())),
     )
 
 

@@ -24,18 +24,15 @@ def repair(mesh: SolidMesh) -> SolidMesh:
     rows = (mesh.cells, *mesh.facets.values())
     if not mesh.cells.size or any(r.size and (r.min() < 0 or r.max() >= n) for r in rows):
         return mesh
-    mesh = compact(replace(mesh, facets={k: _distinct(f, n) for k, f in mesh.facets.items()}))
+    mesh = compact(replace(mesh, facets={k: _distinct(f) for k, f in mesh.facets.items()}))
     if not np.isfinite(mesh.points).all():
         return mesh
     return _turned(_complete(mesh) if mesh.cell_type == "hex20" else mesh)
 
 
-def _distinct(rows: Index, n: int) -> Index:
+def _distinct(rows: Index) -> Index:
     """Rows without copies, order kept."""
-    if not rows.size:
-        return rows
-    number, _ = row_ids(np.sort(rows, axis=1), n + rows.size + 1)
-    return rows[np.sort(np.unique(number, return_index=True)[1])]
+    return rows[np.sort(np.unique(np.sort(rows, axis=1), axis=0, return_index=True)[1])]
 
 
 def _turned(mesh: SolidMesh) -> SolidMesh:

@@ -4,7 +4,6 @@ from dataclasses import asdict
 
 import numpy as np
 
-from rom.fe.mesh.cad import Axis
 from rom.fe.mesh.cell_types import DECK_EDGES
 from rom.fe.mesh.quality import aspect_ratio, cell_volumes, scaled_jacobian
 from rom.fe.mesh.solid import Notes, SolidMesh
@@ -43,9 +42,10 @@ def summary(mesh: SolidMesh) -> Notes:
                 "facets": len(facets),
                 "nodes": len(np.unique(facets)),
                 "middle": np.mean(_box(mesh.points[facets.ravel()]), axis=0).tolist(),
-                **_axis(mesh.axes.get(name)),
+                # where a joint on this interface sits, if the CAD knows an axis
+                **({"axis": list(a.direction), "point": list(a.point)} if a else {}),
             }
-            for name, facets in mesh.facets.items()
+            for name, facets, a in ((k, f, mesh.axes.get(k)) for k, f in mesh.facets.items())
         },
         "ties": {name: len(tie.points) for name, tie in mesh.ties.items() if tie.kind},
         "masses": [{"interface": body.interface, "mass": body.mass} for body in mesh.carried],
@@ -81,11 +81,6 @@ def _pieces(facets: Index, c: int) -> Index:
     if c == 4:
         inner = np.vstack([inner[:, [0, 1, 2]], inner[:, [0, 2, 3]]])
     return np.vstack([inner, around])
-
-
-def _axis(axis: Axis | None) -> Notes:
-    """Where a joint on this interface sits, if the CAD knows an axis."""
-    return {"axis": list(axis.direction), "point": list(axis.point)} if axis else {}
 
 
 def _box(points: Array) -> Array:

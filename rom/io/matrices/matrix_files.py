@@ -101,7 +101,9 @@ def read_matrix(source: str | Path | tuple[str | Path, str]) -> NamedMatrix:
             where=str(path),
             hint=f"Stiffness and mass are real and square; the file holds {offered(found, key)}.",
         )
-    return NamedMatrix(f"{path} {key}".strip(), csr_matrix(A), dofs.get(key))
+    if not np.isfinite((A := csr_matrix(A)).data).all():
+        raise FileFormatError("a number is not finite.", where=str(path))
+    return NamedMatrix(f"{path} {key}".strip(), A, dofs.get(key))
 
 
 def write_abaqus_matrix(A: Array | csr_matrix, dofs: Dofs, path: str | Path) -> Path:
@@ -136,14 +138,13 @@ def _pairs(path: Path) -> Mapping[str, tuple[csr_matrix, Dofs | None]]:
     with path.open("rb") as file:
         start = file.read(HEAD_BYTES)
     if start.startswith(BANNER_TEXT):
-        return {"": (_finite(read_market(path), path), None)}
+        return {"": (read_market(path), None)}
     if BOEING_PATTERN.match(start):
         return {"": (read_boeing(path), None)}
     if ending in (".bdf", ".dat", ".pch", ".dmig"):
         return read_dmig(path)
     if ending in MATRIX_ENDINGS:
-        A, dofs = read_stored_matrix(path)
-        return {"": (_finite(A, path), dofs)}
+        return {"": read_stored_matrix(path)}
     if ending not in (".mtx", ".mm", ".inp"):
         raise ConfigError(
             f"{path} has the ending {ending!r}; known: .mtx, .mm, .inp, .sti, .mas, "
@@ -172,18 +173,11 @@ def _abaqus(path: Path) -> tuple[csr_matrix, Dofs | None]:
     if not rows:
         raise FileFormatError("the file holds no entry.", where=str(path))
     if len(rows[0]) > 3:
-        A, dofs = labelled(rows)
-        return _finite(A, path), dofs
+        return labelled(rows)
     *place, values = np.array(rows).T
     i, j = np.array(place, dtype=np.int64) - 1
     A = coo_matrix((values, (i, j)), shape=(max(i.max(), j.max()) + 1,) * 2)
-    return _finite(A.tocsr(), path), None
-
-
-def _finite(A: csr_matrix, path: Path) -> csr_matrix:
-    if not np.isfinite(A.data).all():
-        raise FileFormatError("a number is not finite.", where=str(path))
-    return A
+    return A.tocsr(), None
 
 
 def read_market(path: str | Path) -> csr_matrix:

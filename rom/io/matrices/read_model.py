@@ -178,13 +178,9 @@ class _Layout:
                 "normals.",
                 hint="Give hold_drilling=True to leave these rotations out; nothing feels them.",
             )
-        t = nodes.size
-        row = (3 * (k + nodes)[:, None] + np.arange(3)).ravel()
-        column = np.repeat(3 * k + np.arange(t), 3)
-        rest = np.r_[np.arange(3 * k), np.arange(6 * k, n)]
-        to = np.r_[np.arange(3 * k), 3 * k + t + np.arange(n - 6 * k)]
-        entries = np.r_[axes.ravel(), np.ones(rest.size)], (np.r_[row, rest], np.r_[column, to])
-        T = csr_matrix(entries, shape=(n, n - 3 * k + t))
+        t, row = nodes.size, (3 * nodes[:, None] + np.arange(3)).ravel()
+        R = csr_matrix((axes.ravel(), (row, np.repeat(np.arange(t), 3))), shape=(3 * k, t))
+        T = block_diag([identity(3 * k), R, identity(n - 6 * k)], format="csr")
         return T, Rotations(nodes, axes, 3 * k + np.arange(t)) if t else None
 
 

@@ -13,14 +13,14 @@ Source:
 """
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 from scipy.sparse import csr_matrix, tril
 
-from rom.decks.lines import whole
+from rom.decks.lines import row, whole
 from rom.errors import ConfigError, UnsafeFileError, in_file
 from rom.io.files import lines_of, need, number, write_lines
 from rom.io.matrices.dmig import Dofs
@@ -156,7 +156,7 @@ def _document(matrices: Mapping[str, Array], dofs: Dofs, nodes: dict[int, Array]
         raise ConfigError("the rows of a user element must be ordered node by node.")
     yield f"** {ORIGIN_MARK}"
     yield "*NODE"
-    yield from (f"{k}, " + _row(nodes.get(k, np.zeros(3))) for k in labels)
+    yield from (f"{k}, " + row(nodes.get(k, np.zeros(3))) for k in labels)
     yield f"*USER ELEMENT, TYPE=U1, NODES={len(labels)}, LINEAR"
     yield f"** {NODE_LIST}"
     yield from (f"** {line}" for line in _wrapped(labels))
@@ -169,7 +169,7 @@ def _document(matrices: Mapping[str, Array], dofs: Dofs, nodes: dict[int, Array]
     for kind, A in matrices.items():
         yield f"*MATRIX, TYPE={kind}"
         values = tril(A).toarray()[np.tril_indices(len(dofs))]
-        yield from map(_row, np.split(values, range(PER_LINE, values.size, PER_LINE)))
+        yield from map(row, np.split(values, range(PER_LINE, values.size, PER_LINE)))
     yield "*ELEMENT, TYPE=U1, ELSET=BODY"
     yield from _wrapped([1, *labels])
     yield "*UEL PROPERTY, ELSET=BODY"
@@ -179,7 +179,3 @@ def _wrapped(numbers: list[int]) -> Iterator[str]:
     lines = [numbers[k : k + PER_LINE] for k in range(0, len(numbers), PER_LINE)]
     for k, line in enumerate(lines):
         yield ", ".join(map(str, line)) + ("," if k + 1 < len(lines) else "")
-
-
-def _row(values: Iterable[float]) -> str:
-    return ", ".join(f"{v:.13e}" for v in values)
