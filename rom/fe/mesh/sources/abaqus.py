@@ -47,6 +47,8 @@ SIDES = {
     4: ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
     8: ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0)),
 }
+Elements = dict[int, tuple[str, list[int]]]  # {number: type, nodes}
+Labels = dict[str, list[int]]  # of the nodes of surfaces, by name
 
 
 @dataclass
@@ -59,9 +61,9 @@ class Deck(Nodes):
     """
 
     aside: Unread = field(default_factory=Unread)
-    solids: dict[int, tuple[str, list[int]]] = field(default_factory=dict)
+    solids: Elements = field(default_factory=dict)
     skin: dict[int, list[int]] = field(default_factory=dict)
-    at_nodes: dict[int, tuple[str, list[int]]] = field(default_factory=dict)
+    at_nodes: Elements = field(default_factory=dict)
     cell_sets: Sets = field(default_factory=lambda: Sets("elements"))
     surfaces: dict[str, tuple[str, list[list[str]]]] = field(default_factory=dict)
     own: list[str] = field(default_factory=list)
@@ -95,7 +97,7 @@ def read(path: str) -> Read:
     rotating = [node for word in turned for node in deck.node_sets.meant(word).tolist()]
     remarks = [*deck.aside.remark(), *remarks]
     told = of_materials(_materials, deck)
-    return solid.read(names, regions, facets, remarks, elements, rotating, **told)
+    return solid.read(names, regions, facets, remarks, told, elements, rotating)
 
 
 def _element(deck: Deck, block: Block) -> None:
@@ -132,13 +134,7 @@ def _table(block: Block, width: int) -> list[list[int]]:
     return [numbers[k : k + width] for k in range(0, len(numbers), width)]
 
 
-def _put(
-    deck: Deck,
-    block: Block,
-    found: dict[int, tuple[str, list[int]]],
-    kind: str,
-    rows: list[list[int]],
-) -> None:
+def _put(deck: Deck, block: Block, found: Elements, kind: str, rows: list[list[int]]) -> None:
     """Elements in a set, which of solids is a region where there are no sections."""
     for label, *nodes in rows:
         if label in deck.solids or label in deck.at_nodes:
@@ -359,9 +355,7 @@ def _components(block: Block) -> set[str]:
     return found if any(low for low, _ in ends) else set(ALL)
 
 
-def _tied(
-    deck: Deck, block: Block, how: Block, labels: dict[str, list[int]]
-) -> Iterator[Rigid | Average]:
+def _tied(deck: Deck, block: Block, how: Block, labels: Labels) -> Iterator[Rigid | Average]:
     """What a block ties, of surfaces that have these nodes."""
     if block.keyword == "MPC":
         leads: dict[int, list[int]] = {}
@@ -391,7 +385,7 @@ def _one(deck: Deck, block: Block, word: str) -> int:
     return nodes[0]
 
 
-def _coupled(deck: Deck, block: Block, labels: dict[str, list[int]]) -> tuple[str, list[int]]:
+def _coupled(deck: Deck, block: Block, labels: Labels) -> tuple[str, list[int]]:
     """Name and nodes of the surface of a coupling."""
     names = {name.upper(): name for name in deck.surfaces}
     if (name := names.get(block.option("SURFACE").upper(), "")) not in deck.surfaces:

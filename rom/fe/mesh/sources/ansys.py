@@ -94,7 +94,7 @@ def read(path: str) -> Read:
     solid = Solid.of(labels, points, list(deck.solids), types, nodes)
     names = {int(number): f"material_{number}" for number in np.unique(materials)}
     told = of_materials(_materials, deck.laws, names)
-    return solid.read(names, np.array(materials), *solid.facets(deck.sets), **told)
+    return solid.read(names, np.array(materials), *solid.facets(deck.sets), told)
 
 
 def _commands(path: Path) -> Iterator[Command]:

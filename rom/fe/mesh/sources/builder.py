@@ -19,8 +19,7 @@ def make(gmsh: ModuleType, path: Path, request: Request) -> Made:
     if not callable(build):
         raise FileFormatError(f"{path.name} has no function build(gmsh, **parameters).")
     gmsh.model.add(path.stem)
-    defaults = _defaults(build)
-    values = _arguments(build, request["parameters"], path)
+    values, defaults = _arguments(build, request["parameters"], path)
     try:
         build(gmsh, **values)
     except (RomError, MemoryError):
@@ -49,16 +48,16 @@ def _load(path: Path) -> ModuleType:
     return module
 
 
-def _arguments(build: Callable[..., object], given: Notes, path: Path) -> Notes:
+def _arguments(build: Callable[..., object], given: Notes, path: Path) -> tuple[Notes, Notes]:
+    """All that is handed to a builder, and its defaults."""
     known = list(inspect.signature(build).parameters.values())[1:]
     names = [p.name for p in known if p.kind is not p.VAR_KEYWORD]
     if len(names) == len(known):
         check_parameters(path, given, names)
-    defaults = _defaults(build)
-    missing = sorted(set(names) - set(defaults) - set(given))
-    if missing:
+    defaults = {p.name: p.default for p in known if p.default is not p.empty}
+    if missing := sorted(set(names) - defaults.keys() - given.keys()):
         raise ConfigError(f"{path.name} needs a value for the parameter {named(missing)}.")
-    return defaults | given
+    return defaults | given, defaults
 
 
 def check_parameters(
@@ -68,11 +67,6 @@ def check_parameters(
     if unknown := sorted(set(given) - set(known)):
         text = f"{path.name} has no parameter {named(unknown)}; its parameters are {sorted(known)}."
         raise ConfigError(text, hint=hint)
-
-
-def _defaults(build: Callable[..., object]) -> Notes:
-    known = inspect.signature(build).parameters.values()
-    return {p.name: p.default for p in known if p.default is not p.empty}
 
 
 def _place(error: Exception, path: Path) -> str:

@@ -71,6 +71,9 @@ def positions(ids: Index, wanted: Index, what: str) -> Index:
     return order[place]
 
 
+Facets = dict[str, Index]  # {name: (f, kf) nodes}
+
+
 @dataclass(frozen=True, slots=True)
 class Solid:
     """Nodes and cells of a deck, the latter of one type, as rows of nodes in the order of gmsh."""
@@ -84,7 +87,7 @@ class Solid:
     @classmethod
     def of(
         cls,
-        labels: Integers,
+        labels: Index,
         points: npt.ArrayLike,
         ids: npt.ArrayLike,
         types: Iterable[str],
@@ -103,9 +106,7 @@ class Solid:
         cells = cells[:, [*range(n), *(n + np.argsort(places))]]
         return cls(labels, np.asarray(points), np.array(ids, dtype=np.int64), kind, cells)
 
-    def facets(
-        self, sets: Mapping[str, Sequence[int] | Index]
-    ) -> tuple[dict[str, Index], list[str]]:
+    def facets(self, sets: Mapping[str, Sequence[int] | Index]) -> tuple[Facets, list[str]]:
         """Outer facets all of whose corners are in a set of nodes, and remarks on sets left out."""
         outer, n = outer_facets(self.cells, self.kind, self.labels.size), self.kind.corners_per_face
         facets, remarks = {}, []
@@ -124,11 +125,11 @@ class Solid:
         self,
         names: Mapping[int, str],
         regions: Integers,
-        facets: Mapping[str, Index],
+        facets: Facets,
         remarks: Iterable[str],
+        more: Mapping[str, Notes],
         elements: Iterable[Element] = (),
         known: Iterable[int] = (),
-        **notes: Notes,
     ) -> Read:
         """Arrays and notes, with what hangs on nodes; a remark on nodes of no known use."""
         used = np.zeros(self.labels.size, dtype=bool)
@@ -143,8 +144,8 @@ class Solid:
         found = hung(elements, set(self.labels[used].tolist()), place)
         lonely = self.labels[~used & ~np.isin(self.labels, [*found.nodes, *known])]
         text = f"{lonely.size} nodes belong to no solid and are left out: {named(lonely.tolist())}"
-        more = [f"{text}; check that no element is missing."] if lonely.size else []
-        told = {"ties": found.ties, "carried": found.carried, "springs": found.springs}
-        told |= {"region_names": names, "warnings": [*remarks, *more]} | notes
-        told |= {"facets": facets, "provenance": {"parameters": {}}}
+        lost = [f"{text}; check that no element is missing."] if lonely.size else []
+        told: Notes = {"ties": found.ties, "carried": found.carried, "springs": found.springs}
+        told |= {"region_names": names, "warnings": [*remarks, *lost], "facets": facets, **more}
+        told |= {"provenance": {"parameters": {}}}
         return packed(self.points, self.cells, self.kind.name, regions, self.ids, **told)

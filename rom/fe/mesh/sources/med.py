@@ -56,7 +56,7 @@ def _mesh(step: Group, groups: dict[str, dict[int, list[str]]]) -> Read:
         skin, members = _nodes(blocks[kind]), _members(blocks[kind], groups["ELEME"])
         facets |= {name: skin[rows] for name, rows in members.items()}
     found, remarks = solid.facets(_members(step["NOE"], groups["NOEUD"]))
-    return solid.read(names, regions, found | facets, remarks)
+    return solid.read(names, regions, found | facets, remarks, {})
 
 
 def _nodes(block: Group) -> Index:

@@ -70,7 +70,7 @@ def read(path: str) -> Read:
     masses = (_mass(card, place, systems, _per_weight(found)) for card in found.of(*MASSES))
     elements = [*ties, *masses, *_springs(found, place, moves, systems)]
     told = of_materials(_materials, found, names)
-    return solid.read(names, regions, facets, [*remarks, *left], elements, **told)
+    return solid.read(names, regions, facets, [*remarks, *left], told, elements)
 
 
 def _sorted(path: Path) -> tuple[Cards, list[Element], list[str]]:

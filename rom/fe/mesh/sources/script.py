@@ -48,8 +48,7 @@ Modulo Hypot Rand Step Sign Exists FileExists GetNumber GetString GetForced Forc
 LogSpace ListFromFile Find List ListAlt Cross Dot Norm Str StrCat StrPrefix StrRelative StrReplace
 StrSub StrLen StrCmp StrFind StrChoice UpperCase LowerCase LowerCaseIn Sprintf NameFromString
 CurrentDirectory CurrentDir CurrentFileName AbsolutePath DirName Include Merge MergeWithBoundingBox
-Nurb Bounding NewModel Today TestLevel DimNameSpace NameStruct Text2D Text3D TIME T2 T3
-INTERPOLATION_SCHEME SP VP TP SL VL TL ST VT TT SQ VQ TQ SS VS TS SH VH TH SI VI TI SY VY TY
+Nurb Bounding NewModel Today TestLevel DimNameSpace NameStruct Text2D Text3D TIME
 """.split())  # fmt: skip
 FIELDS = frozenset("""
 Attractor AttractorAnisoCurve AutomaticMeshSizeField Ball BoundaryLayer Box Centerline Constant
