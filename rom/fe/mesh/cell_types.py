@@ -7,14 +7,14 @@ Source:
     gmsh reference manual, section "Node ordering".
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
 
 import numpy as np
 
-from rom.model import Array, Integers
+from rom.model import Array, Index, Integers
 
 TET_CORNERS = ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1))
 TET_FACES = ((0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3))
@@ -161,3 +161,9 @@ def jacobians(x: Array, gradients: Array) -> Array:
         + a[1] * (b[2] * c[0] - b[0] * c[2])
         + a[2] * (b[0] * c[1] - b[1] * c[0])
     )
+
+
+def over_blocks(cells: Index, of: Callable[[Index], Array], size: int = 20_000) -> Array:
+    """(m,) what a function makes of some cells (m, k) together, which bounds the memory."""
+    found = [of(cells[i : i + size]) for i in range(0, len(cells), size)]
+    return np.concatenate(found) if found else np.empty(0)

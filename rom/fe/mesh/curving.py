@@ -17,12 +17,11 @@ from math import comb, factorial
 
 import numpy as np
 
-from rom.fe.mesh.cell_types import CELL_TYPES, CellType, jacobians
+from rom.fe.mesh.cell_types import CELL_TYPES, CellType, jacobians, over_blocks
 from rom.fe.mesh.solid import SolidMesh, compact
 from rom.model import Array, Index, Integers, Mask
 
 STRAIGHT_EDGE_RTOL = 1e-9  # of the edge: distance of its mid-side node from the middle
-BLOCK_SIZE = 5000  # cells looked at together, bounds the memory
 BOUND_GAP = 1e-4  # of the cube of the cell: how well the smallest determinant is known
 MOST_HALVINGS = 12
 DEGREES = {"tetrahedron": 3, "hexahedron": 5}  # of the determinant
@@ -72,11 +71,8 @@ def smallest_determinants(points: Array, cells: Index, kind: CellType, gap: Arra
 
     Of points (n, 3) [m]; a value may be above the smallest by the gap (m,) [m^3].
     """
-    found = [
-        _smallest(points[cells[rows]], kind, gap[rows])
-        for rows in (slice(i, i + BLOCK_SIZE) for i in range(0, len(cells), BLOCK_SIZE))
-    ]
-    return np.concatenate(found) if found else np.empty(0)
+    every = np.arange(len(cells))
+    return over_blocks(every, lambda rows: _smallest(points[cells[rows]], kind, gap[rows]), 5000)
 
 
 def _smallest(x: Array, kind: CellType, gap: Array) -> Array:

@@ -1,13 +1,13 @@
 """Shape of the cells: volume, Jacobian, aspect ratio."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import reduce
 from itertools import chain, repeat
 
 import numpy as np
 
-from rom.fe.mesh.cell_types import CellType, jacobians
+from rom.fe.mesh.cell_types import CellType, jacobians, over_blocks
 from rom.fe.mesh.curving import BOUND_GAP, bent, smallest_determinants, straightened
 from rom.fe.mesh.solid import SolidMesh, cell_names, refuse_cells
 from rom.fe.mesh.topology import faces_of
@@ -25,7 +25,6 @@ MAX_ASPECT_RATIO = 100.0  # beyond it we warn; tetrahedra of a good mesh stay be
 # ones. On a ring of 50 thicknesses it is 1 % at five times and 50 % at ten. Bricks do better.
 ONE_LAYER = {1: (1.5, 0.0), 2: (6.0, 0.03), 3: (12.0, 0.003)}
 BRICKS, THIN_SHARE, FINE_RATIO = 1.5, 0.3, 5.0  # limits of them, share of the cells, what cures
-BLOCK_SIZE = 20_000  # cells looked at together, bounds the memory
 
 
 def check_shape(mesh: SolidMesh) -> list[str]:
@@ -132,7 +131,8 @@ def layer_doubt(mesh: SolidMesh, degree: int) -> str:
 def cell_volumes(mesh: SolidMesh) -> Array:
     """(m,) volumes of the cells [m^3], exact for curved ones too."""
     at, weights = mesh.kind.quadrature
-    return _over_blocks(mesh.points, mesh.cells, mesh.kind.gradients(at), lambda x: x @ weights)
+    gradients = mesh.kind.gradients(at)
+    return over_blocks(mesh.cells, lambda block: jacobians(mesh.points[block], gradients) @ weights)
 
 
 def _sampled(mesh: SolidMesh) -> Array:
@@ -148,29 +148,15 @@ def _sampled(mesh: SolidMesh) -> Array:
 def _smallest(points: Array, cells: Index, kind: CellType) -> Array:
     at, _ = kind.quadrature
     gradients = kind.gradients(at[:1] if kind.name == "tet4" else at)
-    return _over_blocks(points, cells, gradients, lambda x: x.min(axis=1))
-
-
-def _over_blocks(
-    points: Array, cells: Index, gradients: Array, of: Callable[[Array], Array]
-) -> Array:
-    blocks = [cells[i : i + BLOCK_SIZE] for i in range(0, len(cells), BLOCK_SIZE)]
-    found = [of(jacobians(points[block], gradients)) for block in blocks]
-    return np.concatenate(found) if found else np.empty(0)
-
-
-def _edges(kind: CellType) -> list[tuple[int, int]]:
-    """Corner pairs next to each other on a face."""
-    rings = [zip(f, f[1:] + f[:1], strict=True) for f in kind.faces]
-    return sorted({(min(e), max(e)) for ring in rings for e in ring})
+    return over_blocks(cells, lambda block: jacobians(points[block], gradients).min(axis=1))
 
 
 def _edge_lengths(mesh: SolidMesh) -> Iterator[Array]:
     """(m,) lengths of the edges of all cells, one edge after the other."""
     x, corners = mesh.points, mesh.corners
-    return (
-        np.linalg.norm(x[corners[:, b]] - x[corners[:, a]], axis=1) for a, b in _edges(mesh.kind)
-    )
+    rings = (zip(f, f[1:] + f[:1], strict=True) for f in mesh.kind.faces)
+    edges = {(min(ends), max(ends)) for ring in rings for ends in ring}
+    return (np.linalg.norm(x[corners[:, b]] - x[corners[:, a]], axis=1) for a, b in edges)
 
 
 def _longest_edge(mesh: SolidMesh) -> Array:

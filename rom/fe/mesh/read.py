@@ -125,14 +125,14 @@ def read_mesh(  # noqa: PLR0913  limits and trust beside what is read
         **notes["provenance"],
     }
     if scale != 1.0 and "materials" in notes:
-        text = f"scale={scale:g} is of lengths alone and says no unit of the materials of the deck."
+        text = f"scale={scale:g} is of lengths alone and says no unit of the"
         hint = "Give units= instead, as 'mm-t-s'"
-        notes["unread"] = {"message": text, "hint": f"{hint}, or others."}
+        notes["unread"] = {
+            "message": f"{text} materials of the deck.",
+            "hint": f"{hint}, or others.",
+        }
         if notes.get("carried") or notes.get("springs"):
-            text = (
-                f"scale={scale:g} is of lengths alone and says no unit of the masses and springs."
-            )
-            raise FileFormatError(text, where=str(path), hint=f"{hint}.")
+            raise FileFormatError(f"{text} masses and springs.", where=str(path), hint=f"{hint}.")
     mesh, remarks = _solid(arrays, notes, provenance, scale, unit), notes["warnings"]
     if reader in GEOMETRIES:
         mesh, straightened = straighten(repair(mesh))
