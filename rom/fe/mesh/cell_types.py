@@ -105,7 +105,9 @@ class CellType:
         """(q, n_nodes, 3) reference gradients of the shape functions at (q, 3) points."""
         e = self._exponents
         coefficients = np.linalg.inv(_monomials(self.nodes, e))
-        return np.stack([_derivative(at, e, a) @ coefficients for a in range(3)], axis=-1)
+        lowered = (np.maximum(e - one, 0) for one in np.eye(3, dtype=int))
+        found = [e[:, a] * _monomials(at, low) @ coefficients for a, low in enumerate(lowered)]
+        return np.stack(found, axis=-1)
 
     @cached_property
     def quadrature(self) -> tuple[Array, Array]:
@@ -122,12 +124,6 @@ class CellType:
 
 def _monomials(x: Array, exponents: Integers) -> Array:
     return np.prod(x[:, None, :] ** exponents, axis=2)
-
-
-def _derivative(x: Array, exponents: Integers, axis: int) -> Array:
-    lowered = exponents.copy()
-    lowered[:, axis] = np.maximum(lowered[:, axis] - 1, 0)
-    return exponents[:, axis] * _monomials(x, lowered)
 
 
 def _alone(corners: Iterable[int]) -> tuple[tuple[int, ...], ...]:

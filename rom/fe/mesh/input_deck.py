@@ -16,7 +16,7 @@ from rom.decks.lines import row
 from rom.errors import InterfaceError, MeshError, TagError
 from rom.fe.mesh.cell_types import CELL_TYPES, DECK_EDGES
 from rom.fe.mesh.solid import SolidMesh
-from rom.fe.mesh.sources.abaqus import SIDES
+from rom.fe.mesh.sources.abaqus import sides
 from rom.fe.mesh.topology import find_rows
 from rom.model import Material, Orthotropic
 from rom.names import ORIGIN_MARK, check_known, named
@@ -56,7 +56,7 @@ def input_deck(
     _check_names(mesh.region_names.values())
     _check_names(mesh.facets)
     mesh = _of_degree(mesh, degree)
-    parts = [*_nodes(mesh), *_elements(mesh), *_interfaces(mesh)]
+    parts = [*_nodes_and_elements(mesh), *_interfaces(mesh)]
     if material is not None:
         parts += [*_materials(mesh, material), *_step(fixed, STEPS[step].format(n=n_modes))]
     return "\n".join(parts) + "\n"
@@ -80,13 +80,10 @@ def _of_degree(mesh: SolidMesh, degree: int) -> SolidMesh:
     return replace(mesh, points=points, cells=cells, cell_type="tet10")
 
 
-def _nodes(mesh: SolidMesh) -> Iterator[str]:
+def _nodes_and_elements(mesh: SolidMesh) -> Iterator[str]:
     yield f"** {ORIGIN_MARK}: lengths in m, forces in N, masses in kg"
     yield "*NODE"
     yield from (f"{k}, {row(x)}" for k, x in enumerate(mesh.points, 1))
-
-
-def _elements(mesh: SolidMesh) -> Iterator[str]:
     order = [0, 1, 2, 3, *mesh.kind.among(DECK_EDGES["tet10"])]
     for tag, name in mesh.region_names.items():
         yield f"*ELEMENT, TYPE={ELEMENTS[mesh.cell_type]}, ELSET={name}"
@@ -95,17 +92,17 @@ def _elements(mesh: SolidMesh) -> Iterator[str]:
 
 
 def _interfaces(mesh: SolidMesh) -> Iterator[str]:
-    sides, supports, n = SIDES[4], mesh.kind.supports, len(mesh.points)
-    on_side = [[k for k, s in enumerate(supports) if set(s) <= set(side)] for side in sides]
+    kind, n = mesh.kind, len(mesh.points)
+    side = {face: label for label, face in sides(kind).items()}
+    listed = mesh.cells[:, np.array(kind.faces)].reshape(-1, 3)
     for name, facets in mesh.facets.items():
-        owned = find_rows(facets[:, :3], mesh.cells[:, np.array(sides)].reshape(-1, 3), n)
-        cell, side = np.divmod(owned, len(sides))
-        nodes = np.unique(mesh.cells[cell[:, None], np.array(on_side)[side]]) + 1
+        cell, face = np.divmod(find_rows(facets[:, :3], listed, n), len(side))
+        nodes = np.unique(mesh.cells[cell[:, None], np.array(kind.face_nodes)[face]]) + 1
         yield f"*NSET, NSET={name}"
         for k in range(0, nodes.size, PER_LINE):
             yield ", ".join(map(str, nodes[k : k + PER_LINE]))
         yield f"*SURFACE, NAME={name}, TYPE=ELEMENT"
-        yield from (f"{c + 1}, S{s + 1}" for c, s in zip(cell, side, strict=True))
+        yield from (f"{c + 1}, {side[f]}" for c, f in zip(cell, face, strict=True))
 
 
 def _materials(mesh: SolidMesh, material: Materials) -> Iterator[str]:

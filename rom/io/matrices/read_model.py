@@ -113,7 +113,7 @@ def read_model(  # noqa: PLR0913  one keyword per choice
         T.T @ mass @ T * unit.mass,
         points,
         {n: _interface(n, own, layout.labels, points, rotations) for n, own in interfaces.items()},
-        provenance={"K": _name(K), "M": _name(M), "units": units},
+        provenance={"K": found[0].where, "M": found[1].where, "units": units},
         rotations=rotations,
         n_scalars=len(layout.scalars),
         D=T.T @ damping[0] @ T * (unit.mass / unit.time) if damping else None,
@@ -372,7 +372,3 @@ def _speed_of_sound(model: FEModel) -> float:
     near = cKDTree(model.points).query(model.points, k=2)[0][:, 1]
     k, m = (A.diagonal().reshape(-1, 3).sum(axis=1) for A in (model.K, model.M))
     return float(np.median(near * np.sqrt(k / m)) / NODE_SPEED)
-
-
-def _name(source: str | Path | tuple[str | Path, str]) -> str:
-    return " ".join(map(str, source)) if isinstance(source, tuple) else str(source)

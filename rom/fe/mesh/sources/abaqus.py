@@ -25,7 +25,7 @@ from rom.decks.lines import Unread
 from rom.decks.nodes import NODE_KEYWORDS, SET_OPTIONS, Nodes, Table
 from rom.decks.rigid import ALL, DISPLACED, Average, PointMass, Rigid, Spring
 from rom.errors import FileFormatError
-from rom.fe.mesh.cell_types import READ_TYPES
+from rom.fe.mesh.cell_types import READ_TYPES, CellType
 from rom.fe.mesh.solid import Read
 from rom.fe.mesh.sources.deck import Solid, of_materials, positions, regions_of
 from rom.model import Index
@@ -263,7 +263,7 @@ def _facets(deck: Deck, solid: Solid) -> tuple[dict[str, Index], list[str]]:
         if kind == "NODE":
             sets[name] = np.concatenate([deck.node_sets.meant(row[0]) for row in rows])
         else:
-            facets[name] = np.vstack([_sides(deck, row, solid) for row in rows])
+            facets[name] = np.vstack([_facets_of(deck, row, solid) for row in rows])
     for name, nodes in _skin_nodes(deck).items():
         sets.setdefault(name, nodes)
     by_nodes, remarks = solid.facets(sets)
@@ -411,12 +411,17 @@ def _body(deck: Deck, block: Block) -> tuple[str, list[int]]:
     return known[names[0].upper()], sorted(found)
 
 
-def _sides(deck: Deck, row: list[str], solid: Solid) -> Index:
+def sides(kind: CellType) -> dict[str, int]:
+    """{S1, S2, ...: number of this face here}."""
+    faces = [set(face) for face in kind.faces]
+    return {f"S{k}": faces.index(set(side)) for k, side in enumerate(SIDES[kind.n_corners], 1)}
+
+
+def _facets_of(deck: Deck, row: list[str], solid: Solid) -> Index:
     """(f, kf) facets of one line ``element or set, S1``."""
-    kind, label = solid.kind, row[1].upper() if len(row) > 1 else ""
-    sides = {f"S{k}": set(side) for k, side in enumerate(SIDES[kind.n_corners], 1)}
-    if label not in sides:
-        raise FileFormatError(f"{label!r} is no face of a {kind.shape}; S1 to S{len(sides)} are.")
-    face = next(i for i, f in enumerate(kind.faces) if set(f) == sides[label])
+    faces, label = sides(solid.kind), row[1].upper() if len(row) > 1 else ""
+    if label not in faces:
+        shape, n = solid.kind.shape, len(faces)
+        raise FileFormatError(f"{label!r} is no face of a {shape}; S1 to S{n} are.")
     wanted = positions(solid.ids, deck.cell_sets.meant(row[0]), "element")
-    return solid.cells[wanted][:, kind.face_nodes[face]]
+    return solid.cells[wanted][:, solid.kind.face_nodes[faces[label]]]

@@ -235,12 +235,12 @@ class Picker:
         """The plane face that looks this way."""
         direction = np.array(wish.values) / np.linalg.norm(wish.values)
         planes = [face for face in self.faces if face.kind == "plane"]
-        angle = {f.number: _angle(np.array(f.normal), direction) for f in planes}
-        found = [f for f in planes if angle[f.number] < NORMAL_ANGLE]
+        apart = {f.number: float(np.linalg.norm(np.array(f.normal) - direction)) for f in planes}
+        found = [f for f in planes if apart[f.number] < NORMAL_ANGLE]
         if len(found) == 1:
             return [found[0].number]
         text = f"no plane face has the outward normal {wish.text[7:]}."
-        near = sorted(planes, key=lambda f: angle[f.number])[:MAX_SHOWN]
+        near = sorted(planes, key=lambda f: apart[f.number])[:MAX_SHOWN]
         listed = ", ".join(f"{f.number} ({_words(f.normal or ())})" for f in near)
         hint = f"The nearest are {listed}." if near else "The part has no plane face."
         if found:
@@ -249,11 +249,6 @@ class Picker:
             text = f"{len(found)} plane faces have the outward normal {wish.text[7:]}: {listed}."
             hint = f"Pick one by its number or by a point on it, or several as {joined}."
         raise TagError(text, hint=hint)
-
-
-def _angle(a: Array, b: Array) -> float:
-    """Angle between unit vectors [rad]."""
-    return float(2 * np.arctan2(np.linalg.norm(a - b), np.linalg.norm(a + b)))
 
 
 def _words(x: tuple[float, ...]) -> str:

@@ -112,8 +112,10 @@ def check_script(path: Path) -> None:
 def _check(path: Path, around: tuple[Path, ...], seen: list[Path]) -> None:
     real = path.resolve()
     if real in around:
+        names = [file.name for file in (*around[around.index(real) :], real)]
+        chain = f" ({' includes '.join(names)})" if len(names) > 2 else ""
         raise FileFormatError(
-            f"includes itself{_chain((*around, real))}.",
+            f"includes itself{chain}.",
             where=_where(around[0], around[1:]),
             hint="Take the Include out.",
         )
@@ -142,11 +144,6 @@ def _where(path: Path, around: tuple[Path, ...]) -> str:
     return str(path) if around else ""
 
 
-def _chain(files: tuple[Path, ...]) -> str:
-    names = [file.name for file in files[files.index(files[-1]) :]]
-    return f" ({' includes '.join(names)})" if len(names) > 2 else ""
-
-
 def _check_read(path: Path, command: str, around: tuple[Path, ...], seen: list[Path]) -> None:
     """A file that a script reads, by the way gmsh would read it; gmsh says when there is none."""
     if not path.is_file():
@@ -154,7 +151,8 @@ def _check_read(path: Path, command: str, around: tuple[Path, ...], seen: list[P
     if command == INCLUDE_COMMAND:
         _check(path, around, seen)
         return
-    finished = path.suffix in MESHES and _start(path).startswith(MESH_STARTS)
+    with path.open("rb") as stream:
+        finished = path.suffix in MESHES and stream.read(16).startswith(MESH_STARTS)
     if not finished and path.suffix in SCRIPTS:
         _check(path, around, seen)
     elif finished or path.suffix in SHAPES:
@@ -165,11 +163,6 @@ def _check_read(path: Path, command: str, around: tuple[Path, ...], seen: list[P
             where=_where(around[-1], around[:-1]),
             hint=f"Mergeable are .geo, .msh, .pos, {', '.join(SHAPES)}.",
         )
-
-
-def _start(path: Path) -> bytes:
-    with path.open("rb") as stream:
-        return stream.read(16)
 
 
 def _tokens(path: Path) -> Iterator[Token]:
