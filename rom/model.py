@@ -395,8 +395,9 @@ FAILURE_COSTS = {
     "reduced never below full": "No reduction can do that: stiffness and mass are of different "
     "models, or a mode of the full model was missed.",
     "error over its estimate": "The estimates of this body are too small; go by the errors.",
-    "by modes left out": "The motion excites shapes that the bodies do not have; the mode with the "
-    "largest share is named. Keep modes up to it, or the static shapes of inertia: rom.WithLoads.",
+    "by shapes left out": "The motion needs shapes that the bodies do not have; what has the "
+    "largest share is named. Keep modes up to it, or the static shapes of inertia by "
+    "rom.WithLoads; let interfaces deform by Polynomial in place of rbe2.",
     "by time steps": "The run is off by as much because of its steps. Take shorter ones.",
     "static flexibility": "Slow loads on the interfaces bend the body wrongly by as much. Use a "
     "method with constraint modes, such as CraigBampton.",

@@ -187,7 +187,9 @@ class JointSpring(UnknownPart):
     high: Factor
 
     def _acts(self, parts: Parts) -> tuple[Array, Array]:
-        sides = [x if x and isinstance(x[0], tuple) else (x,) for x in (self.one, self.other)]
+        sides: list[Any] = [
+            x if x and isinstance(x[0], tuple) else (x,) for x in (self.one, self.other)
+        ]
         one_each("places of the other side", len(sides[1]), "places of one", len(sides[0]))
         motions = []
         for one, other in zip(*sides, strict=True):

@@ -113,7 +113,7 @@ def certify_motion(
     moved = corrected(rich, R, pieces)
     asked = dict(usual_goals(seen, moved, tuple(richer))) if goals is None else goals
     curves = {name: _curve(name, goal, seen, moved) for name, goal in asked.items()}
-    rows = [_row(f"{name}, error by modes left out", x, tol) for name, x in curves.items()]
+    rows = [_row(f"{name}, error by shapes left out", x, tol) for name, x in curves.items()]
     if coarser is not None:
         other = coarser.at(seen.t)
         steps = {name: _curve(name, goal, other, seen) for name, goal in asked.items()}
@@ -150,6 +150,10 @@ def _nested(solution: Solution, richer: Mapping[str, AnyBody]) -> Iterator[tuple
             text = f"body {name!r} is rigid or of large deflection"
             raise ConfigError(f"{text}; only flexible ones of small deflection have richer ones.")
         part.refuse_spin("richer", "gyroscopic forces of its shapes stand in an element")
+        for other, (_, element) in solution.mechanism.elements.items():
+            if getattr(element, "body", None) == name:
+                text = f"{other!r} acts on the shapes of body {name!r} one by one"
+                raise ConfigError(f"{text}, which a richer one has more of; leave it out.")
         less, more = part.moving.surface, body.in_units("SI").on_mean_axes().surface
         if less is None or more is None or less.points.shape != more.points.shape:
             raise ModelError(f"body {name!r} and the richer one need the surface of one mesh.")
@@ -202,17 +206,25 @@ def _elastic_rows(solution: Solution, name: str) -> slice:
 
 
 def _loudest(rich: Solution, moved: Solution, name: str, E: Array) -> Row:
-    """Of the modes with interfaces held that the body had not, which has most strain energy."""
-    body = rich.mechanism.part(name).moving
-    omega, V = body.modes(fixed=rich.mechanism.part(name).names if body.has_static_shapes else ())
+    """Of what the body had not, modes with interfaces held or interfaces that deform, the most.
+
+    By the share of the strain energy of all that it had not.
+    """
+    part = rich.mechanism.part(name)
+    K, q = part.moving.K, moved.elastic(name)
+    omega, V = part.moving.modes(fixed=part.names if part.moving.has_static_shapes else ())
     omega, V = omega[omega > 0], V[6:, omega > 0]
-    had = E @ np.linalg.solve(E.T @ body.K @ E, E.T @ body.K @ V)
-    new = np.einsum("ik,ij,jk->k", V - had, body.K, V - had) > 0.5 * omega**2
-    energy = np.square(moved.elastic(name) @ body.K @ V / omega).sum(axis=0) * new
-    k, total = int(energy.argmax()), float(energy.sum())
-    f = omega[k] / (2 * np.pi)
-    text = f"{name}: share of the mode at {f:.4g} Hz in the energy of those left out"
-    return Row(text, float(energy[k] / total) if total else 0.0, "information", True)
+    had = E @ np.linalg.solve(E.T @ K @ E, E.T @ K)
+    new = np.einsum("ik,ij,jk->k", had @ V, K, had @ V) < 0.5 * omega**2
+    left = q - q @ had.T
+    total = float(np.einsum("ti,ij,tj->", left, K, left)) or 1.0
+    shares = np.square(q @ K @ V / omega).sum(axis=0) * new / total
+    k, others = int(shares.argmax()), max(0.0, 1.0 - float(shares.sum()))
+    what, share = f"the mode at {omega[k] / (2 * np.pi):.4g} Hz", float(shares[k])
+    if others > share:
+        what, share = "interfaces that deform", others
+    text = f"{name}: share of {what} in the energy of shapes left out"
+    return Row(text, share, "information", True)
 
 
 def usual_goals(
