@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 from rom.arguments import typed
 from rom.assembly.assembly import Assembly
@@ -21,6 +22,7 @@ class FamilyAssembly:
         families: {name: family}, all in one system of coordinates and in SI units.
         couplings: ((body, interface), (body, interface)) pairs that move together, see
             `rom.Assembly`. What is joined by springs alone is not coupled.
+        projection: functions that couple interfaces whose nodes differ, see `rom.Assembly`.
 
     Raises:
         ConfigError: without families, for one in other units or without a name, or where two
@@ -30,6 +32,7 @@ class FamilyAssembly:
 
     families: dict[str, BodyFamily]
     couplings: tuple[tuple[Place, Place], ...] = ()
+    projection: Any = None
 
     def __post_init__(self) -> None:
         other = [name for name, family in self.families.items() if family.body.units != "SI"]
@@ -47,7 +50,7 @@ class FamilyAssembly:
     def nominal(self) -> Assembly:
         """The bodies of the families in the coordinates of their shares, coupled."""
         bodies = {name: family.body for name, family in self.families.items()}
-        return Assembly(bodies, self.couplings)
+        return Assembly(bodies, self.couplings, self.projection)
 
     @property
     def parameters(self) -> dict[str, Parameter]:
@@ -69,4 +72,4 @@ class FamilyAssembly:
         for name, family in self.families.items():
             own = {key: point[f"{name}.{key}"] for key in family.parameters}
             bodies[name] = family.at(extrapolate=False, **own)
-        return Assembly(bodies, self.couplings)
+        return Assembly(bodies, self.couplings, self.projection)
