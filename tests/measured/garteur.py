@@ -4,8 +4,6 @@ import warnings
 from dataclasses import replace
 from functools import cache, partial
 
-from mpi4py import MPI
-
 import numpy as np
 from measured.record import Structure
 from scipy.linalg import eigh
@@ -36,7 +34,10 @@ TAPE, POWER = 0.55e6, 0.5  # shear modulus of the tape at 10 Hz [Pa]; it grows w
 TIPS = (("left", "tip"), ("right", "tip"))
 BUNGEES = {("wing", "root"): 2 / 3, ("fuselage", "rear"): 1 / 3}  # of the stiffness
 TAPES = rom.YoungsModulus("tape", 0.1, 10.0)
-MODES, SUSPENDED = 60, 4.0  # of the assembly for each stiffness of the tape; below so many Hz it hangs as if rigid
+MODES, SUSPENDED = (
+    60,
+    4.0,
+)  # of the assembly for each stiffness of the tape; below so many Hz it hangs as if rigid
 
 SHAPES = (  # in the order of the copy with elastic contacts
     "two-node bending", "fuselage rotation", "three-node bending", "antisymmetric torsion",
@@ -63,6 +64,8 @@ def part(name, mesh, strip, contact, E, rho, t, b):  # noqa: PLR0913  what chang
 
 def reduced(name, free, mesh, *, strip, contact, E, rho, t, b):  # noqa: PLR0913
     """A body, or a family by what is free; a stiffness of contacts of zero: glued."""
+    from mpi4py import MPI
+
     number, region = PARTS[name]
     solid, layer = rom.Material(E, 0.33, rho), rom.Material(2.98 * TAPE, 0.49, 1000.0)
     glued = rom.Material(contact * GAP, 0.0, rho) if contact else solid
@@ -79,12 +82,18 @@ def reduced(name, free, mesh, *, strip, contact, E, rho, t, b):  # noqa: PLR0913
         kinds = {face: rom.Polynomial(ORDERS[face]) if face in ORDERS else "rbe3"
                  for face in model.interfaces}  # fmt: skip
         how = {"method": rom.CraigBampton(16), "interfaces": kinds, "certify": False, "name": name}
-        return rom.reduce_parametric(model, parameters=free, **how) if free else rom.reduce(model, **how)
+        return (
+            rom.reduce_parametric(model, parameters=free, **how)
+            if free
+            else rom.reduce(model, **how)
+        )
 
 
 def bed(mesh, *, strip, contact, E, rho, t, b):
     """The assembly of the parts, and (r, r) the stiffness of the tape by the wing's coordinates."""
-    found = {name: part(name, mesh, strip and name == "wing", contact, E, rho, t, b) for name in PARTS}
+    found = {
+        name: part(name, mesh, strip and name == "wing", contact, E, rho, t, b) for name in PARTS
+    }
     tape = 0.0
     if strip:
         family = found["wing"]
@@ -126,7 +135,6 @@ def spectrum(assembly, tape, *, heave, masses=(), factor=1.0, n=18):
         loss[k] = g * found[:, k] @ T @ found[:, k] / lam[0]
     moved = V @ found
     return f, loss, {name: moved[at] for name, at in whole.columns.items()}
-
 
 
 def seen(assembly, shapes):
@@ -178,8 +186,7 @@ COPY = Structure("garteur_copy", partial(frequencies, strip=False), SPREADS, (50
 ORIGINAL = Structure(
     "garteur",
     partial(frequencies, strip=True),
-    SPREADS
-    | {"tips": (0.175, 0.025), "tape": (0.0, 0.3), "loss": (1.0, 0.3), "other": (0.3, 0.3)},
+    SPREADS | {"tips": (0.175, 0.025), "tape": (0.0, 0.3), "loss": (1.0, 0.3), "other": (0.3, 0.3)},
     (50, 25),
     f"""{NOTE} Tip masses hang as points on the front ends of the drums. The strip is flush with the
 rear edge of the wing. The tape has a shear modulus of 0.55 MPa at 10 Hz, growing with the root of the
