@@ -36,7 +36,11 @@ NAMES = (
 )  # fmt: skip
 NONE = 1e-9  # factor of a mass that is not there
 TIP, BRASS, BRASSES = 0.150, 0.92, ("middle", "end_left", "end_right")  # kg; on the tailplane
-STIFF = ("fuselage.E", "wing.E", "tailplane.E")
+# what keeps its stiffness where aluminium gets stiffer: over it, these are softer
+SOFTER = (
+    "wing.contact", "wing.tape", "left.contact", "right.contact", "fin.contact", "below root",
+    "below rear",
+)  # fmt: skip
 
 
 @cache
@@ -64,7 +68,9 @@ def bed():
     model = family_model(whole, (rows, rows[:1]), hung, {}, ())
     columns = []
     for factor in (0.1, 1.0, 10.0):
-        here = model.at(logarithms(dict.fromkeys(("root", "drums", "tail", "tape"), np.log(factor))))
+        here = model.at(
+            logarithms(dict.fromkeys(("root", "drums", "tail", "tape"), np.log(factor)))
+        )
         columns.append(eigh(here.K, here.M, subset_by_index=(0, 59))[1])
     T = np.linalg.qr(np.hstack(columns))[0]
     return model.reduced(T, np.ones(len(NAMES), bool), np.zeros(len(NAMES)), model.sensors @ T)
@@ -75,9 +81,8 @@ def logarithms(sought, *, heavy=TIP, brass=0.0, bar=0.1):
     x = dict.fromkeys(NAMES, 0.0)
     for name, value in sought.items():
         x |= dict.fromkeys(SOUGHT[name][0], value)
-    for name in NAMES:  # what is no aluminium is softer where that is stiffer
-        if not name.startswith(("tip", "brass")) and name not in STIFF:
-            x[name] -= sought.get("E", 0.0)
+    for name in SOFTER:
+        x[name] -= sought.get("E", 0.0)
     x["tip left"] = np.log(heavy / TIP)
     for face in BRASSES:
         share = 1 - bar if face == "middle" else bar / 2
@@ -86,10 +91,14 @@ def logarithms(sought, *, heavy=TIP, brass=0.0, bar=0.1):
 
 
 def modes(sought, **modified):
-    """Frequencies (14,) [Hz], loss by that of the tape [1], shapes (channels, 14), by name."""
+    """Frequencies (14,) [Hz], loss by that of the tape, shapes (channels, 14), by name.
+
+    And (14, 6) the derivatives of logarithms of frequencies by what is sought.
+    """
     model, known = bed().at(logarithms(sought, **modified)), garteur.reference(True)
-    T, scale = model.dK[NAMES.index("wing.tape")], np.exp(sought.get("E", 0.0) / 2)
+    T, E = model.dK[NAMES.index("wing.tape")], sought.get("E", 0.0)
     f, loss, shapes = np.full(len(SHAPES), 40.0), np.zeros(len(SHAPES)), known.copy()
+    J = np.zeros((len(SHAPES), len(SOUGHT)))
     for _ in range(3):  # the tape as stiff as it is at the frequency of each
         for k in range(len(SHAPES)):
             g = (f[k] / 10.0) ** POWER
@@ -97,9 +106,14 @@ def modes(sought, **modified):
             U = model.sensors @ V
             like = (known[:, k] @ U) ** 2 / (U**2).sum(axis=0)
             one = int(like[6:].argmax()) + 6
-            f[k], shapes[:, k] = scale * np.sqrt(lam[one]) / 2 / np.pi, U[:, one]
-            loss[k] = g * V[:, one] @ T @ V[:, one] / lam[one]
-    return f, loss, shapes
+            v, f[k] = V[:, one], np.exp(E / 2) * np.sqrt(lam[one]) / 2 / np.pi
+            shapes[:, k] = U[:, one] / np.linalg.norm(U[:, one])
+            part = np.einsum("i,nij,j->n", v, model.dK, v) / lam[one]
+            part[NAMES.index("wing.tape")] *= g
+            loss[k] = part[NAMES.index("wing.tape")]
+            J[k] = [sum(part[NAMES.index(name)] for name in names) for names, _ in SOUGHT.values()]
+            J[k, 0] = 1 - sum(part[n] for n, name in enumerate(NAMES) if name in SOFTER)
+    return f, loss, shapes, J / (2 - POWER * loss[:, None])
 
 
 @dataclass(frozen=True)
@@ -120,28 +134,23 @@ class Found:
     after: dict[str, float]
 
 
-def updated(measured, spread, *, steps=5):
-    """By {shape: frequency [Hz]} and the standard deviation of their logarithms: one, or by shape."""
+def updated(measured, spread, *, steps=6):
+    """By {shape: frequency [Hz]} and the standard deviation of their logarithms: one, or each."""
     rows = [SHAPES.index(shape) for shape in measured]
-    target, wide = np.log([*measured.values()]), np.broadcast_to(spread, len(rows))
-    prior = np.array([sigma for _, sigma in SOUGHT.values()])
-    x = np.zeros(prior.size)
-    for step in range(steps + 1):
-        y, J = sensitivity(x, rows)
-        r = (target - y) / wide
-        if step == 0:
-            first = y, r @ r
-        N = (J / wide[:, None]).T @ (J / wide[:, None]) + np.diag(prior**-2.0)
-        if step < steps:
-            x = x + np.clip(np.linalg.solve(N, (J / wide[:, None]).T @ r - x / prior**2), -1, 1)
-    told = (dict(zip(measured, np.exp(one), strict=True)) for one in (first[0], y))
-    misfit = first[1] / len(rows), r @ r / len(rows)
-    return Found(dict(zip(SOUGHT, x, strict=True)), np.linalg.inv(N), misfit, *told)
+    wide = np.broadcast_to(spread, len(rows))
+    prior, x, told = np.array([sigma for _, sigma in SOUGHT.values()]), np.zeros(len(SOUGHT)), []
+    for _ in range(steps):
+        f, _, _, J = modes(named(x))
+        told.append(f[rows])
+        r, J = np.log([*measured.values()] / f[rows]) / wide, J[rows] / wide[:, None]
+        N = J.T @ J + np.diag(prior**-2.0)
+        last, misfit = x, r @ r / len(rows)
+        first = first if len(told) > 1 else misfit
+        x = x + np.clip(np.linalg.solve(N, J.T @ r - x / prior**2), -1.0, 1.0)
+    before, after = (dict(zip(measured, f, strict=True)) for f in (told[0], told[-1]))
+    return Found(named(last), np.linalg.inv(N), (first, misfit), before, after)
 
 
-def sensitivity(x, rows=slice(None), **modified):
-    """Logarithms of frequencies, and their derivatives by the unknowns."""
-    value = lambda x: np.log(modes(dict(zip(SOUGHT, x, strict=True)), **modified)[0])[rows]
-    steps = 0.05 * np.eye(len(SOUGHT))
-    J = [(value(x + step) - value(x - step)) / 0.1 for step in steps]
-    return value(x), np.array(J).T
+def named(x):
+    """{name: logarithm} of what is sought."""
+    return dict(zip(SOUGHT, x, strict=True))
