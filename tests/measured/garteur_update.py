@@ -5,11 +5,12 @@ derivatives are those of `rom.update`, and what is made small are logarithms of 
 their spread among laboratories, with what was known before as a prior.
 """
 
+import tomllib
 from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from measured import garteur
+from measured import garteur, record
 from measured.garteur import BUNGEES, COUPLINGS, FACES, PARTS, POWER, SHAPES, TIPS
 from scipy.linalg import eigh
 
@@ -28,14 +29,24 @@ SOUGHT = {
     "drums": (("left.contact", "right.contact"), 0.6),
     "tail": (("fin.contact",), 0.6),
     "tape": (("wing.tape",), 0.35),
+    "angles": (("fin.angles",), 1.0),
+    "tips": (("tip left", "tip right"), 0.15),
+    "mass": (("on tailplane",), 1.0),  # of what hangs there, about 0.1 kg
 }
 NAMES = (
     "fuselage.E", "wing.contact", "wing.E", "wing.tape", "left.contact", "right.contact",
-    "fin.contact", "tailplane.E", "below root", "below rear", "tip left", "tip right",
+    "fin.contact", "fin.angles", "tailplane.E", "below root", "below rear", "on tailplane", "tip left", "tip right",
     "brass middle", "brass end_left", "brass end_right",
 )  # fmt: skip
+TESTED = 10  # modes that all laboratories have
+MIDDLE = ("tailplane", "middle")
 NONE = 1e-9  # factor of a mass that is not there
-TIP, BRASS, BRASSES = 0.150, 0.92, ("middle", "end_left", "end_right")  # kg; on the tailplane
+TIP, EXTRA, BRASS, BRASSES = (
+    0.150,
+    0.1,
+    0.92,
+    ("middle", "end_left", "end_right"),
+)  # kg; on the tailplane
 # what keeps its stiffness where aluminium gets stiffer: over it, these are softer
 SOFTER = (
     "wing.contact", "wing.tape", "left.contact", "right.contact", "fin.contact", "below root",
@@ -44,22 +55,31 @@ SOFTER = (
 
 
 @cache
-def bed():
-    """The family with its tip masses, brass and bungees, in few coordinates."""
-    families = {}
+def families():
+    """{name: family of a part}, what is unknown of it free."""
+    found = {}
     for name in PARTS:
         free = {"contact": rom.YoungsModulus("contact", 0.1, 10.0)}
         if name == "wing":
             free |= {"E": rom.YoungsModulus("wing", 1.0, 1.0), "tape": garteur.TAPES}
+        elif name == "fin":
+            free["angles"] = rom.YoungsModulus("angles", 0.1, 10.0)
         elif name in ("fuselage", "tailplane"):
             free = {"E": rom.YoungsModulus(None, 1.0, 1.0)}  # a family needs one
-        families[name] = garteur.reduced(
+        found[name] = garteur.reduced(
             name, free, MESH, **GIVEN | {"strip": name == "wing", "contact": CONTACT}
         )
-    whole = rom.parametric.FamilyAssembly(families, COUPLINGS, FACES)
-    stiff = (2 * np.pi * 2.3) ** 2 * (sum(one.body.mass for one in families.values()) + 0.3)
+    return found
+
+
+@cache
+def bed():
+    """The family with its tip masses, brass and bungees, in few coordinates."""
+    whole = rom.parametric.FamilyAssembly(families(), COUPLINGS, FACES)
+    stiff = (2 * np.pi * 2.3) ** 2 * (sum(one.body.mass for one in families().values()) + 0.3)
     hung = {f"below {face}": GroundSpring((body, face), (0, 0, share * stiff), NONE, 10.0)
             for (body, face), share in BUNGEES.items()}  # fmt: skip
+    hung["on tailplane"] = AddedMass(MIDDLE, EXTRA, NONE, 100.0)
     hung |= {f"tip {body}": AddedMass((body, face), TIP, NONE, 10.0) for body, face in TIPS}
     hung |= {f"brass {face}": AddedMass(("tailplane", face), BRASS, NONE, 1.0) for face in BRASSES}
     rows = Channels(*map(np.array, zip(*garteur.PLACES, strict=True))).rows(
@@ -76,14 +96,15 @@ def bed():
     return model.reduced(T, np.ones(len(NAMES), bool), np.zeros(len(NAMES)), model.sensors @ T)
 
 
-def logarithms(sought, *, heavy=TIP, brass=0.0, bar=0.1):
+def logarithms(sought, *, heavy=None, brass=0.0, bar=0.1):
     """(n_p,) logarithms of factors; one tip mass and the brass [kg], a share of that at the ends."""
-    x = dict.fromkeys(NAMES, 0.0)
+    x = dict.fromkeys(NAMES, 0.0) | ({} if "mass" in sought else {"on tailplane": np.log(NONE)})
     for name, value in sought.items():
         x |= dict.fromkeys(SOUGHT[name][0], value)
     for name in SOFTER:
         x[name] -= sought.get("E", 0.0)
-    x["tip left"] = np.log(heavy / TIP)
+    if heavy is not None:
+        x["tip left"] = np.log(heavy / TIP)
     for face in BRASSES:
         share = 1 - bar if face == "middle" else bar / 2
         x[f"brass {face}"] = np.log(max(share * brass / BRASS, NONE))
@@ -93,7 +114,7 @@ def logarithms(sought, *, heavy=TIP, brass=0.0, bar=0.1):
 def modes(sought, **modified):
     """Frequencies (14,) [Hz], loss by that of the tape, shapes (channels, 14), by name.
 
-    And (14, 6) the derivatives of logarithms of frequencies by what is sought.
+    And (14, 8) the derivatives of logarithms of frequencies by what is sought.
     """
     model, known = bed().at(logarithms(sought, **modified)), garteur.reference(True)
     T, E = model.dK[NAMES.index("wing.tape")], sought.get("E", 0.0)
@@ -108,7 +129,7 @@ def modes(sought, **modified):
             one = int(like[6:].argmax()) + 6
             v, f[k] = V[:, one], np.exp(E / 2) * np.sqrt(lam[one]) / 2 / np.pi
             shapes[:, k] = U[:, one] / np.linalg.norm(U[:, one])
-            part = np.einsum("i,nij,j->n", v, model.dK, v) / lam[one]
+            part = np.einsum("i,nij,j->n", v, model.dK / lam[one] - model.dM, v)
             part[NAMES.index("wing.tape")] *= g
             loss[k] = part[NAMES.index("wing.tape")]
             J[k] = [sum(part[NAMES.index(name)] for name in names) for names, _ in SOUGHT.values()]
@@ -122,7 +143,7 @@ class Found:
 
     Attributes:
         sought: {name: logarithm}.
-        covariance: (6, 6) of these.
+        covariance: (n, n) of these.
         misfit: chi-square of the frequencies over their number [1], before and after.
         before, after: {shape: frequency [Hz]}.
     """
@@ -134,23 +155,73 @@ class Found:
     after: dict[str, float]
 
 
-def updated(measured, spread, *, steps=6):
+def updated(measured, spread, *, free=tuple(SOUGHT), steps=8):
     """By {shape: frequency [Hz]} and the standard deviation of their logarithms: one, or each."""
     rows = [SHAPES.index(shape) for shape in measured]
     wide = np.broadcast_to(spread, len(rows))
-    prior, x, told = np.array([sigma for _, sigma in SOUGHT.values()]), np.zeros(len(SOUGHT)), []
+    prior, x, told = np.array([SOUGHT[name][1] for name in free]), np.zeros(len(free)), []
+    columns = [[*SOUGHT].index(name) for name in free]
     for _ in range(steps):
-        f, _, _, J = modes(named(x))
+        f, _, _, J = modes(dict(zip(free, x, strict=True)))
         told.append(f[rows])
-        r, J = np.log([*measured.values()] / f[rows]) / wide, J[rows] / wide[:, None]
+        r, J = (
+            np.log([*measured.values()] / f[rows]) / wide,
+            J[np.ix_(rows, columns)] / wide[:, None],
+        )
         N = J.T @ J + np.diag(prior**-2.0)
         last, misfit = x, r @ r / len(rows)
         first = first if len(told) > 1 else misfit
         x = x + np.clip(np.linalg.solve(N, J.T @ r - x / prior**2), -1.0, 1.0)
     before, after = (dict(zip(measured, f, strict=True)) for f in (told[0], told[-1]))
-    return Found(named(last), np.linalg.inv(N), (first, misfit), before, after)
+    return Found(
+        dict(zip(free, last, strict=True)), np.linalg.inv(N), (first, misfit), before, after
+    )
 
 
-def named(x):
-    """{name: logarithm} of what is sought."""
-    return dict(zip(SOUGHT, x, strict=True))
+# a normal law has a range of 2.06 standard deviations among four, and of 1.13 among two
+RANGES = {4: 2.06, 2: 1.13}
+AFTER = ("E", "wing", "root", "drums", "tail", "tape", "tips", "mass")
+WITHOUT = AFTER[:-1]
+
+
+def measured():
+    """{shape: mean of the laboratories [Hz]}, and standard deviations of logarithms."""
+    kept = tomllib.loads((record.FOUND / "garteur.toml").read_text())
+    f = {shape: kept["numbers"][f"elastic, {shape} [Hz]"] for shape in SHAPES}
+    ranges = [RANGES[4 if k < TESTED else 2] for k in range(len(SHAPES))]
+    return f, np.array([kept["spread"][shape] / r for shape, r in zip(SHAPES, ranges, strict=True)])
+
+
+@cache
+def original(free=AFTER):
+    """What the frequencies of the original say."""
+    return updated(*measured(), free=free)
+
+
+def modified(mesh, *, bar, laboratory, **directions):
+    """Frequencies of the first ten shapes with brass, and with a heavy tip [Hz]; changes [%]."""
+    found, values = original(), {}
+    root = np.linalg.cholesky(found.covariance)
+    x = np.array([*found.sought.values()]) + root @ [*directions.values()]
+    sought = dict(zip(found.sought, x, strict=True))
+    bare, (f, _) = modes(sought)[0], measured()
+    for name, change in (("brass", {"brass": BRASS, "bar": bar}), ("heavy tip", {"heavy": 0.724})):
+        ratio = modes(sought, **change)[0] / bare
+        for shape, one in [*zip(SHAPES, ratio, strict=True)][:TESTED]:
+            values[f"{name}, {shape} [Hz]"] = float(f[shape] * one * np.exp(laboratory))
+            values[f"{name}, {shape}, change [%]"] = float(100 * (one - 1))
+    return values
+
+
+MODIFIED = record.Structure(
+    "garteur_modified",
+    modified,
+    {"bar": (0.1, 0.1), "laboratory": (0.0, 0.014)}
+    | {f"direction_{k}": (0.0, 2.0) for k in range(1, len(AFTER) + 1)},
+    (MESH, MESH),
+    """After an update by the mean of four laboratories: 0.92 kg of brass on the middle of the
+tailplane, the share 'bar' of it at its ends, and 0.724 kg in place of the tip mass on the front end
+of one drum. Ratios of the updated model times the mean measured before; directions are those of the
+covariance of the update, 'laboratory' is the spread of the mean (logarithm). Shapes are those most
+like the ones without; a heavy tip parts the two torsions into one of each wing.""",
+)
