@@ -152,6 +152,6 @@ SUBJECTS = {
     "Gears and bearings": "planetary transmission two_stage oil_inlet",
     "Wind turbines": "wind_turbine whole_turbine wind_power",
     "Models and measurements": """updating bolted_frame virtual_sensing measured_rods
-    measured_frames barc""",
+    measured_frames barc garteur""",
     "Stones and rocks": "masonry measured_arches rockfall",
 }

@@ -1,4 +1,4 @@
-"""The test bed like an aircraft, GARTEUR SM-AG19: solids in parts, reduced and joined by contacts."""
+"""The test bed like an aircraft, GARTEUR SM-AG19: solids in parts, joined by contacts."""
 
 import warnings
 from dataclasses import replace
@@ -146,7 +146,7 @@ def seen(assembly, shapes):
 
 @cache
 def reference(strip):
-    """(channels, 14) shapes by name, of elastic contacts, kept in a file: the copy's or the bed's."""
+    """(channels, 14) shapes by name, with elastic contacts, of the copy or of the bed; a file."""
     kept = np.loadtxt(PREDICTED / "garteur_shapes.csv", delimiter=",").T
     return kept[:, len(SHAPES) :] if strip else kept[:, : len(SHAPES)]
 
@@ -165,7 +165,7 @@ def paired(known, U):
 
 
 def frequencies(mesh, *, strip, E, t, b, contact, heave, tips=0.0, tape=0.0, loss=0.0, other=0.0):  # noqa: PLR0913
-    """Of the parts glued together and joined by elastic contacts [Hz]; damping of the latter [%]."""
+    """Of parts glued and joined by elastic contacts [Hz]; damping of the latter [%]."""
     found, masses = {}, dict.fromkeys(TIPS, tips) if tips else {}
     for joint, stiff in (("glued", 0.0), ("elastic", 10**contact)):
         whole = bed(mesh, strip=strip, contact=stiff, E=E, rho=DENSITY, t=t, b=b)
@@ -183,11 +183,11 @@ SPREADS = {
     "E": (71e9, 2.4e9), "t": (0.010, 1e-4), "b": (0.035, 0.01), "contact": (11.5, 0.5),
     "heave": (2.3, 0.7),
 }  # fmt: skip
-NOTE = """Aluminium of 2740 kg/m3; the spread of E is that of density, too. A steel plate 130 x 70 x 16
-mm lies between fuselage and wing, its half-width b uncertain; steel angles hold the fin, its rear edge
-flush with the tail. Faces are glued, or joined by contacts of 10^contact N/m3 (half of it along the
-faces), a guess of bolted faces, within a factor of 3. Bungees act at the wing root (two thirds) and
-290 mm behind it, with that frequency of heave. No accelerometers, cables and brackets."""
+NOTE = """Aluminium of 2740 kg/m3; the spread of E is that of density, too. A steel plate 130 x 70
+x 16 mm lies between fuselage and wing, its half-width b uncertain; steel angles hold the fin, its
+rear edge flush with the tail. Faces are glued, or joined by contacts of 10^contact N/m3 (half of it
+along the faces), a guess of bolted faces, within a factor of 3. Bungees act at the wing root (two
+thirds) and 290 mm behind it, with that frequency of heave. No accelerometers, cables, brackets."""
 COPY = Structure("garteur_copy", partial(frequencies, strip=False), SPREADS, (50, 25), NOTE)
 ORIGINAL = Structure(
     "garteur",
@@ -195,6 +195,6 @@ ORIGINAL = Structure(
     SPREADS | {"tips": (0.175, 0.025), "tape": (0.0, 0.3), "loss": (1.0, 0.3), "other": (0.3, 0.3)},
     (50, 25),
     f"""{NOTE} Tip masses hang as points on the front ends of the drums. The strip is flush with the
-rear edge of the wing. The tape has a shear modulus of 0.55 MPa at 10 Hz, growing with the root of the
-frequency, within a factor of 2 (10^tape), and that loss factor; what else damps is 'other' [%].""",
+rear edge of the wing. The tape has a shear modulus of 0.55 MPa at 10 Hz, growing with the root of
+the frequency, within a factor of 2 (10^tape), and that loss factor; what else damps is 'other'.""",
 )

@@ -35,8 +35,8 @@ SOUGHT = {
 }
 NAMES = (
     "fuselage.E", "wing.contact", "wing.E", "wing.tape", "left.contact", "right.contact",
-    "fin.contact", "fin.angles", "tailplane.E", "below root", "below rear", "on tailplane", "tip left", "tip right",
-    "brass middle", "brass end_left", "brass end_right",
+    "fin.contact", "fin.angles", "tailplane.E", "below root", "below rear", "on tailplane",
+    "tip left", "tip right", "brass middle", "brass end_left", "brass end_right",
 )  # fmt: skip
 TESTED = 10  # modes that all laboratories have
 MIDDLE = ("tailplane", "middle")
@@ -97,8 +97,10 @@ def bed():
 
 
 def logarithms(sought, *, heavy=None, brass=0.0, bar=0.1):
-    """(n_p,) logarithms of factors; one tip mass and the brass [kg], a share of that at the ends."""
-    x = dict.fromkeys(NAMES, 0.0) | ({} if "mass" in sought else {"on tailplane": np.log(NONE)})
+    """(n_p,) of factors; one tip mass and the brass [kg], and the share of that at the ends."""
+    x = dict.fromkeys(NAMES, 0.0)
+    if "mass" not in sought:
+        x["on tailplane"] = np.log(NONE)
     for name, value in sought.items():
         x |= dict.fromkeys(SOUGHT[name][0], value)
     for name in SOFTER:
@@ -159,23 +161,19 @@ def updated(measured, spread, *, free=tuple(SOUGHT), steps=8):
     """By {shape: frequency [Hz]} and the standard deviation of their logarithms: one, or each."""
     rows = [SHAPES.index(shape) for shape in measured]
     wide = np.broadcast_to(spread, len(rows))
-    prior, x, told = np.array([SOUGHT[name][1] for name in free]), np.zeros(len(free)), []
-    columns = [[*SOUGHT].index(name) for name in free]
-    for _ in range(steps):
+    columns, prior = [[*SOUGHT].index(name) for name in free], [SOUGHT[name][1] for name in free]
+    target, known = np.log([*measured.values()]), np.diag(np.array(prior) ** -2.0)
+    x, told = np.zeros(len(free)), []
+    for step in range(steps + 1):
         f, _, _, J = modes(dict(zip(free, x, strict=True)))
-        told.append(f[rows])
-        r, J = (
-            np.log([*measured.values()] / f[rows]) / wide,
-            J[np.ix_(rows, columns)] / wide[:, None],
-        )
-        N = J.T @ J + np.diag(prior**-2.0)
-        last, misfit = x, r @ r / len(rows)
-        first = first if len(told) > 1 else misfit
-        x = x + np.clip(np.linalg.solve(N, J.T @ r - x / prior**2), -1.0, 1.0)
-    before, after = (dict(zip(measured, f, strict=True)) for f in (told[0], told[-1]))
-    return Found(
-        dict(zip(free, last, strict=True)), np.linalg.inv(N), (first, misfit), before, after
-    )
+        r, J = (target - np.log(f[rows])) / wide, J[np.ix_(rows, columns)] / wide[:, None]
+        told.append((float(r @ r / len(rows)), dict(zip(measured, f[rows], strict=True))))
+        N = J.T @ J + known
+        if step < steps:
+            x = x + np.clip(np.linalg.solve(N, J.T @ r - known @ x), -1.0, 1.0)
+    (first, before), (last, after) = told[0], told[-1]
+    sought = dict(zip(free, x.tolist(), strict=True))
+    return Found(sought, np.linalg.inv(N), (first, last), before, after)
 
 
 # a normal law has a range of 2.06 standard deviations among four, and of 1.13 among two

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from measured import barc, bumper, jim_beam, lanl, record, rods
+from measured import barc, bumper, garteur, garteur_update, jim_beam, lanl, record, rods
 from numpy.testing import assert_allclose
 from scipy.linalg import eigh
 
@@ -15,7 +15,8 @@ from rom.updating import Channels
 
 ALL = [pytest.param(one, id=one.name) for one in rods.RODS]
 SOLIDS = (barc.BARC, barc.BARC_JOINT, jim_beam.JIM_BEAM, jim_beam.JIM_CORNERS, lanl.LANL,
-          lanl.LANL_FITTED, lanl.LANL_RAILS, bumper.BUMPER)  # fmt: skip
+          lanl.LANL_FITTED, lanl.LANL_RAILS, bumper.BUMPER, garteur.COPY, garteur.ORIGINAL,
+          garteur_update.MODIFIED)  # fmt: skip
 ALL += [pytest.param(one, id=one.name, marks=[pytest.mark.long, pytest.mark.fenicsx])
         for one in SOLIDS]  # fmt: skip
 
@@ -134,6 +135,11 @@ def test_a_wing_bends_and_twists_by_its_rigidities_under_a_small_mass():
         (lanl.LANL_FITTED, "mode [23]", 1.81, 2.56, 10, 10),
         (lanl.LANL_RAILS, "mode 1", 2.69, -4.9, 4, 5),
         (lanl.LANL_RAILS, "mode [23]", 0.23, -0.636, 10, 10),
+        (garteur.COPY, "elastic", 1.87, 6.28, 11, 14),
+        (garteur.COPY, "glued", 3.92, 10.37, 4, 14),
+        (garteur.ORIGINAL, "elastic", 1.28, 7.17, 10, 14),
+        (garteur.ORIGINAL, "glued", 5.39, 10.29, 3, 14),
+        (garteur.ORIGINAL, "damping", 39.2, 120.1, 4, 8),
     ],
 )
 def test_the_verdict_is_the_one_that_is_told(structure, quantity, median, largest, inside, number):
@@ -149,6 +155,13 @@ def test_the_verdict_is_the_one_that_is_told(structure, quantity, median, larges
 def box():
     """Parts whose squares are as wide as cones of pressure."""
     return barc.parts(12, "rbe2", **barc.CONES)
+
+
+def test_the_copy_of_the_test_bed_is_met_within_four_percent():
+    """Twelve of 14 on elastic contacts, eight when glued; the first of them best."""
+    rows = record.compare(garteur.COPY).items()
+    near = [name for name, row in rows if abs(row.deviation) < 4]
+    assert [sum(joint in name for name in near) for joint in ("elastic", "glued")] == [12, 8]
 
 
 @pytest.mark.long

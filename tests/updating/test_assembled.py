@@ -51,6 +51,15 @@ def measured(family, attached, true):
     return noisy_test(family, true, CHANNELS, LINES, attached=attached, fixed=HELD, **TEST)
 
 
+def test_families_pass_their_projection_on(families):
+    """Meshes that differ are coupled by common functions, at all values."""
+    functions, coupled = rom.Polynomial(1), ((("frame", "tip"), ("arm", "root")),)
+    one = FamilyAssembly(families, coupled, functions)
+    assert one.nominal.projection is functions is one.at(**{"arm.E": 1.1}).projection
+    with pytest.raises(rom.errors.ConfigError, match="gives no functions"):
+        FamilyAssembly(families, coupled, "linear")
+
+
 def test_coupled_families_have_the_frequencies_of_their_assembly(joined):
     model = model_of(joined, {})
     assert model.names == ("frame.E", "arm.E") and model.n_rigid == 0

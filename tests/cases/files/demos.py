@@ -17,7 +17,7 @@ LONG_DEMOS = {
     f"demo_{name}"
     for name in (
         "assembly barc beam bent_blade best_matching bladed_disk bladed_rotor bolted_frame "
-        "compressor_blade exchange flexible_arm flexure forming hand isotropy "
+        "compressor_blade exchange flexible_arm flexure forming garteur hand isotropy "
         "large_deflection large_mesh lost_tip masonry measured_arches measured_frames "
         "measured_rods mistuning oil_inlet parameters pendulum_chain periodic planetary "
         "robot_arm rockfall rolling_wheel rotating_blade rotor satellite sheet slider_crank "
