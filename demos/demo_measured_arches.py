@@ -134,7 +134,7 @@ figure = [
                 | {"glued, joints break one by one": brittle},
                 notes={"vault U_V": (0.37, 0.75), "half circle": (0.62, 2.6), "US-1": (1.34, 1.05),
                        "US-2": (1.8, 1.05), "arch U_A": (1.75, 2.9)}, log=True),
-     view.Panel("Afterwards: what mortar accounts for", "shear and flexural strength [MPa]",
+     view.Panel("Afterwards: mortar that would do", "shear and flexural strength [MPa]",
                 "load [kN]",
                 {label: (1e-6 * BONDS, borne[name]) for name, label in LABELS.items()},
                 {"measured": (1e-6 * np.concatenate([*needed.values()]),
