@@ -15,6 +15,7 @@ import sys
 from pathlib import Path
 
 from mpi4py import MPI
+from slepc4py import SLEPc  # noqa: F401  begins on all processes, of which one goes on
 
 import numpy as np
 
