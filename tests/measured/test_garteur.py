@@ -67,18 +67,14 @@ def test_the_strip_stiffens_and_damps_as_ross_kerwin_and_ungar_say():
     assert_allclose(np.sqrt(lam[:3]), k**2 * np.sqrt(stiff / heavy), rtol=0.04)
 
 
-@pytest.mark.long
-@pytest.mark.fenicsx
-def test_the_glued_bed_vibrates_as_beams_do():
-    """Beams whose axes do not meet, without angles and strip; the plate is a rigid link."""
-    kept, bed = (
-        record.read("garteur_copy"),
-        airframe(0.05, material=garteur.rom.Material(71e9, 0.33, 2740.0)),
-    )
+def test_the_glued_bed_is_a_little_stiffer_than_beams():
+    """Beams meet in points; here drums and plate stiffen 100 and 70 mm of the wing."""
+    kept = record.read("garteur_copy")
+    bed = airframe(0.05, material=garteur.rom.Material(71e9, 0.33, 2740.0))
     K, M = sum(bed.K.values()), sum(bed.M.values())
-    lam = garteur.eigh(K, M, eigvals_only=True)[6:16]
+    beams = np.sqrt(garteur.eigh(K, M, eigvals_only=True)[6:14]) / 2 / np.pi
     f = np.sort([one.value for name, one in kept.items() if name.startswith("glued")])[:8]
-    assert_allclose(f, np.sqrt(lam[:8]) / 2 / np.pi, rtol=0.06)
+    assert ((f / beams > 0.995) & (f / beams < 1.09)).all(), f / beams
 
 
 @pytest.mark.long
