@@ -1,12 +1,12 @@
 """The motion of a mechanism file as a measure: which of its keys vary, and what is kept of it."""
 
-import hashlib
 import json
 import re
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
+from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 Changes = dict[tuple[str, ...], Any]
 KEY_WORDS = re.compile(r'"([^"]*)"|([^."]+)')  # of a key, joints."main bearing"
 CALL = re.compile(r"\s*(\w+)\s*\((.*)\)\s*", re.DOTALL)
+AXIS = re.compile(r" (x|y|z|p[0-3]|q\d+)$")  # of a column, behind its quantity
 OF_COMPONENTS = {key.name for key in TABLE.keys} - {"name"}
 FUNCTIONS: dict[str, Callable[[Array], Any]] = {
     "max": np.max,
@@ -63,12 +64,9 @@ class MotionOf:
     def __call__(self, **given: Any) -> dict[str, Any]:
         """Move it, and say what is kept."""
         own, parts = self.sorted(given)
-        own |= {
-            ("bodies", name, "file"): body_of(
-                place, tuple(changes.items()), self.folder, self.trust
-            )
-            for name, (place, changes) in parts.items()
-        }
+        for name, (place, changes) in parts.items():
+            made = body_of(place, tuple(changes.items()), self.folder, self.trust)
+            own["bodies", name, "file"] = made
         solution = read_mechanism(self.file, own, trust=self.trust).simulate()
         return {text: value_of(text, solution) for text in self.kept}
 
@@ -82,8 +80,8 @@ class MotionOf:
     @property
     def name(self) -> str:
         """By which a study knows the files, as they are now, and what is kept."""
-        files = {Path(self.file), *self.components.values()}
-        digest = _digest("".join(map(_content, sorted(files))))
+        files = sorted({Path(self.file), *self.components.values()})
+        digest = _digest("".join(sha256(path.read_bytes()).hexdigest() for path in files))
         return "; ".join([f"{Path(self.file).name} {digest}", *self.kept])
 
     def sorted(self, given: Mapping[str, Any]) -> tuple[Changes, dict[str, tuple[str, Changes]]]:
@@ -124,8 +122,8 @@ def body_of(place: str, changes: tuple[Any, ...], folder: str, trust: bool) -> s
     path = Path(folder) / f"{_digest(repr((place, sorted(changes))))}.rom.npz"
     path.parent.mkdir(parents=True, exist_ok=True)
     try:
-        if not path.exists() and TURNS.take(path) and path.exists():
-            return str(path)
+        if not path.exists():
+            TURNS.take(path)
         if not path.exists():
             _make(place, dict(changes), path, trust)
     finally:
@@ -187,7 +185,7 @@ def _column(name: str, solution: Any) -> Array:
     if name == "t":
         return np.asarray(solution.t)
     try:
-        channels = asked(solution, [_without_axis(name)])
+        channels = asked(solution, [AXIS.sub("", name)])
     except ConfigError as error:
         raise Unmeasurable(error.message, hint=error.hint) from error
     for channel in channels:
@@ -198,16 +196,8 @@ def _column(name: str, solution: Any) -> Array:
     raise Unmeasurable(f"the motion has no quantity {name!r}.", hint=WRITE)
 
 
-def _without_axis(name: str) -> str:
-    return re.sub(r" (x|y|z|p[0-3]|q\d+)$", "", name)
-
-
 def _digest(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()[:24]
-
-
-def _content(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+    return sha256(text.encode()).hexdigest()[:24]
 
 
 if __name__ == "__main__":

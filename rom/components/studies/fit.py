@@ -244,7 +244,6 @@ def fit(  # noqa: PLR0913  what is sought, from where, and what runs
 
 
 def _fitted(search: Search, found: Study) -> Fitted:
-    """The record of the best search."""
     squares, n = found.values["chi-square"][found.good], found.values["residuals"].shape[1]
     least = squares.min() + LAST_GAIN * max(1.0, squares.min() / n)
     best = found.good[np.flatnonzero(squares <= least)[0]]  # whatever the round-off of equal ones

@@ -10,7 +10,6 @@ import json
 import zlib
 from collections.abc import Mapping
 from pathlib import Path
-from types import TracebackType
 from typing import IO, Any
 
 import numpy as np
@@ -21,6 +20,7 @@ from rom.readable import check_readable
 
 SCHEMA, VERSION = "rom-study", 1
 LARGEST_FILE = 2**36  # bytes
+SAME_HINT = "Give the samples, and the generator they come from, as they were; or another file."
 FULL_HINT = "What was measured is kept: make room, and go on with resume=True, or --resume."
 Row = dict[str, Any]
 
@@ -55,12 +55,7 @@ class Journal:
     def __enter__(self) -> "Journal":
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        at: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.file.close()
 
     def add(self, row: Row) -> None:
@@ -108,14 +103,9 @@ def _read(path: Path) -> tuple[Row, list[Row], int]:
 
 
 def _check_same(path: Path, there: Row, head: Row) -> None:
-    """Refuse a file of another study."""
-    for what in ("measure", "parameters"):
+    for what, other in (("measure", "another measure"), ("parameters", "other samples")):
         if there.get(what) != json.loads(json.dumps(head[what])):
-            other = "another measure" if what == "measure" else "other samples"
-            hint = (
-                "Give the samples, and the generator they come from, as they were; or another file."
-            )
-            raise ConfigError(f"{path} is of a study with {other}.", hint=hint)
+            raise ConfigError(f"{path} is of a study with {other}.", hint=SAME_HINT)
 
 
 def packed(array: Array) -> float | dict[str, Any]:

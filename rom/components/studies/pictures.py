@@ -8,7 +8,6 @@ import numpy as np
 from rom import view
 from rom.components.studies.study import Indices, Study
 from rom.errors import ConfigError
-from rom.model import Array
 
 LARGEST = 6  # rows and columns of diagrams on a sheet
 BAND = (0.05, 0.5, 0.95)
@@ -18,22 +17,18 @@ def scatter_matrix(study: Study, path: str | Path | None = None) -> Any:
     """Draw each number that was measured (rows) over each parameter (columns); the figure."""
     numbers = {name: x for name, x in study.values.items() if x.ndim == 1}
     varied = {name: x for name, x in study.parameters.items() if x.dtype.kind != "U"}
-    if not numbers or not varied or not study.good.size:
+    good = study.good
+    if not numbers or not varied or not good.size:
         raise ConfigError("there is no number over a parameter to draw.")
     rows = [
         [
-            view.Panel(
-                "",
-                name[-30:],
-                value[-36:] if k == 0 else "",
-                points={"_": (x[study.good], y[study.good])},
-            )
+            view.Panel("", name[-30:], value[-36:] * (k == 0), points={"_": (x[good], y[good])})
             for k, (name, x) in enumerate(list(varied.items())[:LARGEST])
         ]
         for j, (value, y) in enumerate(list(numbers.items())[:LARGEST])
     ]
     caption = (
-        f"Each point is one of {study.good.size} samples: a number that was measured (row) over a "
+        f"Each point is one of {good.size} samples: a number that was measured (row) over a "
         "parameter that was varied (column), in SI units; all of them varied at the same time."
     )
     return view.panels(rows, path, title="What was measured over what was varied", caption=caption)
@@ -63,10 +58,8 @@ def bands(
     """Draw where 90 % of the histories of a value lie over time, and their median; the figure."""
     times, n = study.on_clock(name, clock), study.good.size
     quantiles, _ = study.quantiles(name, BAND)
-    curves: dict[str, tuple[Array, Array]] = {
-        f"{share:.0%} of the samples below": (times, x)
-        for share, x in zip(BAND, quantiles, strict=True)
-    }
+    limits = zip(BAND, quantiles, strict=True)
+    curves = {f"{share:.0%} of the samples below": (times, x) for share, x in limits}
     caption = f"At each time, {n} samples ordered by size; a curve is no sample, but a limit."
     panel = view.Panel("", "time [s]", f"{name} {unit}".strip(), curves=curves)
     return view.panels([[panel]], path, title=f"Bands of {name}", caption=caption)

@@ -10,14 +10,8 @@ import os
 import sys
 from collections import deque
 from collections.abc import Callable, Iterator
-from concurrent.futures import (
-    FIRST_COMPLETED,
-    BrokenExecutor,
-    CancelledError,
-    Executor,
-    Future,
-    wait,
-)
+from concurrent import futures
+from concurrent.futures import BrokenExecutor, Executor, Future
 from concurrent.futures.process import ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -133,7 +127,7 @@ class Handing:
         """What came of a sample; None where its pool broke."""
         try:
             answer: Answer | str = future.result()
-        except (BrokenExecutor, CancelledError, OSError) as error:
+        except (BrokenExecutor, futures.CancelledError, OSError) as error:
             if not isinstance(self.executor, Processes):
                 raise _broke(error) from error
             return None
@@ -162,7 +156,7 @@ def answers(
         if isinstance(executor, Processes) and not hand.running:
             executor.replace()  # it broke while it had nothing to do
         lost = list[Given]()
-        for future in wait(hand.running, return_when=FIRST_COMPLETED).done:
+        for future in futures.wait(hand.running, return_when=futures.FIRST_COMPLETED).done:
             sample, answer = hand.running.pop(future), hand.taken(future)
             if answer is None:
                 lost.append(sample)

@@ -123,10 +123,8 @@ def _scaled(U: Array, ranges: Mapping[str, Range], log: Sequence[str]) -> dict[s
     for u, (name, given) in zip(U.T, ranges.items(), strict=True):
         if hasattr(given, "ppf"):
             found[name] = np.asarray(given.ppf(u), dtype=float)
-        elif name in log:
-            low, high = np.log(given)
-            found[name] = np.exp(low + u * (high - low))
-        else:
-            low, high = given
-            found[name] = low + u * (high - low)
+            continue
+        low, high = np.log(given) if name in log else given
+        x = low + u * (high - low)
+        found[name] = np.exp(x) if name in log else x
     return found

@@ -3,6 +3,7 @@
 See docs/theory/studies.md.
 """
 
+import os
 import platform
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
@@ -147,17 +148,15 @@ class Study:
                       for x in self.parameters.values()])  # fmt: skip
         swapped = [X[j, 2 + i] == X[j, int(i == j)] for i in range(k) for j in range(k)]
         if n < 2 or value.ndim > 1 or not np.all(swapped):
-            raise ConfigError(
-                "indices are of a number at the samples of rom.components.studies.indices_design."
-            )
+            where = "rom.components.studies.indices_design"
+            raise ConfigError(f"indices are of a number at the samples of {where}.")
         f = value.reshape(k + 2, n)
         f = f[:, np.isfinite(f).all(axis=0)]
         chosen = rng.integers(f.shape[1], size=(resamples, f.shape[1]))
         drawn = np.array([_indices(f[:, rows]) for rows in chosen])
         ends = np.quantile(drawn, [(1 - level) / 2, (1 + level) / 2], axis=0)
         first, total = _indices(f)
-        names = tuple(self.parameters)
-        return Indices(names, first, total, ends[:, 0].T, ends[:, 1].T)
+        return Indices(tuple(self.parameters), first, total, ends[:, 0].T, ends[:, 1].T)
 
     def _value(self, name: str) -> Array:
         check_known(name, self.values, f"nothing measured is called {name!r}; there are")
@@ -183,13 +182,11 @@ class Indices:
 
     def __str__(self) -> str:
         width = max(map(len, self.parameters))
-        rows = zip(
-            self.parameters, self.first, self.first_ends, self.total, self.total_ends, strict=True
-        )
+        columns = self.parameters, self.first, self.first_ends, self.total, self.total_ends
         head = f"{'':{width}}  first order              total"
         return "\n".join([head, *(
             f"{name:{width}}  {s:6.3f} ({a:6.3f} to {b:6.3f})  {t:6.3f} ({c:6.3f} to {d:6.3f})"
-            for name, s, (a, b), t, (c, d) in rows
+            for name, s, (a, b), t, (c, d) in zip(*columns, strict=True)
         )])  # fmt: skip
 
 
@@ -294,15 +291,11 @@ def _studied(  # noqa: PLR0913
             _executor(executor, workers, len(todo), b"__main__" in payload) as ready,
             _told(progress, n, len(rows)) as tell,
         ):
-            found = (
-                here(measure, todo, limits)
-                if ready is None
-                else answers(ready, payload, todo, limits)
-            )
+            alone = ready is None
+            found = here(measure, todo, limits) if alone else answers(ready, payload, todo, limits)
             try:
                 for number, answer in found:
-                    row = _row(number, answer, shapes)
-                    rows[number] = row
+                    rows[number] = row = _row(number, answer, shapes)
                     if journal:
                         journal.add(row)
                     tell("failed" in row)
@@ -330,21 +323,14 @@ def read_study(path: str | Path) -> Study:
 def _columns(samples: Mapping[str, Any]) -> dict[str, list[Any]]:
     """Values of each parameter, as JSON has them."""
     found = {str(name): np.asarray(samples[name]) for name in samples}
-    if (
-        not found
-        or {x.ndim for x in found.values()} != {1}
-        or len({x.size for x in found.values()}) > 1
-    ):
+    shapes = {x.shape for x in found.values()}
+    if len(shapes) != 1 or len(*shapes) != 1:
+        text = "samples are one list of values for each parameter, all as long"
         sizes = ", ".join(f"{name!r} {x.shape}" for name, x in found.items())
-        raise ConfigError(
-            f"samples are one list of values for each parameter, all as long: {sizes}."
-        )
+        raise ConfigError(f"{text}: {sizes}.")
     for name, x in found.items():
-        if (
-            not x.size
-            or x.dtype.kind not in "fiubU"
-            or (x.dtype.kind == "f" and not np.isfinite(x).all())
-        ):
+        endless = x.dtype.kind == "f" and not np.isfinite(x).all()
+        if not x.size or x.dtype.kind not in "fiubU" or endless:
             raise ConfigError(f"values of {name!r} are finite numbers or texts, at least one.")
     return {name: x.tolist() for name, x in found.items()}
 
@@ -362,8 +348,6 @@ def _executor(
     if executor is not None or workers == 0 or not n:
         yield executor
         return
-    import os
-
     with processes(min(workers or len(os.sched_getaffinity(0)), n), script=script) as pool:
         yield pool
 
@@ -416,17 +400,15 @@ def _study(columns: Mapping[str, list[Any]], rows: Mapping[int, Row]) -> Study:
     first = min((k for k, row in rows.items() if "values" in row), default=None)
     shapes = {} if first is None else _shapes([rows[first]])
     values = {name: np.full((n, *shape), np.nan) for name, shape in shapes.items()}
-    seconds, failed, warned = np.zeros(n), dict[int, str](), dict[int, list[str]]()
-    for k in range(n):
-        row = rows.get(k, {"failed": "it was not reached", "seconds": 0.0})
-        seconds[k] = row["seconds"]
+    every = {k: rows.get(k, {"failed": "it was not reached", "seconds": 0.0}) for k in range(n)}
+    for k, row in every.items():
         for name, value in row.get("values", {}).items():
             values[name][k] = unpacked(value)
-        if "failed" in row:
-            failed[k] = row["failed"]
-        if "warned" in row:
-            warned[k] = row["warned"]
+    failed, warned = (
+        {k: row[what] for k, row in every.items() if what in row} for what in ("failed", "warned")
+    )
     parameters = {name: np.array(x) for name, x in columns.items()}
+    seconds = np.array([row["seconds"] for row in every.values()], dtype=float)
     return Study(parameters, values, failed, warned, seconds)
 
 

@@ -79,9 +79,8 @@ def run(args: argparse.Namespace) -> Answer:
     asked = {"keep": how["keep"], "trust": args.trust, "workers": args.workers}
     from rom.components.studies.study import study
 
-    found = study(
-        args.file, samples, **asked, into=path, resume=args.resume, progress=not args.quiet
-    )
+    asked |= {"resume": args.resume, "progress": not args.quiet}
+    found = study(args.file, samples, into=path, **asked)
     if args.picture and found.good.size:
         from rom.components.studies.pictures import scatter_matrix
 
@@ -98,9 +97,8 @@ def run(args: argparse.Namespace) -> Answer:
     }
     head = f"{path}: {len(found.seconds)} samples, {len(found.failed)} failed"
     said = f"{head}\n{table(('', '5 %', '50 %', '95 %'), rows)}"
-    return Answer(
-        data, said if rows else head, failed=() if found.good.size else ("every sample failed",)
-    )
+    failed = () if found.good.size else ("every sample failed",)
+    return Answer(data, said if rows else head, failed=failed)
 
 
 def _asked(args: argparse.Namespace) -> dict[str, Any]:

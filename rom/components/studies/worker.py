@@ -72,25 +72,22 @@ def measured(
         except Exception as error:  # of whatever the modules of the measure raise
             text = f"the measure cannot be loaded by workers: {error}. {SEND}"
             return ("refused", type(error).__name__, text, 0.0)
-    clock, kind, told = perf_counter(), "failed", ""
+    clock = perf_counter()
     try:
         with _limited(seconds, memory), warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", RomWarning)
             values = _plain(_measures[key](**given))
     except InterruptedRun:  # of this process
         raise
-    except MemoryError as error:
-        name, told = type(error).__name__, "it needs more memory than it may take"
-    except Overtime as error:
-        name, told = type(error).__name__, f"it takes longer than {seconds:g} s"
-    except Unmeasurable as error:
-        kind, name, told = "refused", type(error).__name__, str(error)
     except Exception as error:  # a row of the table, whatever it is
-        name, told = type(error).__name__, str(error)
-    else:
-        own = (str(one.message) for one in caught if issubclass(one.category, RomWarning))
-        return ("values", values, list(dict.fromkeys(own)), perf_counter() - clock)
-    return (kind, name, told, perf_counter() - clock)
+        kind, told = "refused" if isinstance(error, Unmeasurable) else "failed", str(error)
+        if isinstance(error, MemoryError):
+            told = "it needs more memory than it may take"
+        elif isinstance(error, Overtime):
+            told = f"it takes longer than {seconds:g} s"
+        return (kind, type(error).__name__, told, perf_counter() - clock)
+    own = (str(one.message) for one in caught if issubclass(one.category, RomWarning))
+    return ("values", values, list(dict.fromkeys(own)), perf_counter() - clock)
 
 
 def _plain(values: Any) -> dict[str, Any]:
