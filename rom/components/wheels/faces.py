@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 
 from rom.errors import InterfaceError
 from rom.model import Array, Interface
-from rom.rotation import skew
+from rom.rotation import exp, matrix
 
 COINCIDENT_RTOL = 1e-6  # of the face's size
 SECTOR_COUNT_ATOL = 1e-3  # distance of the number of sectors from a whole number
@@ -30,9 +30,8 @@ class Pairing:
 
 
 def turned(axis: Array, angle: float) -> Array:
-    """(3, 3) rotation about a unit vector (Rodrigues)."""
-    S = skew(axis)
-    return np.eye(3) + np.sin(angle) * S + (1 - np.cos(angle)) * (S @ S)
+    """(3, 3) rotation about a unit vector."""
+    return matrix(exp(angle * axis))
 
 
 def paired(low: Interface, high: Interface, axis: Array, at: Array) -> Pairing:

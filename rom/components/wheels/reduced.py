@@ -166,9 +166,8 @@ def projected(sector: CyclicSector, Psi: Array, q: int, omega: Array) -> Reduced
 
     K, M = (0.5 * (A + A.T) for A in (small(sector.K), small(sector.M)))
     kept = {f.name: getattr(sector, f.name) for f in fields(CyclicSector)}
-    motions = None
-    if sector.motions is not None:
-        motions = np.linalg.solve(M.toarray(), Psi.T @ (sector.M @ sector.motions))
+    if (motions := sector.motions) is not None:
+        motions = np.linalg.solve(M.toarray(), Psi.T @ (sector.M @ motions))
     regions = {name: small(A) for name, A in sector.regions.items()}
     kept |= {"K": K, "M": M, "motions": motions, "points": None, "face": None, "regions": regions}
     kept |= {"slave": np.arange(q, 2 * q), "master": np.arange(q), "held": NO_DOFS}

@@ -123,14 +123,9 @@ def travelling_modes(
     keep = np.arange(wanted) if not standing else np.flatnonzero(lam.imag > 0)[:n]
     lam, U = lam[keep], U[:, keep]
     ahead = np.zeros(lam.size) if standing else -np.sign(lam.imag) * np.sign(speed)
-    size = np.sqrt(np.einsum("fm,fm->m", U.conj(), M @ U).real)
+    shapes = T @ (U / np.sqrt(np.einsum("fm,fm->m", U.conj(), M @ U).real))
     return TravellingModes(
-        abs(lam.imag),
-        T @ (U / size),
-        sector=sector,
-        diameter=diameter,
-        speed=abs(speed),
-        direction=ahead,
+        abs(lam.imag), shapes, sector=sector, diameter=diameter, speed=abs(speed), direction=ahead
     )
 
 
@@ -142,7 +137,7 @@ def _lowest(
     With lam = shift + mu, 1 / mu is an eigenvalue of the inverse of the companion matrix, which
     costs one solution with K + shift G + shift^2 M.
     """
-    f = K.shape[0]
+    f, k = K.shape[0], m + N_SPARE_WAVES
     D = csr_matrix(G + 2 * shift * M)
     try:
         solve = splu(csc_matrix(K + shift * G + shift**2 * M, dtype=complex)).solve
@@ -154,15 +149,13 @@ def _lowest(
         a, b = y[:f].ravel(), y[f:].ravel()
         return np.concatenate([-solve(M @ b + D @ a), a])
 
-    if f <= MAX_DENSE_DOFS or m + N_SPARE_WAVES >= 2 * f - 1:
+    if f <= MAX_DENSE_DOFS or k >= 2 * f - 1:
         columns = [inverse(e) for e in np.eye(2 * f, dtype=complex)]
         mu, V = eig(np.array(columns).T)
     else:
         operator = LinearOperator((2 * f, 2 * f), matvec=inverse, dtype=complex)
         start = np.exp(1j * np.arange(2 * f))
-        mu, V = eigs(
-            operator, m + N_SPARE_WAVES, v0=start, tol=0.0, ncv=max(2 * (m + N_SPARE_WAVES) + 1, 20)
-        )
+        mu, V = eigs(operator, k, v0=start, tol=0.0, ncv=max(2 * k + 1, 20))
     lam = shift + 1 / mu
     order = np.argsort(abs(lam))
     return lam[order], V[:f, order]

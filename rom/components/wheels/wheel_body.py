@@ -81,7 +81,8 @@ def wheel_body(
     check_known(hub, model.interfaces, text, InterfaceError)
     _refuse_others(full, model, model.interfaces[hub])
     found = wheel_modes(sector, n, diameters=diameters)
-    shapes = [_full_shapes(modes) for modes in found]
+    expand = sector.expand if isinstance(sector, ReducedSector) else np.asarray
+    shapes: list[Complex] = [expand(modes.shapes) for modes in found]
     F = np.hstack([part for U, modes in zip(shapes, found, strict=True)
                    for part in (U.real, U.imag)[: modes.multiplicity]])  # fmt: skip
     every = [(modes.omega, modes.diameter) for modes in found for _ in range(modes.multiplicity)]
@@ -112,12 +113,6 @@ def wheel_body(
     report = Report(f"certificate of {name}", (*rows, *frequency_rows(f"{hub} held", table), unit))
     report.warn_of_failures(f"the certificate of body {name!r}")
     return replace(body, certificate=report)
-
-
-def _full_shapes(modes: CyclicModes) -> Complex:
-    """(n_full, m) complex shapes of sector 0 in nodal dofs."""
-    small = modes.sector
-    return small.expand(modes.shapes) if isinstance(small, ReducedSector) else modes.shapes
 
 
 def _refuse_others(full: CyclicSector, model: FEModel, hub: Interface) -> None:

@@ -22,17 +22,9 @@ from scipy.sparse import csr_matrix, identity
 
 from rom.arguments import typed, vector
 from rom.checks.draft import run
+from rom.components.wheels import reduced
 from rom.components.wheels.faces import interpolation
-from rom.components.wheels.reduced import (
-    CYCLIC_FACES,
-    Functions,
-    ReducedSector,
-    SectorDraft,
-    basis,
-    connect_faces,
-    connect_root,
-    project,
-)
+from rom.components.wheels.reduced import Functions, ReducedSector, SectorDraft
 from rom.components.wheels.rotation import arms, centrifugal_displacement, rotation_matrices
 from rom.components.wheels.sector import NO_DOFS, CyclicSector, all_rows, region, stresses_of
 from rom.eigen.verbs import dofs_of, every_row, own_rows, static_shapes
@@ -170,9 +162,8 @@ def reduced_blade(
         and Maurici (2018); see docs/theory/cyclic_symmetry.md.
     """
     if blade is None:
-        check_known(
-            root, model.interfaces, f"the blade has no interface {root!r}; it has", InterfaceError
-        )
+        text = f"the blade has no interface {root!r}; it has"
+        check_known(root, model.interfaces, text, InterfaceError)
         K, M = all_rows(model, model.K), all_rows(model, model.M)
         inner, nodes = np.arange(model.n_dofs), model.interfaces[root].nodes
     else:
@@ -244,9 +235,8 @@ def _same_surface(sector: SubstructuredSector, points: Array) -> csr_matrix:
     apart = np.abs(boxes[0] - boxes[1]).max()
     if apart > ROOT_MATCH_RTOL * size:
         text = f"the root of this blade ends up to {apart:.3g} m from that of the sector"
-        raise InterfaceError(
-            f"{text}, {size:.3g} m wide; only above it may blades differ in shape."
-        )
+        why = f"{size:.3g} m wide; only above it may blades differ in shape."
+        raise InterfaceError(f"{text}, {why}")
     return interpolation(own, points)
 
 
@@ -298,11 +288,12 @@ def substructured_sector(
         raise InterfaceError(f"{text}; cut the wheel between the blades.")
     face = root_of(model, nodes)
     Q_root = interface_functions(root or Polynomial(3), face)
-    kinds, r = {CYCLIC_FACES: functions or Polynomial(4)}, 3 * Q_root.shape[1]
+    kinds, r = {reduced.CYCLIC_FACES: functions or Polynomial(4)}, 3 * Q_root.shape[1]
     disk = np.union1d(np.union1d(np.union1d(faces, sector.held), shared), inner)
     parts = (disk, n_modes), (np.setdiff1d(np.arange(sector.n), inner), n_blade_modes)
     draft = SectorDraft(model=sector, interfaces=kinds, root=(shared, Q_root), parts=parts)
-    small, q = run((connect_faces, connect_root, basis, project), draft), draft.q
+    steps = reduced.connect_faces, reduced.connect_root, reduced.basis, reduced.project
+    small, q = run(steps, draft), draft.q
     root_at = 2 * q + np.arange(r)
     modes_at = 2 * q + r + n_modes + np.arange(n_blade_modes)
     Psi = np.zeros((sector.n, r + n_blade_modes))

@@ -19,14 +19,13 @@ from rom.arguments import Count, Positive, typed, unit_vector
 from rom.components.wheels.modes import CyclicModes, cyclic_modes
 from rom.components.wheels.prestress.steady_rotation import SteadyRotation
 from rom.components.wheels.prestress.thermal import Heat, finite_solid
-from rom.components.wheels.reduced import ReducedSector, projected, reduce_sector
+from rom.components.wheels.reduced import Functions, ReducedSector, projected, reduce_sector
 from rom.components.wheels.rotation import refuse_attachments, rotation_matrices
 from rom.components.wheels.sector import NO_DOFS, CyclicSector, all_rows, workers_of
 from rom.components.wheels.travelling import TravellingModes, travelling_modes
 from rom.eigen.supports import Fixed, held_dofs
 from rom.errors import ConfigError, ModelError, reached, warn
 from rom.model import Array, FEModel, Report
-from rom.reduction.interfaces.polynomial import FourierLegendre, Polynomial
 from rom.rows import row
 
 N_CHECKED = 3  # lowest modes by which a reduction is judged
@@ -166,9 +165,7 @@ class SpinUp(SpeedTable):
         K_t = self.steady.solid.tangent(self.displacement(speed))
         return replace(self.sector, K=csr_matrix(self.sector.K + K_t - self.steady.K_cold))
 
-    def reduced(
-        self, n_modes: int, *, functions: Polynomial | FourierLegendre | None = None
-    ) -> ReducedSpinUp:
+    def reduced(self, n_modes: int, *, functions: Functions | None = None) -> ReducedSpinUp:
         """Reduced matrices as functions of the speed.
 
         At each tabulated speed the state has a basis of its own: with cyclic faces that of
@@ -226,7 +223,7 @@ def lagrange(nodes: Array, x: Array | float) -> Array:
 
 
 def _basis(
-    state: CyclicSector, speed: float, n_modes: int, functions: Polynomial | FourierLegendre | None
+    state: CyclicSector, speed: float, n_modes: int, functions: Functions | None
 ) -> tuple[Array, int, Array]:
     """Shapes of a state: of one face, of the other, modes; the size of a face, frequencies."""
     if state.slave.size:

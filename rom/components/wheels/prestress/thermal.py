@@ -258,7 +258,6 @@ def _refuse_buckled(parts: Iterable[tuple[csr_matrix, ...]], heat: Heat, workers
         factor = workers.factor(sum(part))
         if factor is None or not factor.definite:
             shares.append(critical_factor(*part))
-    share = min(shares, default=None)
-    if share is not None:
-        text = f"the heated solid buckles at {heat.described(share)}"
+    if shares:
+        text = f"the heated solid buckles at {heat.described(min(shares))}"
         raise ModelError(f"{text}; hold it more loosely, or follow its shape with rom.spin_up.")
