@@ -110,8 +110,6 @@ class Mesh:
         Places s (n,) of the contact lie on its path, from first to last [m].
         """
         k = np.atleast_1d(np.asarray(self.stiffness, dtype=float))
-        if k.size == 1:
-            return np.full(s.shape, k[0])
         return np.interp((s - path[0]) / (path[1] - path[0]), np.linspace(0, 1, k.size), k)
 
     def forces(

@@ -12,14 +12,7 @@ from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.linalg import SuperLU, splu
 
 from rom.arguments import between
-from rom.components.gear_mesh.compliance import (
-    contact_compliance,
-    in_normal_section,
-    normal_section,
-    places_of_contact,
-    profile,
-    tooth_compliance,
-)
+from rom.components.gear_mesh import compliance
 from rom.components.gear_mesh.gears.geometry import GearPair
 from rom.errors import ModelError
 from rom.model import Array, Index
@@ -115,14 +108,14 @@ def element_table(
     Raises:
         ModelError: if the bore leaves no body.
     """
-    teeth = normal_section(pair)
+    teeth = compliance.normal_section(pair)
     models = [tooth_model(teeth, gear, bore=bore) for gear in (0, 1)]
     table = []
-    for s in places_of_contact(pair, n):
-        radii, rho = in_normal_section(pair, s)
+    for s in compliance.places_of_contact(pair, n):
+        radii, rho = compliance.in_normal_section(pair, s)
         own = sum(model.compliance(r) for model, r in zip(models, radii, strict=True))
-        depths = [tooth_compliance(teeth, g, float(radii[g]))[2] for g in (0, 1)]
-        table.append(E / (own + contact_compliance(rho, depths, force, E)))
+        depths = [compliance.tooth_compliance(teeth, g, float(radii[g]))[2] for g in (0, 1)]
+        table.append(E / (own + compliance.contact_compliance(rho, depths, force, E)))
     return np.array(table)
 
 
@@ -130,7 +123,7 @@ def _mesh(
     pair: GearPair, gear: int, inner: float, fine: int
 ) -> tuple[Array, Index, Index, Index, Index]:
     """Points, cells, clamped nodes, nodes of the axis and of one flank."""
-    rf, (y, t) = pair.rf[gear], profile(pair, gear)
+    rf, (y, t) = pair.rf[gear], compliance.profile(pair, gear)
     across, x0 = 4 * fine, t[0] / 2  # intervals between nodes
     xi = np.linspace(-1, 1, across + 1)
     arc = np.arcsin(xi * x0 / rf)

@@ -21,18 +21,8 @@ from typing import Annotated
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import (
-    Angle,
-    Between,
-    Count,
-    Direction,
-    NotNegative,
-    Positive,
-    between,
-    finite,
-    unit_vector,
-    vector,
-)
+from rom import arguments
+from rom.arguments import Angle, Between, Count, Direction, NotNegative, Positive
 from rom.components.gear_mesh.gears import table as col
 from rom.components.gear_mesh.gears.corrections import Correction, checked_map
 from rom.components.gear_mesh.gears.geometry import GearPair
@@ -153,7 +143,7 @@ def gear_mesh(  # noqa: PLR0913  one keyword per property
     if not all(float(z).is_integer() for z in pair.teeth):
         raise ConfigError(f"wheels of {name!r} have {pair.teeth} teeth, needed are whole ones.")
     self.check_apart(name, wheel_a, wheel_b)
-    z = unit_vector(f"axis of {name}", axis)
+    z = arguments.unit_vector(f"axis of {name}", axis)
     D = self.design_point(wheel_b) - self.design_point(wheel_a)
     _check_place(name, pair, D, z)
     c = np.sign(pair.distance) * (D - (D @ z) * z) / np.linalg.norm(D - (D @ z) * z)
@@ -166,10 +156,10 @@ def gear_mesh(  # noqa: PLR0913  one keyword per property
     if friction and transition_speed is None:
         text = f"mesh {name!r} has friction, but no transition_speed"
         raise ConfigError(f"{text}; take a hundredth of the speed with which its flanks slide.")
-    between(f"coupling [m] of mesh {name!r} and its width", coupling, 0, pair.width)
+    arguments.between(f"coupling [m] of mesh {name!r} and its width", coupling, 0, pair.width)
     soft = hertz.compliance if hertz else 0.0
     numbers = (damping, friction, transition_speed or 1.0, follows, coupling, soft)
-    stiffness = vector(f"stiffness of the teeth of {name!r}", stiffness)
+    stiffness = arguments.vector(f"stiffness of the teeth of {name!r}", stiffness)
     flanks = correction or Correction()
     _check_correction(name, pair, flanks)
     if hertz:
@@ -185,14 +175,12 @@ def gear_mesh(  # noqa: PLR0913  one keyword per property
 
 def phase_from(name: str, mesh: GearMesh, others: Iterable[tuple[str, GearMesh]]) -> float:
     """Phase of a new `GearMesh` from others that its wheels have, 0 if they have none [rad]."""
-    pair, found = mesh.pair, dict[int, tuple[float, str]]()
+    pair, phases = mesh.pair, dict[int, tuple[float, str]]()
+    pitch = pair.base_pitch / pair.rb[0]
     for other, known in others:
         for side in (0, 1) if pair.teeth[1] else (0,):
-            at = _middle(mesh, side, known)
-            if side not in found and at is not None:
-                found[side] = at, other
-    pitch = pair.base_pitch / pair.rb[0]
-    phases = {side: (_phase(pair, side, at) % pitch, other) for side, (at, other) in found.items()}
+            if (at := _middle(mesh, side, known)) is not None:
+                phases.setdefault(side, (_phase(pair, side, at) % pitch, other))
     if not phases:
         return 0.0
     if len(phases) == 2:
@@ -222,8 +210,8 @@ def _middle(mesh: GearMesh, side: int, known: GearMesh) -> float | None:
         same = place == marker and known.pair.teeth[other] == teeth
         if same and abs(turned) > 1 - SAME_AXIS:
             middle = middle_of_tooth(known.pair, other, known.phase)
-            between = np.arctan2(z @ np.cross(e, towards), e @ towards)
-            return float(between + np.sign(turned) * middle)
+            apart = np.arctan2(z @ np.cross(e, towards), e @ towards)
+            return float(apart + np.sign(turned) * middle)
     return None
 
 
@@ -270,7 +258,6 @@ def _follows_energy(
 
 
 def _check_place(name: str, pair: GearPair | RackPair, D: Array, z: Array) -> None:
-    """Refuse wheels that do not stand as the pair says."""
     distance = float(np.linalg.norm(D - (D @ z) * z))
     if not abs(distance - abs(pair.distance)) <= DISTANCE_RTOL * pair.module:
         text = f"the wheels of mesh {name!r} stand {distance * 1e3:.6g} mm apart, those of its pair"
@@ -282,13 +269,12 @@ def _check_place(name: str, pair: GearPair | RackPair, D: Array, z: Array) -> No
 
 
 def _check_correction(name: str, pair: GearPair | RackPair, correction: Correction) -> None:
-    """Refuse errors and maps of other wheels."""
     for errors, z in zip(correction.pitch, pair.teeth, strict=True):
         if len(errors):
-            finite(f"pitch errors of {name!r}", errors, (abs(z),))
+            arguments.finite(f"pitch errors of {name!r}", errors, (abs(z),))
     if isinstance(pair, RackPair) and correction.run_out[1][0] != 0.0:
         raise ConfigError(f"the rack of {name!r} does not turn; give it no run-out.")
-    for amount, _ in finite("run_out", correction.run_out, (2, 2)):
+    for amount, _ in arguments.finite("run_out", correction.run_out, (2, 2)):
         if not abs(amount) <= MAX_RUN_OUT * pair.module:
             text = f"run-out {amount:g} m of {name!r} is more than {MAX_RUN_OUT} modules"
             raise ConfigError(f"{text}: no involutes about their axis; move the marker.")
