@@ -21,7 +21,6 @@ from rom.model import Array, Index, Material
 from rom.rotation import skew
 
 ALUMINIUM = Material(E=72e9, nu=0.3, rho=2700.0)
-KINDS = ("axial", "torsion", "bending", "sideways")  # bending: across the thin side
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +34,7 @@ class Part:
 
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+THIN = (0.1, 0.01)
 PARTS = (
     Part(  # hangs at two of its corners
         "fuselage",
@@ -46,16 +46,12 @@ PARTS = (
         "wing",
         ((0, 1, 0.096), (0, 0.95, 0.096), (0, 0, 0.096), (0, -0.95, 0.096), (0, -1, 0.096)),
         X,
-        (0.1, 0.01),
+        THIN,
     ),
-    Part("left drum", ((0.2, 0.95, 0.106), (0, 0.95, 0.106), (-0.2, 0.95, 0.106)), Y, (0.1, 0.01)),
-    Part(
-        "right drum", ((0.2, -0.95, 0.106), (0, -0.95, 0.106), (-0.2, -0.95, 0.106)), Y, (0.1, 0.01)
-    ),
-    Part("fin", ((-0.85, 0, 0.05), (-0.85, 0, 0.35)), X, (0.1, 0.01)),
-    Part(
-        "tailplane", ((-0.85, 0.2, 0.355), (-0.85, 0, 0.355), (-0.85, -0.2, 0.355)), X, (0.1, 0.01)
-    ),
+    Part("left drum", ((0.2, 0.95, 0.106), (0, 0.95, 0.106), (-0.2, 0.95, 0.106)), Y, THIN),
+    Part("right drum", ((0.2, -0.95, 0.106), (0, -0.95, 0.106), (-0.2, -0.95, 0.106)), Y, THIN),
+    Part("fin", ((-0.85, 0, 0.05), (-0.85, 0, 0.35)), X, THIN),
+    Part("tailplane", ((-0.85, 0.2, 0.355), (-0.85, 0, 0.355), (-0.85, -0.2, 0.355)), X, THIN),
 )
 LINKS = (  # a point of each part after the first follows a point of another
     ((0, 0, 0.096), (0, 0, 0)),
@@ -126,9 +122,9 @@ def airframe(
             a, b = (T[6 * n + 3 : 6 * n + 6] for n in _ends(points, link))
             K[part.name, "joint"] = joints * (a - b).T @ (a - b)
     for part in PARTS:
-        own = points, beams[part.name], part, material
-        K |= {(part.name, kind): T.T @ _summed(*own, kind) @ T for kind in KINDS}
-        M[part.name] = T.T @ _summed(*own, "mass") @ T
+        own = _summed(points, beams[part.name], part, material)
+        M[part.name] = T.T @ own.pop("mass") @ T
+        K |= {(part.name, kind): T.T @ A @ T for kind, A in own.items()}
     return Airframe(points, np.vstack(list(beams.values())), K, M, T)
 
 
@@ -168,57 +164,48 @@ def _ends(points: Array, link: npt.ArrayLike) -> tuple[int, int]:
     return first, second
 
 
-def _summed(points: Array, beams: Index, part: Part, material: Material, what: str) -> Array:
-    A = np.zeros((6 * len(points),) * 2)
+def _summed(points: Array, beams: Index, part: Part, material: Material) -> dict[str, Array]:
+    """Matrices of a part, by kind of deformation and of its mass."""
+    found: dict[str, Array] = {}
     for i, j in beams:
         along = points[j] - points[i]
         L = float(np.linalg.norm(along))
         e = along / L
-        R = np.array([e, part.broad, np.cross(e, part.broad)])
-        local = _mass(L, part, material) if what == "mass" else _stiffness(L, part, material, what)
-        Q = block_diag(*[R] * 4)
+        Q = block_diag(*[np.array([e, part.broad, np.cross(e, part.broad)])] * 4)
         dofs = np.r_[6 * i : 6 * i + 6, 6 * j : 6 * j + 6]
-        A[np.ix_(dofs, dofs)] += Q.T @ local @ Q
-    return A
+        for kind, blocks in _element(L, part, material).items():
+            local = np.zeros((12, 12))
+            for own, block in blocks:
+                local[np.ix_(own, own)] = block
+            A = found.setdefault(kind, np.zeros((6 * len(points),) * 2))
+            A[np.ix_(dofs, dofs)] += Q.T @ local @ Q
+    return found
 
 
 # local dofs: u v w and rotations about x y z of both ends; x along the beam, y along the broad side
 AXIAL_DOFS, TWIST_DOFS = [0, 6], [3, 9]
 IN_Y, IN_Z = [1, 5, 7, 11], [2, 4, 8, 10]  # deflection and slope; w' is minus the rotation
-TURN_SIGNS = np.array([1.0, -1.0, 1.0, -1.0])
+TURNED = np.outer([1.0, -1.0, 1.0, -1.0], [1.0, -1.0, 1.0, -1.0])
 BAR_K, BAR_M = np.array([[1.0, -1], [-1, 1]]), np.array([[2.0, 1], [1, 2]]) / 6
+BEAM_K = np.array([[12, 6, -12, 6], [6, 4, -6, 2], [-12, -6, 12, -6], [6, 2, -6, 4]]) / 12
+BEAM_M = (
+    np.array([[156, 22, 54, -13], [22, 4, 13, -3], [54, 13, 156, -22], [-13, -3, -22, 4]]) / 420
+)
 
 
-def _stiffness(L: float, part: Part, material: Material, kind: str) -> Array:
-    """(12, 12) of one kind of deformation."""
-    (a, b), E = part.size, material.E
-    K = np.zeros((12, 12))
-    if kind == "axial":
-        K[np.ix_(AXIAL_DOFS, AXIAL_DOFS)] = E * a * b / L * BAR_K
-    elif kind == "torsion":
-        GJ = E / (2 * (1 + material.nu)) * torsion_constant(a, b)
-        K[np.ix_(TWIST_DOFS, TWIST_DOFS)] = GJ / L * BAR_K
-    else:
-        scale = np.array([1, L, 1, L])
-        k = np.array([[12, 6, -12, 6], [6, 4, -6, 2], [-12, -6, 12, -6], [6, 2, -6, 4]])
-        k = k * np.outer(scale, scale) / L**3 * E / 12
-        if kind == "sideways":  # deflection along the broad side
-            K[np.ix_(IN_Y, IN_Y)] = k * b * a**3
-        else:
-            K[np.ix_(IN_Z, IN_Z)] = k * a * b**3 * np.outer(TURN_SIGNS, TURN_SIGNS)
-    return K
-
-
-def _mass(L: float, part: Part, material: Material) -> Array:
-    (a, b), M = part.size, np.zeros((12, 12))
-    m, scale = material.rho * a * b * L, np.array([1, L, 1, L])
-    h = np.array([[156, 22, 54, -13], [22, 4, 13, -3], [54, 13, 156, -22], [-13, -3, -22, 4]])
-    h = h * np.outer(scale, scale) * (m / 420)
-    M[np.ix_(AXIAL_DOFS, AXIAL_DOFS)] = m * BAR_M
-    M[np.ix_(TWIST_DOFS, TWIST_DOFS)] = m * (a**2 + b**2) / 12 * BAR_M
-    M[np.ix_(IN_Y, IN_Y)] = h
-    M[np.ix_(IN_Z, IN_Z)] = h * np.outer(TURN_SIGNS, TURN_SIGNS)
-    return M
+def _element(L: float, part: Part, material: Material) -> dict[str, list[tuple[list[int], Array]]]:
+    """Blocks of a beam and their dofs by kind of deformation, bending across the thin side."""
+    (a, b), E, scale = part.size, material.E, np.array([1, L, 1, L])
+    m, GJ = material.rho * a * b * L, E / (2 * (1 + material.nu)) * torsion_constant(a, b)
+    k, h = (A * np.outer(scale, scale) for A in (E / L**3 * BEAM_K, m * BEAM_M))
+    along, about = (AXIAL_DOFS, m * BAR_M), (TWIST_DOFS, m * (a**2 + b**2) / 12 * BAR_M)
+    return {
+        "axial": [(AXIAL_DOFS, E * a * b / L * BAR_K)],
+        "torsion": [(TWIST_DOFS, GJ / L * BAR_K)],
+        "bending": [(IN_Z, a * b**3 * k * TURNED)],
+        "sideways": [(IN_Y, a**3 * b * k)],
+        "mass": [along, about, (IN_Y, h), (IN_Z, h * TURNED)],
+    }
 
 
 def torsion_constant(a: float, b: float) -> float:

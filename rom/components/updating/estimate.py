@@ -13,16 +13,8 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from rom.arguments import Between, Count, Positive, typed
-from rom.components.updating.family_model import (
-    Attached,
-    Family,
-    FamilyModel,
-    Held,
-    Parts,
-    check_prior,
-    check_units,
-    family_model,
-)
+from rom.components.updating import family_model, verdict
+from rom.components.updating.family_model import Attached, Family, FamilyModel, Held, Parts
 from rom.components.updating.frf_data import Complex, beside_poles
 from rom.components.updating.measured import Responses
 from rom.components.updating.methods import Update
@@ -35,16 +27,7 @@ from rom.components.updating.normal_equations import (
     responses_at,
     sums,
 )
-from rom.components.updating.verdict import (
-    LEFT_LOG_LEVEL,
-    Updated,
-    band,
-    check_channels,
-    scores,
-    suspects,
-    unseen_directions,
-    verdict,
-)
+from rom.components.updating.verdict import Updated
 from rom.errors import ConfigError, ParameterError, SolverError, warn
 from rom.model import Array, Mask, Row
 from rom.names import check_known, named
@@ -121,11 +104,11 @@ def update(  # noqa: PLR0913  keywords of one call
     check_damping_ratio(damping)
     if rank is not None and residual != "equations":
         raise ConfigError('rank needs residual="equations".')
-    check_units(family)
+    family_model.check_units(family)
     bodies = Parts.of(family).bodies
     attached, candidates = dict(attached or {}), dict(candidates or {})
     rows = test.rows(bodies, tolerance)
-    model = family_model(family, rows, attached, candidates, fixed)
+    model = family_model.family_model(family, rows, attached, candidates, fixed)
     chosen = set(model.names) - set(candidates) if free is None else {*free, *attached}
     for name in sorted(chosen):
         check_known(name, model.names, f"no parameter {name!r}; there are", ParameterError)
@@ -134,7 +117,7 @@ def update(  # noqa: PLR0913  keywords of one call
         raise ConfigError('the update by another test as a prior needs residual="responses".')
     before = _before(prior or {}, model)
     search = _Search.begun(model, test, unknown, damping, before)
-    check_channels(search.extremes(), search.data.roughly())
+    verdict.check_channels(search.extremes(), search.data.roughly())
     if beside_poles is not None:
         search = search.near().beside(beside_poles)
     if residual == "responses":
@@ -161,7 +144,7 @@ def _before(prior: dict[str, float] | Updated, model: FamilyModel) -> tuple[Arra
     """
     names, precision = model.names, np.zeros((len(model.names),) * 2)
     if not isinstance(prior, Updated):
-        check_prior(prior, names)
+        family_model.check_prior(prior, names)
         sigma = np.array([prior.get(name, np.inf) for name in names])
         return np.zeros(len(names)), np.diag(sigma**-2.0), 0
     known = [name for name in prior.names if name in names]
@@ -202,10 +185,9 @@ class _Search:
         m = model.n_ratios(x, data.omega[-1])
         free = np.r_[unknown, np.ones(m, dtype=bool)]
         if data.n_values <= free.sum():
-            raise ConfigError(
-                f"{data.n_values} usable numbers for {free.sum()} unknowns.",
-                hint="Measure more lines, or fix parameters; lines of low coherence do not count.",
-            )
+            text = f"{data.n_values} usable numbers for {free.sum()} unknowns."
+            hint = "Measure more lines, or fix parameters; lines of low coherence do not count."
+            raise ConfigError(text, hint=hint)
         precision = block_diag(known, np.eye(m) * DAMPING_LOG_DEVIATION**-2.0)
         before, theta = (np.r_[y, np.full(m, np.log(damping))] for y in (first, x))
         return _Search(model, test, data, theta, free, precision, before, n_known)
@@ -292,7 +274,7 @@ class _Search:
 
     def _descend(self, mu: float) -> float:
         """Levenberg-Marquardt until the expected gain vanishes; the cost there."""
-        self.settled = False
+        self.settled = True  # unless all steps are taken
         self.sums, cost = self.at(self.theta)
         low, high = self.bounds
         for _ in range(MAX_STEPS):
@@ -302,7 +284,6 @@ class _Search:
             N, g = N[np.ix_(a, a)], g[a]
             spread = max(1.0, cost / self.data.n_values)  # of a model that does not fit
             if g @ np.linalg.lstsq(N, g, rcond=None)[0] < DECREMENT_TOL * spread:
-                self.settled = True
                 return cost
             scaled = np.diag(np.maximum(np.diag(N), np.finfo(float).tiny))
             while mu < MAX_STIFFNESS:
@@ -315,17 +296,16 @@ class _Search:
                     break
                 mu *= 4.0
             else:
-                self.settled = True
                 return cost
             moved = (trial - self.theta)[a]
             gain = (cost - new) / -(moved @ (2 * g + N @ moved))
             mu *= max(1 / 3, 1 - (2 * gain - 1) ** 3) if gain > 0 else 1.0
             self.theta, self.sums, cost = trial, found, new
+        self.settled = False
         return cost
 
 
 def _found(family: Family, search: _Search) -> Updated:
-    """The record of a search that has ended."""
     model, data, s = search.model, search.data, search.sums
     n, free = len(model.names), np.flatnonzero(search.free)
     labels = tuple(model.labels(search.theta.size - n)[k] for k in free)
@@ -334,7 +314,7 @@ def _found(family: Family, search: _Search) -> Updated:
     low, high = search.bounds
     ends = np.minimum(search.x - low[:n], high[:n] - search.x) <= BOUND_ATOL
     at_bound = tuple(np.array(model.names)[ends & search.free[:n]].tolist())
-    missing = scores(N, g, free, model.names)
+    missing = verdict.scores(N, g, free, model.names)
     factors = np.where(model.present, np.exp(search.x), 0.0)
     own = N[np.ix_(free, free)]
     covariance = np.linalg.pinv(own, hermitian=True)
@@ -352,11 +332,11 @@ def _found(family: Family, search: _Search) -> Updated:
         zeta=search.zeta,
         names=labels,
         covariance=covariance,
-        verdict=verdict(s, data, free.size, missing, _doubts(search, at_bound)),
+        verdict=verdict.verdict(s, data, free.size, missing, _doubts(search, at_bound)),
         by_sensor=_mean(s.squares, data, (0, 2)),
         by_line=_mean(s.squares, data, (1, 2)),
         scores=missing,
-        unseen=unseen_directions(own, width, labels),
+        unseen=verdict.unseen_directions(own, width, labels),
         at_bound=at_bound,
         model=model,
     )
@@ -369,13 +349,13 @@ def _doubts(search: _Search, at_bound: tuple[str, ...]) -> list[Row]:
     counted = data.weight > 0
     highest = data.omega[counted.any(axis=(1, 2))][-1] / (2 * np.pi)
     alike = likeness(H, np.exp(data.logarithm), counted)
-    rows = [alike, band(np.sqrt(model.elastic(search.x)) / (2 * np.pi), highest)]
+    rows = [alike, verdict.band(np.sqrt(model.elastic(search.x)) / (2 * np.pi), highest)]
     if search.n_known:
         n = len(model.names)
         off = (search.theta - search.before)[:n]
         moved = float(off @ search.precision[:n, :n] @ off)
         rows.append(chi_row("distance from the test before", moved, search.n_known, 1))
-    for message, _ in suspects(H, data, LEFT_LOG_LEVEL).values():
+    for message, _ in verdict.suspects(H, data, verdict.LEFT_LOG_LEVEL).values():
         rows.append(row(message, 1.0, 0.0))
     if not search.settled:
         rows.append(row("steps of the search, which has not ended", MAX_STEPS, MAX_STEPS - 1))

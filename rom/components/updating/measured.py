@@ -149,11 +149,9 @@ class Channels:
         for k, own in enumerate(owners):
             if far[own, k] > reach and not strains[k]:  # a gauge lies in a face, between nodes
                 whose = "the body" if self.bodies is None else f"{self.bodies[k]!r}"
-                raise ConfigError(
-                    f"{what} {k} at {points[k].tolist()} is {far[own, k]:.3g} m off {whose}; "
-                    f"{reach:.3g} m is taken.",
-                    hint="Compare the units and axes of the test with those of the geometry.",
-                )
+                text = f"{what} {k} at {points[k].tolist()} is {far[own, k]:.3g} m off {whose}"
+                hint = "Compare the units and axes of the test with those of the geometry."
+                raise ConfigError(f"{text}; {reach:.3g} m is taken.", hint=hint)
             if len(near := np.flatnonzero(far[:, k] <= far[own, k] + SAME_RTOL * size)) > 1:
                 raise ConfigError(
                     f"{what} {k} at {points[k].tolist()} is as near to one as to another of "
@@ -227,10 +225,9 @@ class Responses:
         one_each("quantities", len(self.quantities), "sensors", wanted[1])
         c = np.asarray(self.coherence, dtype=float)
         if c.shape not in ((), wanted) or not ((c >= 0) & (c < 1)).all():
-            raise ConfigError(
-                f"coherence {c.shape} must be one number or {wanted}, from 0 up to below 1.",
-                hint="A coherence of exactly one comes of a single average: it says nothing.",
-            )
+            text = f"coherence {c.shape} must be one number or {wanted}, from 0 up to below 1."
+            hint = "A coherence of exactly one comes of a single average: it says nothing."
+            raise ConfigError(text, hint=hint)
         if c.shape and self.averages <= FREEDOM_LOST:
             text = f"coherence estimated from {self.averages} averages says nothing of the noise"
             raise ConfigError(f"{text}; average more, or give one number that is known.")

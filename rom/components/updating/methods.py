@@ -13,18 +13,9 @@ from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 
 from rom.arguments import Count, matrix, typed, whole
+from rom.components.updating import models
 from rom.components.updating.frf_data import Complex
-from rom.components.updating.models import (
-    AtSensors,
-    Measurement,
-    Modal,
-    Model,
-    ParametricModel,
-    likeness,
-    modal,
-    sensor_dofs,
-    worst_rows,
-)
+from rom.components.updating.models import AtSensors, Measurement, Modal, Model, ParametricModel
 from rom.errors import ConfigError
 from rom.model import Array, Report
 
@@ -85,7 +76,7 @@ def responses(
     here = model.at(p)
     if not set(inputs) <= set(range(len(here.sensors))) or not np.isfinite(omega).all():
         raise ConfigError(f"inputs = {inputs} must be 0 to {len(here.sensors) - 1}, omega finite.")
-    modes = modal(here, zeta)
+    modes = models.modal(here, zeta)
     seen = here.sensors @ modes.Phi
     return receptance(seen, modes.g(omega), seen[list(inputs)])
 
@@ -185,8 +176,8 @@ def sensitivity(
         ConfigError, ModelError: as `responses`.
     """
     here = model.at(p)
-    driven = here.sensors[list(inputs)]
-    return transfer(here, modal(here, zeta), driven, np.size(zeta))(omega)
+    driven, modes = here.sensors[list(inputs)], models.modal(here, zeta)
+    return transfer(here, modes, driven, np.size(zeta))(omega)
 
 
 def update_by_output(model: Model, test: Measurement, p: ArrayLike, zeta: ArrayLike) -> Update:
@@ -300,7 +291,7 @@ def solved(
 
 def _equations(here: ParametricModel, test: Measurement, ratios: Array, rank: int) -> Array:
     """(n + 1, n + 1) triangle with the R^T R of derivatives and residual of all lines together."""
-    modes = modal(here, ratios)
+    modes = models.modal(here, ratios)
     at_sensors = here.sensors @ modes.Phi
     H = receptance(at_sensors, modes.g(test.omega), at_sensors[list(test.inputs)])
     U, R = common_basis(test.H, H, rank), np.zeros((0, len(here.dK) + ratios.size + 1))
@@ -342,7 +333,7 @@ def response_function_method(
     """
     test.check(model)
     matrix("C", C, (len(model.K), len(model.K)))
-    p, path, s = np.array(p, dtype=float), [], sensor_dofs(model)
+    p, path, s = np.array(p, dtype=float), [], models.sensor_dofs(model)
     clip = MAX_PARAMETER_CHANGE if steps > 1 else np.inf
     o = np.setdiff1d(np.arange(len(model.K)), s)
     w = test.omega[:, None, None]
@@ -404,19 +395,17 @@ def _judged(found: Update, model: Model, test: Measurement) -> Update:
     H = responses(model, found.p, found.zeta, test.omega, test.inputs)
     weight = np.broadcast_to(np.asarray(test.weights, dtype=float), test.H.shape)
     used = weight > 0
-    rows = [likeness(H, test.H, used)]
+    rows = [models.likeness(H, test.H, used)]
     squares = np.abs(np.log(H / test.H) * weight) ** 2
     freedom = max(2 * int(used.sum()) - found.p.size - found.zeta.size, 1)
     variance = squares.sum() / freedom
     if variance > ROUND_OFF**2:
-        rows += worst_rows(squares / variance, used, test.omega, scale=2 / freedom)
+        rows += models.worst_rows(squares / variance, used, test.omega, scale=2 / freedom)
     return replace(found, verdict=Report("updating", tuple(rows)))
 
 
 def weighted(weights: Array | float, r: Complex) -> Array:
     """Weighted residual, or its derivatives (.., n_q), real parts above imaginary parts."""
     weights = np.asarray(weights, dtype=float)
-    if r.ndim == 3:
-        return np.concatenate([(part * weights).ravel() for part in (r.real, r.imag)])
-    weights = weights[..., None] if weights.ndim else weights
-    return np.vstack([(part * weights).reshape(-1, r.shape[-1]) for part in (r.real, r.imag)])
+    weights = weights[..., None] if r.ndim > 3 and weights.ndim else weights
+    return np.concatenate([(part * weights).reshape(-1, *r.shape[3:]) for part in (r.real, r.imag)])

@@ -213,16 +213,13 @@ def modal(model: ParametricModel, zeta: ArrayLike) -> Modal:
         raise ModelError("the changes must leave a mass matrix that is positive.") from error
     elastic, rigid = lam[model.n_rigid :], np.abs(lam[: model.n_rigid]).max(initial=0.0)
     if rigid > RIGID_RTOL * np.abs(elastic).min(initial=np.inf):
-        raise ModelError(
-            f"n_rigid = {model.n_rigid}, but a motion among them has the frequency "
-            f"{np.sqrt(rigid):.4g} rad/s: the structure is held; take n_rigid of what is free."
-        )
+        text = f"n_rigid = {model.n_rigid}, but a motion among them has the frequency"
+        why = "the structure is held; take n_rigid of what is free."
+        raise ModelError(f"{text} {np.sqrt(rigid):.4g} rad/s: {why}")
     lam[: model.n_rigid] = 0.0
     if not (elastic > 0).all():
-        raise ModelError(
-            f"{model.n_rigid} rigid motions leave the eigenvalue {elastic.min():.3g} rad^2/s^2: "
-            "the stiffness must be positive."
-        )
+        text = f"{model.n_rigid} rigid motions leave the eigenvalue {elastic.min():.3g} rad^2/s^2"
+        raise ModelError(f"{text}: the stiffness must be positive.")
     zeta, d = np.asarray(zeta, dtype=float), np.zeros(lam.size)
     if zeta.size > (n := elastic.size):
         raise ConfigError(f"at most {n} damping ratios, of the elastic modes, got {zeta.size}.")

@@ -14,20 +14,11 @@ import numpy as np
 from scipy.linalg import null_space, qr
 
 from rom.arguments import whole
+from rom.components.updating import methods
 from rom.components.updating.family_model import FamilyModel
 from rom.components.updating.frf_data import Complex
 from rom.components.updating.measured import Responses
-from rom.components.updating.methods import (
-    Update,
-    blocks,
-    folded,
-    receptance,
-    solved,
-    through_modes,
-    transfer,
-    update_by_input,
-    weighted,
-)
+from rom.components.updating.methods import Update
 from rom.components.updating.models import AtSensors, Measurement
 from rom.errors import ConfigError
 from rom.model import Array, Index, Mask
@@ -61,8 +52,8 @@ class Data:
     def lines(self, chosen: Index | slice) -> "Data":
         """Some of the lines."""
         names = ("omega", "logarithm", "weight", "common", "varied")
-        of_lines = {name: x for name in names if np.ndim(x := getattr(self, name))}
-        return replace(self, **{name: x[chosen] for name, x in of_lines.items()})
+        every = {name: getattr(self, name) for name in names}
+        return replace(self, **{name: x[chosen] for name, x in every.items() if np.ndim(x)})
 
     def roughly(self) -> "Data":
         """Lines at even distances, with errors that are large enough to start from afar."""
@@ -96,7 +87,7 @@ def responses_at(model: FamilyModel, x: Array, ratios: Array, omega: Array) -> C
     Damping ratios (m,) are those of the lowest elastic modes, the last one of all others too [1].
     """
     modes = model.modal(model.at(x), ratios)
-    return receptance(model.sensors @ modes.Phi, modes.g(omega), model.driven @ modes.Phi)
+    return methods.receptance(model.sensors @ modes.Phi, modes.g(omega), model.driven @ modes.Phi)
 
 
 def sensitivity(
@@ -105,7 +96,7 @@ def sensitivity(
     """As `transfer`, by logarithms of factors and of ratios; arguments as of `responses_at`."""
     here = model.at(x)
     modes = model.modal(here, ratios)
-    return transfer(here, modes, model.driven, ratios.size, shared=True)
+    return methods.transfer(here, modes, model.driven, ratios.size, shared=True)
 
 
 def sums(model: FamilyModel, x: Array, ratios: Array, data: Data) -> Sums:
@@ -114,7 +105,7 @@ def sums(model: FamilyModel, x: Array, ratios: Array, data: Data) -> Sums:
     normal, varied, gradient = np.zeros((n, n)), np.zeros((n, n)), np.zeros(n)
     squares = np.zeros(data.weight.shape)
     at = sensitivity(model, x, ratios)
-    for block in blocks(data.omega.size):
+    for block in methods.blocks(data.omega.size):
         some = data.lines(block)
         w = some.weight
         H, J = at(some.omega)
@@ -221,7 +212,9 @@ def by_equations(
     small = AtSensors(inside)
     rank = whole("rank", min(n_s, needed) if rank is None else rank, 1, n_s, reason="sensors")
     start = x[free], np.full(m, damping)
-    return update_by_input(small, test, *start, rank=rank, limits=inside.ends, prior=prior[free])
+    return methods.update_by_input(
+        small, test, *start, rank=rank, limits=inside.ends, prior=prior[free]
+    )
 
 
 def by_response_functions(
@@ -254,11 +247,11 @@ def by_response_functions(
     def triangle(x: Array, ratios: Array) -> Array:
         here = inside.at(x)
         modes = model.modal(here, ratios)
-        change = through_modes(here, modes, ratios.size, shared=True)
+        change = methods.through_modes(here, modes, ratios.size, shared=True)
         MPhi = here.M @ modes.Phi
         driven, n = modes.Phi.T @ F, x.size + ratios.size
         C, R = (MPhi * modes.d) @ MPhi.T, np.zeros((0, 2 * n + 1))
-        for block in blocks(used.omega.size):
+        for block in methods.blocks(used.omega.size):
             some = used.lines(block)
             w, test, g = some.omega, np.exp(some.logarithm), modes.g(some.omega)
             Z = here.K - w[:, None, None] ** 2 * here.M + 1j * w[:, None, None] * C
@@ -268,11 +261,11 @@ def by_response_functions(
             instruments = change(left, g[:, :, None] * driven, w) / H[..., None]
             J = change(left, MPhi.T @ np.concatenate([test, unseen], axis=1), w) / test[..., None]
             columns = np.concatenate([instruments, J, (1 - H / test)[..., None]], axis=-1)
-            R = folded(R, weighted(1.0, white(columns, some.weight, some.common)))
+            R = methods.folded(R, methods.weighted(1.0, white(columns, some.weight, some.common)))
         return R
 
     options = 2 * used.logarithm.size, inside.ends, prior[free], prior_damping
-    return solved(triangle, (x[free], ratios), *options, enough=LAST_STEP)
+    return methods.solved(triangle, (x[free], ratios), *options, enough=LAST_STEP)
 
 
 def _whole_lines(data: Data) -> Index:
@@ -292,9 +285,8 @@ def _collocated(model: FamilyModel) -> tuple[tuple[int, ...], Array]:
         off = np.linalg.norm(model.sensors[None] - signs[..., None] * row, axis=2)
         sign, sensor = np.unravel_index(off.argmin(), off.shape)
         if off.min() > COLLOCATED_RTOL * np.linalg.norm(row):
-            raise ConfigError(
-                f"input {k} has no sensor at its point and along its direction.",
-                hint="Equations at the sensors need one there; update by responses without.",
-            )
+            text = f"input {k} has no sensor at its point and along its direction."
+            hint = "Equations at the sensors need one there; update by responses without."
+            raise ConfigError(text, hint=hint)
         found.append((int(sensor), signs[int(sign), 0]))
     return tuple(sensor for sensor, _ in found), np.array([sign for _, sign in found])

@@ -18,10 +18,8 @@ def match(family: Family, test: Responses, path: Path) -> None:
     """Draw where the points of a test are, also of one that does not belong to the body."""
     check_ending(path, "a picture", ".png")
     points = np.vstack([test.sensors.points, test.inputs.points])
-    far = cKDTree(_surface(family)[0]).query(points)[0]
-    more = (
-        f"Largest distance of the {len(points)} points from one of the surface: {far.max():.3g} m."
-    )
+    far = cKDTree(_surface(family)[0]).query(points)[0].max()
+    more = f"Largest distance of the {len(points)} points from one of the surface: {far:.3g} m."
     drawn(family, (test.sensors, test.inputs), path, "Points of a vibration test", more)
 
 

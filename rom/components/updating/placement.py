@@ -19,17 +19,9 @@ import numpy.typing as npt
 from rom.arguments import NotNegative, Positive, typed, vector, whole
 from rom.body.flexible import FlexibleBody
 from rom.body.surface import surface_of
+from rom.components.updating import family_model
 from rom.components.updating.estimate import DAMPING_LOG_DEVIATION
-from rom.components.updating.family_model import (
-    Attached,
-    Family,
-    FamilyModel,
-    Held,
-    Parts,
-    check_prior,
-    check_units,
-    family_model,
-)
+from rom.components.updating.family_model import Attached, Family, FamilyModel, Held, Parts
 from rom.components.updating.frf_data import Complex
 from rom.components.updating.measured import DERIVATIVES, Channels
 from rom.components.updating.methods import blocks
@@ -126,7 +118,7 @@ def candidates(body: FlexibleBody | Family, n: int, *, fixed: Held = ()) -> Chan
     axes = np.tile(np.eye(3), (len(points), 1))
     everywhere = Channels(np.repeat(points, 3, axis=0), axes, None if "" in each else owners)
     nothing = np.zeros((0, parts.n))
-    V = family_model(body, (nothing, nothing), {}, {}, fixed).motions
+    V = family_model.family_model(body, (nothing, nothing), {}, {}, fixed).motions
     motion = np.linalg.norm(everywhere.rows(parts.bodies, "candidate") @ V, axis=1).reshape(-1, 3)
     moving = np.flatnonzero(motion.max(axis=1) > INDEPENDENCE_RTOL * motion.max())
     whole("n", n, 1, len(moving), reason="points of the surface that move")
@@ -228,14 +220,14 @@ def place(  # noqa: PLR0913  keywords of one call
     """
     check_damping_ratio(damping)
     bodies = Parts.of(family).bodies
-    check_units(family)
+    family_model.check_units(family)
     if not noise and not floor:
         raise ConfigError("noise and floor are zero, and one of them must be positive.")
     omega = 2 * np.pi * vector("frequencies", frequencies)
     rows = sensors.rows(bodies, "sensor"), inputs.rows(bodies, "input")
     whole("n_sensors", n_sensors, 1, len(rows[0]), reason="candidates")
     whole("n_inputs", n_inputs, 1, len(rows[1]), reason="candidates")
-    model = family_model(family, rows, dict(attached or {}), {}, fixed)
+    model = family_model.family_model(family, rows, dict(attached or {}), {}, fixed)
     order = DERIVATIVES[quantity]
     if floor is None:
         floor = DYNAMIC_RANGE * _largest(model, omega, damping, order)
@@ -275,7 +267,7 @@ def _information(
     model: FamilyModel, omega: Array, damping: float, prior: Mapping[str, float], error: Error
 ) -> tuple[Array, Array, tuple[str, ...]]:
     """What each pair of channels tells (n_s, n_e, n, n), the prior (n, n), and the names (n,)."""
-    check_prior(prior, model.names)
+    family_model.check_prior(prior, model.names)
     x = np.clip(np.zeros(len(model.names)), *model.ends)
     m = model.n_ratios(x, omega.max())
     at, n = sensitivity(model, x, np.full(m, damping)), x.size + m
@@ -336,14 +328,14 @@ def _exchanged(known: Array, blocks: Array, chosen: list[int], n_p: int) -> list
     """The chosen rows after exchanges, each the best one for its place, until none gains."""
     chosen = list(chosen)
     for _ in range(MAX_EXCHANGES):
-        same = True
+        before = chosen.copy()
         for k in range(len(chosen)):
             others = chosen[:k] + chosen[k + 1 :]
             value = gain(known + blocks[others].sum(axis=0) + blocks, n_p)
             now = value[chosen[k]]
             value[others] = -np.inf
             if value.max() > now + GAIN_ATOL:
-                chosen[k], same = int(value.argmax()), False
-        if same:
+                chosen[k] = int(value.argmax())
+        if chosen == before:
             break
     return chosen

@@ -13,18 +13,9 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rom.cli import options
 from rom.cli.answer import Answer, failures, report_data
-from rom.cli.options import (
-    assignment,
-    count,
-    names,
-    number,
-    option,
-    positive,
-    require,
-    typed_number,
-    unique,
-)
+from rom.cli.options import assignment, count, names, number, option, positive, unique
 from rom.cli.output import add_force, checked
 from rom.cli.schemas import FILE, OUTPUT, REPORT, by_name, each, record
 from rom.cli.schemas import number as ratio
@@ -155,7 +146,7 @@ def run(args: argparse.Namespace) -> Answer:
 
     if args.plan is not None:
         return _plan(args)
-    require({"file": args.file}, hint="A test, or --plan for one that is to be made.")
+    options.require({"file": args.file}, hint="A test, or --plan for one that is to be made.")
     family = _family(args)
     outputs = _outputs(args)
     read = {name: getattr(args, name) for name in ("averages", "coherence", "points")}
@@ -172,8 +163,8 @@ def run(args: argparse.Namespace) -> Answer:
     if wrong := sorted(set(args.candidate) - set(outside)):
         raise ConfigError(f"--candidate {wrong[0]} must name a --spring, --joint or --mass.")
     candidates = {name: outside.pop(name) for name in dict.fromkeys(args.candidate)}
-    options = ("free", "tolerance", "residual", "rank", "beside_poles")
-    common |= {name: getattr(args, name) for name in options}
+    search = ("free", "tolerance", "residual", "rank", "beside_poles")
+    common |= {name: getattr(args, name) for name in search}
     found = update(family, test, **common, attached=outside, candidates=candidates)
 
     def write() -> None:
@@ -216,9 +207,8 @@ def _files(args: argparse.Namespace) -> dict[str, Path]:
         pairs.append(("", text) if not file or Path(text).exists() else (name, file))
     if len(pairs) > 1 and not all(name for name, _ in pairs):
         given = ", ".join(file for name, file in pairs if not name)
-        raise ConfigError(
-            f"--family {given}: of several each has a name.", hint="Write --family NAME=FILE."
-        )
+        text = f"--family {given}: of several each has a name."
+        raise ConfigError(text, hint="Write --family NAME=FILE.")
     return {name: Path(file) for name, file in unique(pairs, "--family").items()}
 
 
@@ -231,10 +221,9 @@ def _family(args: argparse.Namespace) -> "Family":
     families = {name: load(file) for name, file in _files(args).items()}
     for name, family in families.items():
         if not isinstance(family, BodyFamily):
-            raise ConfigError(
-                f"{_files(args)[name]} holds one body, without parameters.",
-                hint="Make a family with rom.reduce_parametric and write it with rom.save.",
-            )
+            text = f"{_files(args)[name]} holds one body, without parameters."
+            hint = "Make a family with rom.reduce_parametric and write it with rom.save."
+            raise ConfigError(text, hint=hint)
     if "" in families:
         if args.couple or args.joint:
             raise ConfigError("--couple and --joint need an assembly of several families.")
@@ -260,12 +249,11 @@ def _common(args: argparse.Namespace) -> dict[str, Any]:
         "fixed": tuple(_place("--fixed", text, _files(args)) for text in args.fixed),
         "attached": _outside(args),
         "damping": args.damping,
-        "prior": {name: typed_number("--prior", text) for name, text in prior.items()},
+        "prior": {name: options.typed_number("--prior", text) for name, text in prior.items()},
     }
 
 
 def _plan(args: argparse.Namespace) -> Answer:
-    """Choose the channels of a test."""
     import numpy as np
 
     from rom.components.updating.placement import candidates, place
@@ -273,7 +261,7 @@ def _plan(args: argparse.Namespace) -> Answer:
 
     if args.file is not None or args.candidate:
         raise ConfigError("--plan takes neither a test nor --candidate: it comes before the test.")
-    require({"--lines": args.lines}, hint="For example --lines 20:800, from 20 to 800 Hz.")
+    options.require({"--lines": args.lines}, hint="For example --lines 20:800, from 20 to 800 Hz.")
     output = args.output and checked(args, args.output)
     if output:
         check_ending(output, "a plan", *PLAN_ENDINGS)
@@ -309,7 +297,6 @@ def _plan(args: argparse.Namespace) -> Answer:
 
 
 def _data(args: argparse.Namespace, found: "Updated | Plan") -> dict[str, Any]:
-    """What an update and a plan tell."""
     data = {"family": ", ".join(args.family), "deviations": found.deviations}
     data |= {} if args.output is None else {"output": str(args.output)}
     return data | {"unseen": list(found.unseen)}
@@ -332,8 +319,8 @@ def _outside(args: argparse.Namespace) -> "Attached":
             places = [_place(flag, part, bodies) for part in parts[0].split(",")]
             if len(places) != (n := 1 + (flag == "--joint")):
                 raise ConfigError(f"{shown} names {len(places)} places, needed are {n}.")
-            low, high = (typed_number(flag, part) for part in parts[2:])
-            value = [typed_number(flag, part) for part in parts[1].split(",")]
+            low, high = (options.typed_number(flag, part) for part in parts[2:])
+            value = [options.typed_number(flag, part) for part in parts[1].split(",")]
             if flag == "--mass" and len(value) != 1:
                 raise ConfigError(f"{shown}: a mass must be one number [kg].")
             found[name] = kind(*places, value[0] if flag == "--mass" else value, low, high)

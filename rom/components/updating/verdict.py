@@ -163,10 +163,8 @@ class Updated:
             ConfigError: for lines that are not finite, channels off the body, or no draw.
         """
         whole("n", n, 1, None)
-        seen, driven = (
-            channels.rows(Parts.of(self.family).bodies, what) @ self.model.motions
-            for channels, what in ((sensors, "sensor"), (inputs, "input"))
-        )
+        bodies, V = Parts.of(self.family).bodies, self.model.motions
+        seen, driven = sensors.rows(bodies, "sensor") @ V, inputs.rows(bodies, "input") @ V
         model = replace(self.model, sensors=seen, driven=driven)
         x = self.logarithms
         unknown = [model.labels(self.zeta.size).index(name) for name in self.names]
@@ -174,9 +172,8 @@ class Updated:
         rng = np.random.default_rng(seed)
         theta[:, unknown] += rng.multivariate_normal(np.zeros(len(unknown)), self.covariance, n)
         omega = 2 * np.pi * finite("frequencies", frequencies, None)
-        return np.array(
-            [responses_at(model, row[: x.size], np.exp(row[x.size :]), omega) for row in theta]
-        )
+        pairs = zip(*np.split(theta, [x.size], axis=1), strict=True)
+        return np.array([responses_at(model, y, np.exp(z), omega) for y, z in pairs])
 
     def __str__(self) -> str:
         d = self.deviations
@@ -283,7 +280,6 @@ def _derived(log: Array, used: Mask, lines: Array) -> str:
 def _turned(cosine: Array, used: Mask, unsure: bool) -> dict[str, tuple[str, str]]:
     """Sensors and inputs of which phases run against the model while those of others do not."""
     most, found = 0.0 if unsure else MIN_PHASE_COSINE, {}
-    hint = "Turn its direction, or see whether two cables are exchanged."
     for what, axes in (("sensor", (0, 2)), ("input", (0, 1))):
         mean = (cosine * used).sum(axis=axes) / np.maximum(used.sum(axis=axes), 1)
         for k in range(mean.size):
@@ -292,7 +288,7 @@ def _turned(cosine: Array, used: Mask, unsure: bool) -> dict[str, tuple[str, str
                 found[f"sign of {what} {k}"] = (
                     f"{what} {k} moves against the model (mean cosine of the phase {mean[k]:.2f}; "
                     f"{others:.2f} of the others): it looks turned around.",
-                    hint,
+                    "Turn its direction, or see whether two cables are exchanged.",
                 )
     if mean.max() < most:
         found["sign of all"] = (

@@ -24,16 +24,8 @@ from rom.arguments import typed
 from rom.arguments.quantities import NotNegative
 from rom.body.flexible import FlexibleBody
 from rom.body.recovery import StressRecovery
-from rom.components.updating.family_model import (
-    Attached,
-    FamilyModel,
-    Held,
-    Parts,
-    Structure,
-    family_model,
-    summed,
-    terms_of,
-)
+from rom.components.updating import family_model
+from rom.components.updating.family_model import Attached, FamilyModel, Held, Parts, Structure
 from rom.components.updating.measured import POINT_RTOL, Channels
 from rom.errors import ConfigError, ModelError
 from rom.model import Array, Index
@@ -121,7 +113,7 @@ class Operation:
         dA[:, m : 2 * m] = dacc
         found = []
         for rows in (self.seen, self.wanted):
-            y, dy = summed(rows.carried, self.model.k_powers, x)
+            y, dy = family_model.summed(rows.carried, self.model.k_powers, x)
             C = rows.acceleration @ acc
             C[:, :m] += (y + rows.displacement) / self.scale
             C[:, m : 2 * m] += rows.velocity
@@ -146,7 +138,7 @@ def operation(
     """
     parts = Parts.of(structure)
     nothing = np.eye(parts.n), np.zeros((0, parts.n))
-    model = family_model(structure, nothing, attached, {}, fixed)
+    model = family_model.family_model(structure, nothing, attached, {}, fixed)
     for name in names:
         check_known(name, model.names, f"no parameter {name!r} of family or attached; there are")
     if not model.K.shape[1]:
@@ -163,7 +155,7 @@ def operation(
         XI[: model.n_rigid], XI[:, : model.n_rigid] = 0.0, 0.0  # rigid motion is not damped
     chosen = [model.names.index(name) for name in names]
     sensors, forces, wanted = channels
-    terms = terms_of(structure)
+    terms = family_model.terms_of(structure)
     seen = _rows(parts, terms, V, sensors, "sensor", len(attached))
     asked = _rows(parts, terms, V, wanted, "wanted value", len(attached))
     driven = (forces.rows(parts.bodies, "force") @ V).T
@@ -179,7 +171,6 @@ def _rows(
     what: str,
     n_attached: int,
 ) -> Rows:
-    """Rows of channels, one below the other."""
     k, m, order = sum(len(s.names) for s in several), V.shape[1], ("displacement", "velocity")
     rows = {name: np.zeros((k, m)) for name in (*order, "acceleration")}
     carried, first = np.zeros((len(terms) + n_attached, k, m)), 0
@@ -228,8 +219,8 @@ def stress_rows(
         far = np.linalg.norm(recovery.points - x, axis=1)
         n = int(far.argmin())
         if far[n] > reach:
-            text = f"{what} {k} is {far[n]:.3g} m off the body; at most {reach:.3g} m may be."
-            raise ConfigError(text)
+            off = f"{what} {k} is {far[n]:.3g} m off the body"
+            raise ConfigError(f"{off}; at most {reach:.3g} m may be.")
         a, b, c = d / np.linalg.norm(d)
         along = np.array([a * a, b * b, c * c, 2 * b * c, 2 * a * c, 2 * a * b])
         static.append(along @ recovery.operator[None, 6 * n : 6 * n + 6])
@@ -254,10 +245,9 @@ def check_seen(at: Linear, body: Operation) -> None:
         unseen = [f"force {k}" for k in range(n_e) if x[2 * m + k] > 0.1 * x.max()]
         moving = np.maximum(x[:m], x[m : 2 * m]) > 0.1 * x.max()
         unseen += [f"the motion at {f:.4g} Hz" for f in body.omega[moving] / (2 * np.pi)]
-        raise ModelError(
-            f"the sensors do not see {named(unseen)}, which would drift.",
-            hint="Add a displacement or a stress: accelerations do not see what stands still.",
-        )
+        text = f"the sensors do not see {named(unseen)}, which would drift."
+        hint = "Add a displacement or a stress: accelerations do not see what stands still."
+        raise ModelError(text, hint=hint)
 
 
 def discrete(A: Array, white: Array, dt: float) -> tuple[Array, Array]:

@@ -22,26 +22,9 @@ from rom.arguments import positive, typed
 from rom.arguments.quantities import NotNegative, Positive
 from rom.components.updating.family_model import Attached, Family, Held, check_units
 from rom.components.updating.measured import Channels
-from rom.components.updating.observers.operation import (
-    Linear,
-    Operation,
-    Sensors,
-    discrete,
-    operation,
-    step_derivatives,
-)
-from rom.components.updating.observers.tracking import (
-    Assumed,
-    First,
-    Step,
-    Track,
-    Tracker,
-    Walk,
-    White,
-    checked_record,
-    linear_tracker,
-    recorded,
-)
+from rom.components.updating.observers import operation, tracking
+from rom.components.updating.observers.operation import Linear, Operation, Sensors
+from rom.components.updating.observers.tracking import Track, Tracker
 from rom.errors import ConfigError, ParameterError, SolverError
 from rom.model import Array
 from rom.names import check_known
@@ -73,7 +56,7 @@ class ParameterTracker:
     """
 
     operation: Operation
-    assumed: Assumed
+    assumed: tracking.Assumed
     drifts: Mapping[str, Drift]
     R: Array
     sensors: tuple[Sensors, ...]
@@ -93,11 +76,11 @@ class ParameterTracker:
             ConfigError: for another number of sensors, infinite samples, or unequal steps.
             SolverError: if a parameter leaves the range of its family.
         """
-        y = checked_record(samples, times, len(self.R), self.assumed.dt)
+        y = tracking.checked_record(samples, times, len(self.R), self.assumed.dt)
         first = np.array([d.first for d in self.drifts.values()])
         P = block_diag(self.assumed.before(self.operation), np.diag(first**2))
         n_e = self.operation.driven.shape[1]
-        return recorded(y, P, self.R, n_e, first.size, self.at, LINEAR_REACH)
+        return tracking.recorded(y, P, self.R, n_e, first.size, self.at, LINEAR_REACH)
 
     def at(self, x: Array) -> tuple[Array, Linear, Array]:
         """The point x (n_p,) [1], steps of the equations there, and noise (N, N) [of two states].
@@ -115,9 +98,9 @@ class ParameterTracker:
                 "family with a wider range.",
             )
         rates = o.at(x)
-        step, Q = discrete(rates.A, self.assumed.white(o), dt)
+        step, Q = operation.discrete(rates.A, self.assumed.white(o), dt)
         walks = np.array([d.walk for d in self.drifts.values()])
-        at = replace(rates, A=step, dA=step_derivatives(rates.A, rates.dA, dt))
+        at = replace(rates, A=step, dA=operation.step_derivatives(rates.A, rates.dA, dt))
         return x.copy(), at, block_diag(Q, np.diag(walks**2 * dt))
 
     def held(self, **factors: float) -> Tracker:
@@ -132,7 +115,7 @@ class ParameterTracker:
         for name in factors:
             check_known(name, self.names, f"{name!r} must be one of", ParameterError)
         x = np.log([positive(name, factors.get(name, 1.0)) for name in self.names])
-        return linear_tracker(self.operation, x, self.assumed, self.sensors, self.wanted)
+        return tracking.linear_tracker(self.operation, x, self.assumed, self.sensors, self.wanted)
 
 
 @typed
@@ -143,13 +126,13 @@ def parameter_tracker(  # noqa: PLR0913  keywords of one call
     wanted: Sequence[Sensors],
     *,
     parameters: Mapping[str, Drift],
-    dt: Step,
-    walk: Walk,
+    dt: tracking.Step,
+    walk: tracking.Walk,
     damping: float = 0.01,
     attached: Attached | None = None,
     fixed: Held = (),
-    unmodelled: White = 0.0,
-    first: First = None,
+    unmodelled: tracking.White = 0.0,
+    first: tracking.First = None,
 ) -> ParameterTracker:
     """A filter that also follows parameters: a joint that loosens, a mass that grows.
 
@@ -168,7 +151,7 @@ def parameter_tracker(  # noqa: PLR0913  keywords of one call
         raise ConfigError("no parameter changes.", hint="Use tracker for a body that stays.")
     check_damping_ratio(damping)
     channels, names = (sensors, forces, wanted), tuple(parameters)
-    motion = operation(family, names, dict(attached or {}), channels, damping, fixed)
-    assumed = Assumed(dt, walk, unmodelled, first)
-    R = linear_tracker(motion, np.zeros(len(names)), assumed, sensors, wanted).R
+    motion = operation.operation(family, names, dict(attached or {}), channels, damping, fixed)
+    assumed = tracking.Assumed(dt, walk, unmodelled, first)
+    R = tracking.linear_tracker(motion, np.zeros(len(names)), assumed, sensors, wanted).R
     return ParameterTracker(motion, assumed, dict(parameters), R, tuple(sensors), tuple(wanted))

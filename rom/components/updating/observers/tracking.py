@@ -196,10 +196,9 @@ def steady(A: Array, C: Array, Q: Array, R: Array) -> Array:
             break
         if (np.abs(np.diag(P) - old) <= SETTLED_RTOL * np.diag(P)).all():
             return P
-    raise SolverError(
-        "the filter has no steady state that can be computed.",
-        hint="Give noise that fits the sensors, or leave out modes far above the samples.",
-    )
+    text = "the filter has no steady state that can be computed."
+    hint = "Give noise that fits the sensors, or leave out modes far above the samples."
+    raise SolverError(text, hint=hint)
 
 
 Points = Callable[[Array], tuple[Array, Linear, Array]]
@@ -231,17 +230,10 @@ def recorded(
         if k == len(y):
             break
         point, at, Q = points(z[n:])
-    deviations, end = np.sqrt(np.maximum(variances, 0.0)), n_v + n_forces
-    return Track(
-        values=values[:, :n_v],
-        deviations=deviations[:, :n_v],
-        forces=values[:, n_v:end],
-        force_deviations=deviations[:, n_v:end],
-        surprise=out[2],
-        covariance=P,
-        factors=np.exp(values[:, end:]),
-        factor_deviations=deviations[:, end:],
-    )
+    cuts = [n_v, n_v + n_forces]
+    wanted, pushed, x = np.split(values, cuts, axis=1)
+    by_wanted, by_force, by_factor = np.split(np.sqrt(np.maximum(variances, 0.0)), cuts, axis=1)
+    return Track(wanted, by_wanted, pushed, by_force, out[2], P, np.exp(x), by_factor)
 
 
 def checked_record(
@@ -256,10 +248,9 @@ def checked_record(
     times = finite("times", times, (len(y),))
     steps = np.diff(times)
     for k in np.flatnonzero(np.abs(steps - dt) > TIME_RTOL * dt)[:1]:
-        raise ConfigError(
-            f"the step after t = {times[k]:.9g} s is {steps[k]:.6g} s; it must be {dt:.6g} s.",
-            hint="Put the record on equal steps, with NaN where nothing was measured.",
-        )
+        text = f"the step after t = {times[k]:.9g} s is {steps[k]:.6g} s; it must be {dt:.6g} s."
+        hint = "Put the record on equal steps, with NaN where nothing was measured."
+        raise ConfigError(text, hint=hint)
     return y
 
 

@@ -38,10 +38,9 @@ def side_by_side(
     if not found:
         raise FileFormatError("there is no frequency response to a force.")
     if coherence is None and (silent := sorted(set(found) - set(coherences))):
-        raise FileFormatError(
-            f"there is no coherence of {_some(silent)}.",
-            hint="Give one number, coherence=..., from what is known of the noise.",
-        )
+        text = f"there is no coherence of {_some(silent)}."
+        hint = "Give one number, coherence=..., from what is known of the noise."
+        raise FileFormatError(text, hint=hint)
     sensors, inputs = (sorted({pair[k] for pair in found}) for k in (0, 1))
     x = next(iter(found.values())).x
     keep = x > 0  # no displacement follows from motion at 0 Hz
@@ -85,10 +84,9 @@ class Bodies:
             return node, axis, self.of_nodes.get(node, "")
         found = [name for name in self.names if _entity(name) == entity.lower()]
         if len(found) != 1 and entity.upper() not in ("", "NONE"):
-            raise FileFormatError(
-                f"node {node} is of {entity!r}; bodies are {named(self.names)}.",
-                hint="Name them as the file does, in ten characters that differ.",
-            )
+            text = f"node {node} is of {entity!r}; bodies are {named(self.names)}."
+            hint = "Name them as the file does, in ten characters that differ."
+            raise FileFormatError(text, hint=hint)
         return node, axis, found[0] if found else ""
 
 
@@ -104,9 +102,8 @@ def _by_pair(functions: list[Function], bodies: Bodies) -> dict[tuple[Dof, Dof],
             one, other = map(_dof, pair)
             raise FileFormatError(f"the function of {one} by {other} is no translation by a force.")
         if pair in known:
-            raise FileFormatError(
-                f"{_some([pair])} is there twice.", hint="Keep one run, or average them before."
-            )
+            text = f"{_some([pair])} is there twice."
+            raise FileFormatError(text, hint="Keep one run, or average them before.")
         known[pair] = f
     return known
 
@@ -119,10 +116,9 @@ def _check_lines(f: Function, x: Array) -> None:
 
 def _channels(dofs: list[Dof], points: Points) -> Channels:
     if missing := sorted({dof[0] for dof in dofs} - set(points)):
-        raise FileFormatError(
-            f"nodes without coordinates: {', '.join(map(str, missing[:MAX_NAMED]))}.",
-            hint="Universal files have them in dataset 15 or 2411; else name a file, points=...",
-        )
+        text = f"nodes without coordinates: {', '.join(map(str, missing[:MAX_NAMED]))}."
+        hint = "Universal files have them in dataset 15 or 2411; else name a file, points=..."
+        raise FileFormatError(text, hint=hint)
     axes = np.array([np.sign(axis) * np.eye(3)[abs(axis) - 1] for _, axis, _ in dofs])
     owners = tuple(body for *_, body in dofs)
     if any(owners) and not all(owners):

@@ -92,10 +92,8 @@ def read_responses(
                 raise FileFormatError(f"this is no whole HDF5 file: {error}.") from error
     check_ending(path, "a test", *UNIVERSAL_ENDINGS, *TABLE_ENDINGS, *ARRAY_ENDINGS)
     if averages is None:
-        raise ConfigError(
-            "averages is missing: how many are behind the functions?",
-            hint="Without it the coherence says nothing of random errors.",
-        )
+        text = "averages is missing: how many are behind the functions?"
+        raise ConfigError(text, hint="Without it the coherence says nothing of random errors.")
     more, owners = _points(points)
     with _of(path):
         table = ending in TABLE_ENDINGS

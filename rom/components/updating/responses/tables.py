@@ -64,9 +64,8 @@ def points_of(path: Path) -> tuple[dict[int, Array], dict[int, str]]:
     found = [POINT_COLUMN.fullmatch(name) for name in names[1:]]
     axes = [m.group(1).lower() for m in found if m]
     if axes != ["x", "y", "z"] or len(names) != 4:
-        raise FileFormatError(
-            f"columns {names}: node, x [m], y [m], z [m], and body if there are several."
-        )
+        needed = "node, x [m], y [m], z [m], and body if there are several"
+        raise FileFormatError(f"columns {names}: {needed}.")
     factors = np.array([in_si(m.group(2), "length") for m in found if m])
     nodes = values[:, 0]
     if len(set(nodes)) < len(nodes) or (nodes != np.floor(nodes)).any():
@@ -80,7 +79,6 @@ def _axis(sign: str, axis: str) -> int:
 
 
 def _functions(pair: Pair, own: dict[str, tuple[str, Array]], x: Array) -> list[Function]:
-    """The response and the coherence of one pair."""
     response = set(own) - {"coherence"}
     if response not in ({"real", "imag"}, {"magnitude", "phase"}, set()):
         raise FileFormatError(f"of {pair} there is {sorted(response)} alone.", hint=NAME_HINT)
@@ -112,12 +110,8 @@ def _cells(path: Path, first: re.Pattern[str]) -> tuple[Row, list[tuple[int, Row
             break
     else:
         raise FileFormatError(f"no column is named {first.pattern!r}.")
-    rows = []
-    for number, line in enumerate(rest, above + 1):
-        if not line.strip():
-            continue
-        cells = line.split(separator)
-        rows.append((number, cells))
+    rows = [(n, line.split(separator)) for n, line in enumerate(rest, above + 1) if line.strip()]
+    for number, cells in rows:
         if len(cells) != (n := len(names)):
             raise FileFormatError(f"line {number} has {len(cells)} numbers under {n} names.")
     if not rows:
@@ -139,10 +133,8 @@ def _numbers(rows: list[tuple[int, Row]]) -> Array:
     """(n, columns) numbers of cells, which have no comma where columns stand between commas."""
     found = []
     if all(any(c in x for _, cells in rows for x in cells) for c in ",."):
-        raise FileFormatError(
-            "numbers have commas and points: one of them is of thousands.",
-            hint="Write numbers without separators of thousands.",
-        )
+        text = "numbers have commas and points: one of them is of thousands."
+        raise FileFormatError(text, hint="Write numbers without separators of thousands.")
     for number, cells in rows:
         try:
             found.append([float(cell.strip().strip('"').replace(",", ".")) for cell in cells])

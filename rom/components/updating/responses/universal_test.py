@@ -10,14 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from rom.components.updating.measured import MeasuredModes
+from rom.components.updating.responses import unit_labels
 from rom.components.updating.responses.grid import COHERENCE_KIND
-from rom.components.updating.responses.unit_labels import (
-    IN_G,
-    NO_UNITS,
-    in_si,
-    motion_of_unit,
-    plain,
-)  # fmt: skip
+from rom.components.updating.responses.unit_labels import IN_G, NO_UNITS, plain
 from rom.errors import ConfigError, FileFormatError
 from rom.io.fields.universal import FREQUENCY_RESPONSE, Function, reals, scan
 from rom.io.files import damaged, need
@@ -82,10 +77,9 @@ def _points(others: SETS, factors: tuple[float, float] | None) -> dict[int, Arra
             for node, system, turned, x in nodes:
                 if local and (other := {system, turned} - same):
                     named = [f"{k} {names.get(k, '')}".strip() for k in sorted(other)]
-                    raise FileFormatError(
-                        f"node {node} is in the local coordinate system {', '.join(named)}.",
-                        hint="Export the test in global axes; local ones are not read.",
-                    )
+                    text = f"node {node} is in the local coordinate system {', '.join(named)}."
+                    hint = "Export the test in global axes; local ones are not read."
+                    raise FileFormatError(text, hint=hint)
                 points[node] = x / length
     return points
 
@@ -131,18 +125,18 @@ def _in_si(f: Function, factors: tuple[float, float] | None) -> Function:
         return f
     try:
         if plain(f.abscissa) not in NO_UNITS:
-            f = replace(f, x=f.x * in_si(f.abscissa, "frequency"))
+            f = replace(f, x=f.x * unit_labels.in_si(f.abscissa, "frequency"))
         if f.kind == COHERENCE_KIND:
             return f
         replace(f, x=np.ones(1), y=np.ones(1)).receptance()  # refuses what is no response
         motion, force = (1 / k for k in factors or (1.0, 1.0))
         if plain(f.units[0]) not in NO_UNITS:
-            kind, own = motion_of_unit(f.units[0])
+            kind, own = unit_labels.motion_of_unit(f.units[0])
             if kind != f.numerator:
                 raise ConfigError(f"its numerator needs unit {f.numerator}, got {f.units[0]!r}.")
             motion = _agreed(own, motion if factors and plain(f.units[0]) not in IN_G else own)
         if plain(f.units[1]) not in NO_UNITS:
-            own = in_si(f.units[1], "force")
+            own = unit_labels.in_si(f.units[1], "force")
             force = _agreed(own, force if factors else own)
     except ConfigError as error:
         where = f"function of {f.response} by {f.reference}"
@@ -152,10 +146,9 @@ def _in_si(f: Function, factors: tuple[float, float] | None) -> Function:
 
 def _agreed(label: float, units: float) -> float:
     if abs(label / units - 1) > UNITS_RTOL:
-        raise ConfigError(
-            f"the unit at its axis is {label / units:.4g} times that of dataset 164.",
-            hint="Correct one of the two in the file; which is right is not known here.",
-        )
+        text = f"the unit at its axis is {label / units:.4g} times that of dataset 164."
+        hint = "Correct one of the two in the file; which is right is not known here."
+        raise ConfigError(text, hint=hint)
     return label
 
 
