@@ -14,6 +14,7 @@ from rom.cli.options import (
     unique,
     verb_parsers,
 )
+from rom.config.component import quickly_solved, source
 from rom.errors import ConfigError
 from rom.model import FEModel, Index
 from rom.names import is_whole, named
@@ -63,8 +64,6 @@ def read_model(args: argparse.Namespace) -> FEModel:
 
 def read_matrices(args: argparse.Namespace) -> FEModel:
     """The model of the matrices the options name."""
-    from rom.config.component import quickly_solved, source
-
     parser = verb_parsers(args.parser)[args.verb]
     odd = [name for name in GEOMETRY_OPTIONS if getattr(args, name) != parser.get_default(name)]
     if odd:

@@ -10,6 +10,7 @@ import numpy as np
 
 from rom.arguments import NotNegative, Number, Positive, Quantity
 from rom.errors import ConfigError
+from rom.fe.mesh.picks import picks
 from rom.material import SOLIDS
 from rom.model import Material
 from rom.names import check_once, is_whole
@@ -221,8 +222,6 @@ def faces(pairs: list[tuple[str, str]]) -> dict[str, str]:
 
 def face(text: str, option: str) -> str:
     """The text, if it picks a face."""
-    from rom.fe.mesh.picks import picks
-
     try:
         picks(text)
     except ConfigError as error:

@@ -33,7 +33,7 @@ def add_force(parser: argparse.ArgumentParser) -> None:
 def checked(
     args: argparse.Namespace, path: Path, kind: str = "", *, inputs: Iterable[Path] = ()
 ) -> Path:
-    """The path, if the verb may write it; to be asked before the computation.
+    """The path, if the verb may and can write it; to be asked before the computation.
 
     One rank writes, and looks for all. Options and inputs name what is read. The kind is a key of
     `rom.io.ours.FILE_SIGNS`; that of the ending if not given.
@@ -42,16 +42,12 @@ def checked(
 
     ending = path.suffix.lower().removeprefix(".")
     kind = kind or KIND_OF_ENDING.get(ending, ending)
-    sources = [*inputs, *_inputs(args)]
-    return on_first_rank(lambda: check_replaceable(path, kind, inputs=sources, force=args.force))
-
-
-def check_encoder(paths: Iterable[Path]) -> None:
-    """Refuse a film that cannot be made before the motion is computed."""
-    if any(path.suffix == ".mp4" for path in paths):
+    if kind == "mp4":
         from rom.view.canvas.films import encoder
 
         encoder()
+    sources = [*inputs, *_inputs(args)]
+    return on_first_rank(lambda: check_replaceable(path, kind, inputs=sources, force=args.force))
 
 
 def usual(args: argparse.Namespace, ending: str) -> Path:

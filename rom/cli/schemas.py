@@ -109,7 +109,7 @@ VERBS: dict[str, Schema] = {
         optional=("demos", "results", "files"),
         demos=by_name(by_name(text("one of them"), "its title, needs and time"), "what there is"),
         results=by_name(by_name(number("one of them"), "value, expected, tolerance"), "numbers"),
-        files=each(text("file"), "files written"),
+        files=FILES,
     ),
     "mesh": record(
         "what a mesh holds",
@@ -136,9 +136,8 @@ VERBS: dict[str, Schema] = {
             "interfaces",
         ),
         ties=by_name(whole("nodes of the deck"), "rigid and averaging elements of a deck"),
-        masses=each(
-            record("a mass", interface=text("what carries it"), mass=number("[kg]")),
-            "point masses of a deck",
+        masses=rows(
+            "point masses of a deck", interface=text("what carries it"), mass=number("[kg]")
         ),
         springs=each(text("its name"), "springs of a deck"),
         faces=FACES,

@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import TextIO
 
 from rom.cli.answer import Answer, to_json
 from rom.errors import QualityGateError, RomError, RomWarning
@@ -43,7 +44,7 @@ def present(answer: Answer, remarks: list[str], options: OutputOptions) -> None:
         say(answer.text)
     if answer.failed:
         more = f", and {len(answer.failed) - 1} more" if len(answer.failed) > 1 else ""
-        print_to_stderr(f"error: {answer.failed[0]}{more}.")
+        say(f"error: {answer.failed[0]}{more}.", sys.stderr)
 
 
 def print_error(error: RomError, options: OutputOptions, rank: int = 0) -> None:
@@ -53,9 +54,9 @@ def print_error(error: RomError, options: OutputOptions, rank: int = 0) -> None:
     if options.json:
         own = {"message": cause, "hint": error.hint, "exit_code": error.exit_code}
         say(to_json({"ok": False, "error": type(error).__name__, **own}))
-    print_to_stderr("error: " + (f"rank {rank}: " if rank else "") + cause)
+    say("error: " + (f"rank {rank}: " if rank else "") + cause, sys.stderr)
     if error.told_hint:
-        print_to_stderr(f"hint: {' '.join(error.told_hint.split())}")
+        say(f"hint: {' '.join(error.told_hint.split())}", sys.stderr)
 
 
 @contextmanager
@@ -71,7 +72,7 @@ def speaking(options: OutputOptions, *, verbose: bool) -> Iterator[list[str]]:
             raise QualityGateError(text, hint="Without --strict this is a warning.")
         remarks.append(text)
         if verbose and not options.quiet:
-            print_to_stderr(f"warning: {text}")
+            say(f"warning: {text}", sys.stderr)
 
     log, handler = logging.getLogger("rom"), logging.StreamHandler()
     level = logging.DEBUG if options.verbose else logging.INFO
@@ -91,13 +92,8 @@ def speaking(options: OutputOptions, *, verbose: bool) -> Iterator[list[str]]:
         log.propagate = True
 
 
-def say(text: str) -> None:
-    """A line on stdout."""
-    sys.stdout.write(text + "\n")
-    sys.stdout.flush()
-
-
-def print_to_stderr(text: str) -> None:
-    """A line on stderr."""
-    sys.stderr.write(text + "\n")
-    sys.stderr.flush()
+def say(text: str, to: TextIO | None = None) -> None:
+    """A line on stdout, or on another stream."""
+    stream = to or sys.stdout
+    stream.write(text + "\n")
+    stream.flush()

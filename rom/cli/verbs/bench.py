@@ -4,18 +4,13 @@ import argparse
 import importlib
 import logging
 import sys
-from collections.abc import Iterator
 from dataclasses import asdict
 from types import ModuleType
-from typing import TYPE_CHECKING
 
 from rom.cli.answer import Answer, table
 from rom.cli.options import option
 from rom.errors import ConfigError
 from rom.places import FOLDER_ABOVE
-
-if TYPE_CHECKING:
-    from benchmarks.benchmarks import Figure
 
 log = logging.getLogger("rom")
 SOURCE_FILES = ("pyproject.toml", "benchmarks/benchmarks.py")  # beside the package
@@ -38,7 +33,10 @@ def run(args: argparse.Namespace) -> Answer:
     if args.list:
         about = {name: (f.__doc__ or "").split("\n")[0] for name, f in known.BENCHMARKS.items()}
         return Answer({"benchmarks": about}, table(("benchmark", ""), about.items()))
-    figures = list(_told(known.run(tuple(args.names))))
+    figures = []
+    for f in known.run(tuple(args.names)):  # told one by one: a benchmark takes minutes
+        log.info("%s: %s %.4g %s", f.case, f.quantity, f.value, f.unit)
+        figures.append(f)
     rows = [
         (f"{f.benchmark}, {f.case}: {f.quantity}", f"{f.value:.4g} {f.unit}".strip(), f.aim)
         for f in figures
@@ -55,10 +53,3 @@ def _of_the_source() -> ModuleType:
         )
     sys.path.insert(0, str(FOLDER_ABOVE))
     return importlib.import_module("benchmarks.benchmarks")
-
-
-def _told(figures: "Iterator[Figure]") -> "Iterator[Figure]":
-    """The figures, each said as soon as it is measured: a benchmark takes minutes."""
-    for figure in figures:
-        log.info("%s: %s %.4g %s", figure.case, figure.quantity, figure.value, figure.unit)
-        yield figure

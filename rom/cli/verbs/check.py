@@ -11,6 +11,7 @@ from pathlib import Path
 import rom
 from rom.cli.answer import Answer, failures, report_data
 from rom.cli.described import TOML_SUFFIX, described
+from rom.config.document import read_document
 from rom.readable import check_readable
 
 SUMMARY = "check a body file and print its certificate"
@@ -59,10 +60,8 @@ def run(args: argparse.Namespace) -> Answer:
     from rom.io.native import load
 
     ending = args.file.suffix.lower()
-    if described(args):
-        return _description(args.file)
     if ending not in BODIES:
-        return _told(args.file, *_kind(args.file))
+        return _told(args.file, *(_description if described(args) else _kind)(args.file))
     if ending == ".sid_fem":
         record = rom.read_sid(args.file, ge="as_written")
         report, told = rom.io.check_sid(record), {"name": record.name, "dialect": record.dialect}
@@ -99,11 +98,9 @@ def _told(file: Path, what: str, *commands: str) -> Answer:
     return Answer({"file": str(file), "kind": what, "next": then}, text)
 
 
-def _description(file: Path) -> Answer:
-    from rom.config.document import read_document
-
+def _description(file: Path) -> tuple[str, ...]:
     if "bodies" in read_document(file).data:
         rom.read_mechanism(file)
-        return _told(file, "a mechanism without mistakes", "rom simulate {}", "rom view {}")
+        return "a mechanism without mistakes", "rom simulate {}", "rom view {}"
     rom.read_component(file)
-    return _told(file, "a component without mistakes", "rom reduce {}", "rom modes {}")
+    return "a component without mistakes", "rom reduce {}", "rom modes {}"

@@ -3,6 +3,7 @@
 import argparse
 
 from rom.cli.answer import Answer
+from rom.cli.options import options_of, verb_parsers
 
 SUMMARY = "print completion for a shell"
 EXAMPLES = """\
@@ -33,8 +34,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> Answer:
     """Build the text from the grammar, so that it never lags behind."""
-    from rom.cli.options import options_of, verb_parsers
-
     verbs = verb_parsers(args.parser)
     cases = "\n".join(
         f'        {name}) [[ "$word" == -* ]] && COMPREPLY=($(compgen -W '

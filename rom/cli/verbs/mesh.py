@@ -135,10 +135,8 @@ def _text(data: Data) -> str:
         f"size {box} m, volume {data['volume']:.6g} m^3",
         f"quality: {quality}",
     ]
-    if data["parameters"]:
-        parts.append(
-            "parameters: " + ", ".join(f"{k} = {x:.6g}" for k, x in data["parameters"].items())
-        )
+    given = ", ".join(f"{name} = {x:.6g}" for name, x in data["parameters"].items())
+    parts += [f"parameters: {given}"] if given else []
     parts += [f"tie {name}: {n} nodes of the deck" for name, n in data["ties"].items()]
     parts += [f"mass of {one['mass']:.6g} kg on {one['interface']}" for one in data["masses"]]
     parts += [f"spring {name}" for name in data["springs"]]

@@ -88,10 +88,12 @@ def _by_options(args: argparse.Namespace) -> "tuple[rom.FlexibleBody, Path]":
     require(needed, "A body needs an interface, for example -i pin_a=rbe2.")
     name = args.name or args.file.stem
     output = _checked(args, args.output, name)
-    chosen, damping = method(args), _damping(args)
+    settings = {key: getattr(args, key) for key in SETTINGS if getattr(args, key) is not None}
+    method = chosen(settings, full=any(kind == "full" for _, kind in args.interface))
+    damping = _damping(args)
     body = rom.reduce(
         read_model(args),
-        method=chosen,
+        method=method,
         interfaces=unique(args.interface, "-i"),
         reference=args.reference[0] if len(args.reference) == 1 else args.reference,
         damping=damping,
@@ -138,9 +140,3 @@ def _text(body: "rom.FlexibleBody", output: Path) -> str:
     lowest = ", ".join(f"{support} {table['reduced'][0]:.5g} Hz" for support, table in compared)
     about = f"lowest elastic frequency: {lowest}; it depends on how the body is held"
     return f"{head}\n{about}\n\n{body.certificate}"
-
-
-def method(args: argparse.Namespace) -> "rom.reduction.Method | rom.reduction.Characteristic":
-    """The method the options ask for; `rom.config.methods.chosen` refuses contradictions."""
-    settings = {key: getattr(args, key) for key in SETTINGS if getattr(args, key) is not None}
-    return chosen(settings, full=any(kind == "full" for _, kind in args.interface))

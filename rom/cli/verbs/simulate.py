@@ -15,7 +15,7 @@ import rom
 from rom.cli.answer import Answer, failures, report_data
 from rom.cli.described import described, mechanism
 from rom.cli.options import ACCELERATION, DURATION, add_meshing, option, require, vector
-from rom.cli.output import add_force, check_encoder, checked, claim, files_in, typed_command, usual
+from rom.cli.output import add_force, checked, claim, files_in, typed_command, usual
 from rom.cli.verbs.swing import pendulum
 from rom.names import inside
 from rom.process.launcher import ranks
@@ -71,7 +71,6 @@ def _mechanism(args: argparse.Namespace) -> Answer:
     paths = paths_of(file, claim(args))
     for path in paths:
         checked(args, path, inputs=files_in(file.values))
-    check_encoder(paths)
     keep = _keeping(args, made_from(file))
     origin = {"command": typed_command(args), "version": rom.__version__}
 
@@ -196,7 +195,6 @@ def _pendulum(args: argparse.Namespace) -> Answer:
     tables = [path.with_suffix(f".history.{args.history}")] if args.history else []
     last = (folder / SCENE_FILE, folder / RECORD_FILE)
     paths = [checked(args, each) for each in (path, *films, *tables, *last)]
-    check_encoder(films)
     hung = {"axis": args.axis, "gravity": args.gravity, "hinge": args.hinge}
     made_from = {f"--{name}": repr(value) for name, value in hung.items()}
     keep = _keeping(args, made_from | {str(args.file): file_digest(args.file)})

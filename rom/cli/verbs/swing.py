@@ -37,7 +37,8 @@ from rom.cli.options import (
     reading,
     unique,
 )
-from rom.cli.output import add_force, check_encoder, checked, claim, typed_command, usual
+from rom.cli.output import add_force, checked, claim, typed_command, usual
+from rom.fe.mesh.picks import is_pick
 from rom.model import Array
 from rom.names import inside
 from rom.process.child import end, python, start
@@ -163,14 +164,11 @@ def _files(args: argparse.Namespace) -> dict[str, Path]:
     paths |= {name: folder / name for name in (TABLE_FILE, SCENE_FILE, RECORD_FILE)}
     for path in paths.values():
         checked(args, path)
-    check_encoder(paths.values())
     return paths
 
 
 def hinge_of(text: str) -> tuple[str, dict[str, str]]:
     """Name of the interface, and the face to pick for it if it has none."""
-    from rom.fe.mesh.picks import is_pick
-
     return ("hinge", {"hinge": face(text, "--hinge")}) if is_pick(text) else (text, {})
 
 
