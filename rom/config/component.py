@@ -13,17 +13,15 @@ from rom.config.document import Document, KeyPath, Values, read_document
 from rom.config.keys import Place, read_table, read_value
 from rom.config.methods import chosen
 from rom.errors import ConfigError, RomError
+from rom.model import Attachment, FEModel, Material, Orthotropic
 from rom.units import LENGTH, in_si, unit
 
 if TYPE_CHECKING:
     from rom.body.damping import ModalDamping, Rayleigh
     from rom.body.flexible import FlexibleBody
     from rom.body.nonlinear.ranges import Geometric
-    from rom.model import Attachment, FEModel, Material, Orthotropic
 
-    Solid = Material | Orthotropic
-
-
+Solid = Material | Orthotropic
 MANY_FOR_SCIPY = 20_000  # dofs, from where its factor takes longer than MUMPS to start
 COUNTS = {"modes": "n_modes", "shapes": "n_shapes", "steps": "n_steps"}  # key: their name in Python
 
@@ -86,11 +84,11 @@ class Component(Described):
             name: self._parameter(name, value, scale)
             for name, value in geometry.get("parameters", {}).items()
         }
-        how = {"faces": geometry.get("faces", {}), "scale": scale, "order": geometry.get("order")}
-        how["units"] = geometry["units"]
-        return geometry["file"], {"parameters": parameters} | how | self.meshing
+        how = {"parameters": parameters, "scale": scale, "units": geometry["units"]}
+        how |= {"faces": geometry.get("faces", {}), "order": geometry.get("order")}
+        return geometry["file"], how | self.meshing
 
-    def model(self) -> "FEModel":
+    def model(self) -> FEModel:
         """The finite element model; a geometry needs FEniCSx."""
         given = [name for name in ("geometry", "matrices") if name in self.values]
         if len(given) != 1:
@@ -104,7 +102,7 @@ class Component(Described):
 
         return model(file, degree=geometry["degree"], solver=geometry["solver"], **keywords)
 
-    def body(self, model: "FEModel | None" = None) -> "FlexibleBody":
+    def body(self, model: FEModel | None = None) -> "FlexibleBody":
         """The reduced body, of a model that is there already or of its own."""
         from rom.workflow import reduce
 
@@ -121,7 +119,7 @@ class Component(Described):
         how |= {"interfaces": kinds, "name": self.name}
         return reduce(model or self.model(), nonlinear=self.nonlinear(), **how)
 
-    def material(self) -> "Solid | dict[str, Solid] | None":
+    def material(self) -> Solid | dict[str, Solid] | None:
         """`Material`, `Orthotropic`, or a dictionary of them by region; None for that of a deck."""
         from rom.fe.mesh.read import is_deck
 
@@ -170,9 +168,7 @@ class Component(Described):
             raise ConfigError(f"[{name}] is missing; it is needed.", where=str(self.document.path))
         return self.values[name]
 
-    def _solid(self, values: Values, *path: str) -> "Solid":
-        from rom.model import Material, Orthotropic
-
+    def _solid(self, values: Values, *path: str) -> Solid:
         with self.at(*path):
             if "G" not in values:
                 return Material(**values)
@@ -192,12 +188,10 @@ class Component(Described):
         with place.told():
             return in_si(value, symbol)
 
-    def _attachments(self) -> "list[Attachment]":
-        from rom.model import Attachment
-
+    def _attachments(self) -> list[Attachment]:
         return [Attachment(**values) for values in self.values.get("attachments", {}).values()]
 
-    def _matrices(self) -> "FEModel":
+    def _matrices(self) -> FEModel:
         from rom.io.matrices.node_files import read_node_sets
         from rom.io.matrices.read_model import read_model
 
@@ -226,7 +220,7 @@ def source(text: str, folder: Path = Path()) -> str | tuple[str, str]:
     return str(folder / text)
 
 
-def quickly_solved(model: "FEModel") -> "FEModel":
+def quickly_solved(model: FEModel) -> FEModel:
     """The same, large matrices by MUMPS where it is installed."""
     if model.n_dofs < MANY_FOR_SCIPY or find_spec("dolfinx") is None:
         return model

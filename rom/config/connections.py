@@ -5,6 +5,10 @@ from dataclasses import dataclass
 from inspect import signature
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from rom import rotation
+from rom.arguments import unit_vector
 from rom.config.document import Values
 from rom.config.keys import Place, Variants, nearest
 from rom.config.laws import Law, check_points, law_of
@@ -82,9 +86,8 @@ def _plainly(entry: Entry) -> None:
 
 def _drive(entry: Entry) -> None:
     law = entry.law("law")
-    functions = {"rate": law.rate, "acceleration": law.acceleration}
-    (joint,) = entry.ends
-    entry.made.drive(entry.name, joint, law.value, **functions)
+    how = {"rate": law.rate, "acceleration": law.acceleration}
+    entry.made.drive(entry.name, *entry.ends, law.value, **how)
 
 
 def _motor(entry: Entry) -> None:
@@ -101,8 +104,6 @@ def _motor(entry: Entry) -> None:
 
 
 def _load(entry: Entry) -> None:
-    import numpy as np
-
     vector: Any = np.array(entry.values["vector"])
     if "factor" in entry.values:
         vector = entry.times(vector)
@@ -128,11 +129,6 @@ def _bushing(entry: Entry) -> None:
     for key in ("stiffness", "damping"):
         entry.values[key] = [*entry.values[key], *entry.values.pop(f"turning_{key}")]
     _plainly(entry)
-
-
-def _law(entry: Entry) -> None:
-    kind = entry.values.pop("kind")
-    LAWS[kind](entry)
 
 
 def _line(entry: Entry) -> None:
@@ -198,8 +194,6 @@ class Condition:
 
     def distance(self, instant: "Instant") -> Measured:
         """Of two markers."""
-        import numpy as np
-
         one, two = self.follow
         gap = instant.position(two.body, two) - instant.position(one.body, one)
         slide = instant.velocity(two.body, two) - instant.velocity(one.body, one)
@@ -217,8 +211,6 @@ def condition_of(ends: list[Any], values: Values, place: Place) -> Condition:
         follow = ((ends[0], values["coordinate"]),)
     axis = None
     if "axis" in values:
-        from rom.arguments import unit_vector
-
         axis = unit_vector(f"axis of {place.path[-1]}", values["axis"])
     formula = None
     if "expression" in values:
@@ -248,7 +240,7 @@ CALLS: dict[str, Callable[[Entry], None]] = {
     "torques": _load,
     "spread_loads": _spread,
     "bushings": _bushing,
-    "laws": _law,
+    "laws": lambda entry: LAWS[entry.values.pop("kind")](entry),
     "events": _event,
 }
 LAWS: dict[str, Callable[[Entry], None]] = {
@@ -267,9 +259,6 @@ def check_name(name: str) -> None:
 
 def pose_of(values: Values) -> Values:
     """Where the frame of a body is at the start, and how it moves."""
-    from rom import rotation
-    from rom.arguments import unit_vector
-
     given = ("at", "orientation", "velocity", "omega")
     pose: Values = {key: values[key] for key in given if key in values}
     turned = pose.get("orientation")

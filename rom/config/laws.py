@@ -4,6 +4,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from rom.arguments import Ascending, Positive, Quantity
 from rom.config.document import Values
 from rom.config.expressions import formula_kind
@@ -112,8 +114,6 @@ class ByCoordinate:
 
 def law_of(values: Any, place: Place, *, t_end: float | None = None, trust: bool = False) -> Law:
     """The functions of a law, as `law_kind` has read it, asked for until t_end [s]."""
-    import numpy as np
-
     values = dict(values) if isinstance(values, Mapping) else {"kind": "constant", "value": values}
     kind = values.pop("kind")
     if kind == "constant":
@@ -151,8 +151,6 @@ def _polynomial(start: float, slope: float) -> Law:
 
 
 def _harmonic(values: Values) -> Law:
-    import numpy as np
-
     A, w, phase = values["amplitude"], 2 * np.pi * values["frequency"], values["phase"]
     return Law(
         lambda t: values["mean"] + A * np.sin(w * t + phase),

@@ -4,7 +4,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rom.arguments import typed
+import numpy as np
+
+from rom.arguments import start_pose, typed
 from rom.config.component import Described, change, located, read_component
 from rom.config.connections import GROUND, Entry, check_name, pose_of
 from rom.config.document import Values, read_document
@@ -14,6 +16,7 @@ from rom.config.mechanism_keys import mechanism_table, sections
 from rom.config.python_files import check_trust, python_entries
 from rom.errors import ConfigError, warn
 from rom.fields import find
+from rom.rotation import matrix
 
 if TYPE_CHECKING:
     from rom.mbs.integrate.keeping import Keeping
@@ -105,8 +108,6 @@ class MechanismFile(Described):
 
     def _warn_if_apart(self, made: "Mechanism", name: str) -> None:
         """Two points that are to be one should be near each other at the start."""
-        import numpy as np
-
         joint = made.joints[name]
         if not joint.one_point:
             return
@@ -194,11 +195,6 @@ def _add_body(made: "Mechanism", name: str, values: Values, meshing: Values) -> 
 
 def _add_rigid_from(made: "Mechanism", name: str, known: "MassProperties", values: Values) -> None:
     """A rigid body with the mass properties and interfaces of a body or a component."""
-    import numpy as np
-
-    from rom.arguments import start_pose
-    from rom.rotation import matrix
-
     mass, centre, inertia, points = known
     pose = (values.get(key) for key in ("orientation", "velocity", "omega"))
     at, p, velocity, omega = start_pose(values["at"], *pose)
@@ -218,8 +214,6 @@ def _add_rigid_from(made: "Mechanism", name: str, known: "MassProperties", value
 
 def _mass_of(file: Path, meshing: Values) -> "MassProperties":
     """Mass, centre (3,), inertia (3, 3) about it, and interface points by name."""
-    import numpy as np
-
     from rom.io.native import load
 
     if file.suffix == ".toml":
