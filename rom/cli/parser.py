@@ -7,7 +7,10 @@ from types import ModuleType
 from typing import NoReturn
 
 from rom import fields
+from rom.cli.answer import to_json
 from rom.cli.options import options_of, verb_parsers
+from rom.cli.schemas import schema
+from rom.cli.speech import say
 from rom.config.keys import nearest
 from rom.errors import ConfigError, UnknownNameError
 
@@ -42,10 +45,6 @@ class ShowSchema(argparse.Action):
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
         """Print and leave."""
-        from rom.cli.answer import to_json
-        from rom.cli.schemas import schema
-        from rom.cli.speech import say
-
         say(to_json(schema(parser.prog.split()[-1])))
         parser.exit()
 

@@ -41,6 +41,18 @@ class Place:
         """An error about this key, which says file and line."""
         return ConfigError(message, where=self.document.where(self.path), hint=hint)
 
+    def note(self, message: str, hint: str = "") -> None:
+        """Collect a mistake."""
+        self.mistakes.append(self.error(message, hint))
+
+    @contextmanager
+    def noted(self) -> Iterator[None]:
+        """Errors from within are collected."""
+        try:
+            yield
+        except ConfigError as error:
+            self.mistakes.append(error)
+
     def refuse(self, value: object, wanted: str) -> NoReturn:
         """Raise the error of a value, with a sentence about what is wanted behind it."""
         raise self.error(f"{self.name} = {shortened(value)}{wanted}.")
@@ -229,23 +241,20 @@ class Table:
         """Values by key: those given, and defaults that are values."""
         if not isinstance(value, Mapping):
             place.refuse(value, f": needed is a table [{place.name}]")
-        known = {key.name: key for key in self.keys}
+        known = [key.name for key in self.keys]
+        inside = f" in [{place.name}]" if place.path else ""
         for name in value:
             if name not in known:
-                place.mistakes.append(unknown(name, tuple(known), place))
+                place.at(name).note(f"there is no key {name!r}{inside}.", nearest(name, known))
         found: Values = {}
         for key in self.keys:
-            if key.name in value:
-                collect(found, key.name, key.kind, value[key.name], place)
+            if key.name in value or key.default == {}:  # a table of its own defaults
+                given = value.get(key.name, {})
+                with place.noted():
+                    found[key.name] = read_value(key.kind, given, place.at(key.name))
             elif key.default is ...:
-                inside = f" in [{place.name}]" if place.path else ""
-                place.mistakes.append(
-                    place.error(
-                        f"{key.name} is missing{inside}.", f"{key.about[:-1]}: {key.kind.summary}."
-                    )
-                )
-            elif key.default == {}:  # a table of its own defaults
-                collect(found, key.name, key.kind, {}, place)
+                hint = f"{key.about[:-1]}: {key.kind.summary}."
+                place.note(f"{key.name} is missing{inside}.", hint)
             elif key.default is not None:
                 found[key.name] = key.default
         return found
@@ -269,12 +278,10 @@ class Named:
             place.refuse(value, f": needed is a {self.summary}")
         found: Values = {}
         for name, item in value.items():
-            try:
+            with place.noted():
                 with place.told():
                     check_text(name, self.what)
                 found[name] = read_value(self.kind, item, place.at(name))
-            except ConfigError as error:
-                place.mistakes.append(error)
         return found
 
 
@@ -323,20 +330,6 @@ class Either:
     def read(self, value: object, place: Place) -> object:
         """Either form."""
         return read_value(self.table if isinstance(value, Mapping) else self.short, value, place)
-
-
-def collect(found: Values, name: str, kind: Kind, value: object, place: Place) -> None:
-    """Read one value into a dictionary; a mistake goes to the others."""
-    try:
-        found[name] = read_value(kind, value, place.at(name))
-    except ConfigError as error:
-        place.mistakes.append(error)
-
-
-def unknown(name: str, known: tuple[str, ...], place: Place) -> ConfigError:
-    """The error of a key that does not exist, with the nearest that does."""
-    inside = f" in [{place.name}]" if place.path else ""
-    return place.at(name).error(f"there is no key {name!r}{inside}.", nearest(name, known))
 
 
 def nearest(word: str, known: Iterable[object]) -> str:

@@ -146,17 +146,16 @@ class MechanismFile(Described):
         for key, one in made.nonlinear.items():  # its ends, and all frames by number
             names[key] = [*one.body.places, *map(str, range(len(one.parts)))]
         if body not in names:
-            place.mistakes.append(place.error(f"there is no body {body!r}.", nearest(body, names)))
+            place.note(f"there is no body {body!r}.", nearest(body, names))
             return
         rod = made.nonlinear.get(body)
         if isinstance(where, str) and where not in names[body]:
             what = "the ground has no point" if body == GROUND else f"body {body!r} has no marker"
             known = names[body] if rod is None else rod.body.places
-            place.mistakes.append(place.error(f"{what} {where!r}.", nearest(where, known)))
+            place.note(f"{what} {where!r}.", nearest(where, known))
         elif not isinstance(where, str) and rod is not None:
             frames = f'"{body}.start", "{body}.end" or "{body}.3" for its frame 3'
-            what = f"rod {body!r} has no points of its own."
-            place.mistakes.append(place.error(what, f"Write {frames}."))
+            place.note(f"rod {body!r} has no points of its own.", f"Write {frames}.")
 
 
 def _markers(found: Any) -> list[Any]:

@@ -133,17 +133,7 @@ def _bodies(
 
 
 def _numbers(part: Part) -> Values:
-    vectors = {
-        "inertia": np.trace(part.second) * np.eye(3) - part.second,
-        "at": part.at,
-        "orientation": part.p,
-        "velocity": part.velocity,
-        "omega": part.omega,
-        "spin": part.spin,
-    }
-    points = {name: np.asarray(x).tolist() for name, x in part.points.items()}
-    return {
-        "mass": float(part.mass),
-        "markers": points,
-        **{name: value.tolist() for name, value in vectors.items()},
-    }
+    found = {name: getattr(part, name).tolist() for name in ("at", "velocity", "omega", "spin")}
+    found |= {"mass": float(part.mass), "orientation": part.p.tolist()}
+    found["inertia"] = (np.trace(part.second) * np.eye(3) - part.second).tolist()
+    return found | {"markers": {name: np.asarray(x).tolist() for name, x in part.points.items()}}

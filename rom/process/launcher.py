@@ -18,11 +18,8 @@ YIELD_VARIABLE = "OMPI_MCA_mpi_yield_when_idle"
 OPEN_MPI_FILE = r"/\S*libopen-pal\S*\.so\S*$"
 OPEN_MPI_CALLS = ("opal_progress_set_yield_when_idle",)
 OPENBLAS_FILE = r"/\S*openblas\S*\.so\S*$"
-OPENBLAS_CALLS = (  # each build has one of them
-    "openblas_set_num_threads",
-    "openblas_set_num_threads64_",
-    "scipy_openblas_set_num_threads",
-    "scipy_openblas_set_num_threads64_",
+OPENBLAS_CALLS = tuple(  # each build has one of them
+    f"{p}openblas_set_num_threads{s}" for p in ("", "scipy_") for s in ("", "64_")
 )
 
 
