@@ -221,10 +221,8 @@ def condition_of(ends: list[Any], values: Values, place: Place) -> Condition:
 
 
 def _event(entry: Entry) -> None:
-    how = {
-        "direction": DIRECTIONS[entry.values.pop("direction")],
-        "terminal": entry.values.pop("terminal"),
-    }
+    direction, terminal = (entry.values.pop(key) for key in ("direction", "terminal"))
+    how = {"direction": DIRECTIONS[direction], "terminal": terminal}
     if entry.values["kind"] == "python":
         function = function_of(entry.values, entry.place, trust=entry.trust)
         entry.made.event(entry.name, function, **how, follow=entry.ends)

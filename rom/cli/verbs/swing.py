@@ -162,9 +162,7 @@ def _files(args: argparse.Namespace) -> dict[str, Path]:
     kinds = (".rom.npz", ".png", *films, ".html")
     paths = {kind: inside(folder, args.file.stem, kind) for kind in kinds}
     paths |= {name: folder / name for name in (TABLE_FILE, SCENE_FILE, RECORD_FILE)}
-    for path in paths.values():
-        checked(args, path)
-    return paths
+    return {kind: checked(args, path) for kind, path in paths.items()}
 
 
 def hinge_of(text: str) -> tuple[str, dict[str, str]]:
