@@ -20,7 +20,7 @@ from rom.view.scenes.connections import SPRING_COLOUR, connections, stretched
 from rom.view.scenes.film import Look, _stage
 from rom.view.scenes.ground import GROUND_COLOUR, JOINT_COLOUR, PLANE_OPACITY
 from rom.view.scenes.places import at_start, different, moving
-from rom.view.scenes.rigid import bars, block_of, ends_of
+from rom.view.scenes.rigid import bars, block_of, ends_of, form_of
 
 UP = np.array([0.0, 0.0, 1.0])
 STEEL = rom.mbs.Impact(stiffness=1e5)
@@ -172,6 +172,20 @@ def test_bodies_without_a_shape_are_blocks_of_their_inertia_with_tubes_to_joints
     mech.spherical("j", mech.ground.marker((0, 0.4, 0)), part.marker((0, 0.4, 0)))
     assert_allclose(ends_of(mech, "body"), [(0, 0.4, 0)])
     assert np.ptp(bars(part, ends_of(mech, "body"))[0][:, 1]) > 0.4
+
+
+def test_a_block_stands_beside_tubes_unless_it_is_far_larger():
+    """A cube of edge a has m a^2 / 6 about each axis; three times the reach is the most."""
+    mech = rom.Mechanism()
+    for name, arm in (("alone", 0.0), ("beside", 0.1), ("hidden", 0.07)):
+        how = {"inertia": (0.24**2 / 6,) * 3, "markers": {"a": (arm, 0, 0)}}
+        mech.add_rigid(name, mass=1.0, at=ORIGIN, **how)
+    alone, beside, hidden = (form_of(mech, name, {}) for name in mech.parts)
+    assert (alone.opacity, beside.opacity, hidden.opacity) == (0.5, 1.0, 1.0)
+    assert alone.block is None and hidden.block is None
+    for points in (alone.points, beside.block[0]):
+        assert_allclose(np.ptp(points, axis=0), 0.24)
+    assert np.ptp(hidden.points, axis=0).max() < 0.1
 
 
 def test_symbols_and_traces_are_drawn_where_they_are_asked_for():

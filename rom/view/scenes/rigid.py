@@ -42,8 +42,12 @@ def form_of(mechanism: "rom.mbs.Mechanism", name: str, shapes: Mapping[str, Mesh
     if name in shapes:
         points, triangles = shapes[name]
         return Form(np.asarray(points, dtype=float), np.asarray(triangles))
-    ends = ends_of(mechanism, name)
-    return Form(*bars(part, ends), None, shadow(part, ends), 1.0 if ends else BLOCK_OPACITY)
+    ends, block = ends_of(mechanism, name), inertia_box(part)
+    if not ends:
+        return Form(*block, opacity=BLOCK_OPACITY)
+    reach = max(float(np.linalg.norm(p)) for p in ends)
+    telling = np.ptp(block[0], axis=0).max() <= MAX_BOX_RATIO * reach
+    return Form(*bars(part, ends), block=block if telling else None)
 
 
 def check_bodies(mechanism: "rom.mbs.Mechanism", what: str, names: Collection[str]) -> None:
@@ -71,13 +75,6 @@ def bars(part: "rom.mbs.Part", ends: list[Array]) -> Mesh:
     tubes = [cylinder(np.zeros(3), end, wide, sides=24) for end in ends]
     knots = [ellipsoid((0.75 * wide,) * 3, end, sides=16) for end in (np.zeros(3), *ends)]
     return joined([*tubes, *knots])
-
-
-def shadow(part: "rom.mbs.Part", ends: list[Array]) -> Mesh | None:
-    """What is drawn half-transparent beside the bars: the box of the inertia, unless it is huge."""
-    reach = max((float(np.linalg.norm(p)) for p in ends), default=0.0)
-    block = inertia_box(part)
-    return block if reach and np.ptp(block[0], axis=0).max() <= MAX_BOX_RATIO * reach else None
 
 
 def inertia_box(part: "rom.mbs.Part") -> Mesh:
