@@ -1,5 +1,6 @@
 """Where the time of long work goes: seconds by stages, and by pieces of work within them."""
 
+from collections import Counter, defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -22,18 +23,16 @@ class Stopwatch:
 
     def __init__(self) -> None:
         # by stage and piece; what lies within another piece counts there alone
-        self.stages: dict[str, dict[str, float]] = {}  # [s]
-        self.counts: dict[str, dict[str, int]] = {}  # how often
+        self.stages: dict[str, dict[str, float]] = defaultdict(lambda: defaultdict(float))  # [s]
+        self.counts: dict[str, Counter[str]] = defaultdict(Counter)  # how often
         self.peaks: dict[str, float] = {}  # largest memory so far, at the end of a stage [MB]
-        self.notes: dict[str, dict[str, float]] = {}
+        self.notes: dict[str, dict[str, float]] = defaultdict(dict)
         self._stage, self._pieces, self._since = "", [REST_PIECE], perf_counter()
 
     def begin(self, stage: str) -> None:
         """End the stage before and begin another, or one of that name once more."""
         self.end()
         self._stage = stage
-        self.stages.setdefault(stage, {})
-        self.counts.setdefault(stage, {})
 
     def end(self) -> None:
         """End the stage under way, if there is one."""
@@ -47,8 +46,7 @@ class Stopwatch:
         self._charge()
         self._pieces.append(piece)
         if self._stage:
-            counts = self.counts[self._stage]
-            counts[piece] = counts.get(piece, 0) + 1
+            self.counts[self._stage][piece] += 1
 
     def leave(self) -> None:
         """From here on time belongs to what was under way before."""
@@ -58,7 +56,7 @@ class Stopwatch:
     def note(self, name: str, value: float) -> None:
         """Keep a number with the stage under way, the largest of that name."""
         if self._stage:
-            notes = self.notes.setdefault(self._stage, {})
+            notes = self.notes[self._stage]
             notes[name] = max(notes.get(name, value), value)
 
     @property
@@ -75,7 +73,7 @@ class Stopwatch:
                 "ranks": ranks()[1],
                 **{piece: round(seconds, 4) for piece, seconds in pieces.items()},
                 **{f"number of {piece}": n for piece, n in self.counts[stage].items()},
-                **self.notes.get(stage, {}),
+                **self.notes[stage],
             }
             for stage, pieces in self.stages.items()
         }
@@ -83,8 +81,7 @@ class Stopwatch:
     def _charge(self) -> None:
         now = perf_counter()
         if self._stage:
-            pieces = self.stages[self._stage]
-            pieces[self._pieces[-1]] = pieces.get(self._pieces[-1], 0.0) + now - self._since
+            self.stages[self._stage][self._pieces[-1]] += now - self._since
         self._since = now
 
 
