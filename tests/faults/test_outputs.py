@@ -93,6 +93,16 @@ def test_it_is_said_before_anything_is_read(case, folder, capsys):
     assert Path(name).read_bytes() == NOTES
 
 
+@pytest.mark.parametrize(
+    "words", [[*PENDULUM, "--film", "mp4"], ["swing", "part.step", "--hinge", "3", "--mp4"]]
+)
+def test_a_film_without_encoder_is_refused_before_the_motion(words, folder, capsys, monkeypatch):
+    monkeypatch.setenv("PATH", str(folder))
+    monkeypatch.setattr(rom, "simulate", lambda *_, **__: pytest.fail("it was moved"))
+    assert main([*words, "-o", "out"]) == rom.ResourceError.exit_code
+    assert "ffmpeg" in capsys.readouterr().err and not os.listdir("out")
+
+
 @pytest.mark.fenicsx
 @pytest.mark.parametrize("name", ["x.vtu", "x.inp"])
 def test_a_mesh_is_replaced_by_another_one_of_its_kind(name, folder, capsys):
