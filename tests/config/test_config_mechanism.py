@@ -20,6 +20,7 @@ from rom.cli.main import main
 from rom.config.document import parsed
 from rom.config.keys import Place
 from rom.config.laws import law_kind, law_of
+from rom.config.mechanism_fmu import _numbers
 
 
 @pytest.fixture(scope="module")
@@ -286,6 +287,16 @@ def test_an_fmu_of_a_file_moves_as_the_file(case, folder, monkeypatch):
         flown = np.column_stack([found[name] for name in tip])
         assert_allclose(flown, sol.position("free", "tip"), atol=1e-9)
     assert_allclose(found["'main bearing'.angle"], sol.joint("main bearing").angle, atol=1e-8)
+
+
+def test_a_rigid_body_of_a_file_goes_into_an_fmu_by_numbers_that_make_it_again():
+    turned, inertia = (0.8, 0.0, 0.6, 0.0), np.diag([0.3, 0.2, 0.4]) + 0.01
+    moving = {"velocity": (1, 2, 3), "omega": (4, 5, 6), "markers": {"a": (0.1, 0, 0)}}
+    how = {"mass": 2.0, "inertia": inertia, "at": (7, 8, 9), "orientation": turned, **moving}
+    made = _numbers(rom.Mechanism().add_rigid("b", **how))
+    for key in ("mass", "inertia", "at", "orientation", "velocity", "omega"):
+        assert_allclose(made[key], how[key], atol=1e-15)
+    assert made["markers"] == {"a": [0.1, 0.0, 0.0]} and not any(made["spin"])
 
 
 @pytest.mark.once
