@@ -85,9 +85,9 @@ def _plainly(entry: Entry) -> None:
 
 
 def _drive(entry: Entry) -> None:
-    law = entry.law("law")
-    how = {"rate": law.rate, "acceleration": law.acceleration}
-    entry.made.drive(entry.name, *entry.ends, law.value, **how)
+    law, (joint,) = entry.law("law"), entry.ends
+    functions = {"rate": law.rate, "acceleration": law.acceleration}
+    entry.made.drive(entry.name, joint, law.value, **functions)
 
 
 def _motor(entry: Entry) -> None:
