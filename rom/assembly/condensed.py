@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from scipy.linalg import block_diag, eigh
+from scipy.linalg import block_diag, eigh, orth
 
 from rom.arguments import lowest
 from rom.body.flexible import FlexibleBody
@@ -156,11 +156,5 @@ def joint_functions(moved: Array, traces: list[list[Array]]) -> Array:
     Motions move the coordinates (h, c) of all interfaces, one below the other; traces are, per
     interface, the directions that its two components ask for.
     """
-    unions = block_diag(*(_span(np.hstack(both)) for both in traces))
-    return _span(np.linalg.lstsq(moved, unions, rcond=RANK_RTOL)[0])
-
-
-def _span(X: Array) -> Array:
-    """(n, k) orthonormal columns that span the same."""
-    Q, spectrum, _ = np.linalg.svd(X, full_matrices=False)
-    return Q[:, spectrum > RANK_RTOL * spectrum[0]]
+    unions = block_diag(*(orth(np.hstack(both), RANK_RTOL) for both in traces))
+    return orth(np.linalg.lstsq(moved, unions, rcond=RANK_RTOL)[0], RANK_RTOL)
