@@ -74,10 +74,9 @@ def added_mass(model: FEModel, first: int, n_local: int) -> csr_matrix | None:
     if not model.attachments:
         return None
     shape = (n_local, model.n_dofs)
-    carried = (carried_displacements(attachment, model) for attachment in model.attachments)
-    blocks = ((c, c.N.T @ (np.repeat(c.masses, 3)[:, None] * c.N)) for c in carried)
-    parts = [coupled(shape, first, c.interface.dofs, block).tocoo() for c, block in blocks]
-    row, column, value = (
-        np.concatenate([getattr(part, name) for part in parts]) for name in ("row", "col", "data")
-    )
-    return csr_matrix((value, (row, column)), shape=shape)
+    added = csr_matrix(shape)
+    for attachment in model.attachments:
+        c = carried_displacements(attachment, model)
+        block = c.N.T @ (np.repeat(c.masses, 3)[:, None] * c.N)
+        added = added + coupled(shape, first, c.interface.dofs, block)
+    return added
