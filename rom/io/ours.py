@@ -140,8 +140,9 @@ def _locked(folder: Path) -> int | None:
         except OSError:
             os.close(handle)
             return None
-        if _still_there(path, handle):
-            break
+        with suppress(FileNotFoundError):
+            if os.path.samestat(path.stat(), os.fstat(handle)):
+                break
         os.close(handle)  # its owner has removed it in between
     os.ftruncate(handle, 0)
     os.pwrite(handle, f"process {os.getpid()} on {platform.node()}".encode(), 0)
@@ -155,10 +156,3 @@ def _taken(folder: Path, handle: int) -> ResourceError:
         f"another run is writing into {folder}: {owner or 'it has just begun'}.",
         hint="Wait for it, or choose another folder.",
     )
-
-
-def _still_there(path: Path, handle: int) -> bool:
-    try:
-        return os.path.samestat(path.stat(), os.fstat(handle))
-    except FileNotFoundError:
-        return False
