@@ -27,6 +27,7 @@ from rom.mbs.integrate.consistent_start import (
     assembled,
     fitting_velocity,
     initial_state,
+    prescribed,
     with_accelerations,
 )
 from rom.mbs.integrate.fixed_step import failed_step, space
@@ -35,7 +36,7 @@ from rom.mbs.integrate.step_memory import begin
 from rom.mbs.kernels import work as entry
 from rom.mbs.kernels.work import Step, Work, workspace
 from rom.mbs.mechanism import Mechanism
-from rom.mbs.parts.signals import padded, sampled
+from rom.mbs.parts.signals import padded
 from rom.mbs.results.state import State
 from rom.model import Array
 
@@ -84,9 +85,7 @@ class Flow:
         self.record = Record(mechanism, packed, self.settings, perf_counter())
         self.t = self.settings.time(np.arange(self.steps + 1))
         span, spacing = self.settings.span, self.settings.spacing
-        table, failure = sampled(packed.signals, padded(self.t), span, spacing, self.settings.h)
-        if failure is not None:
-            raise failure
+        table = prescribed(packed.signals, padded(self.t), span, spacing, self.settings.h)
         self.table = np.ascontiguousarray(table[: self.t.size])
         self.step: Step | None = None
 
@@ -225,15 +224,7 @@ class Flow:
 
     def apart(self, one: State, two: State) -> Array:
         """(n,) small motion from one position to another."""
-        bodies = self.packed.system.bodies
-        out = np.zeros(one.v.size)
-        for at, to, r in zip(bodies.q_at, bodies.v_at, bodies.r, strict=True):
-            out[to : to + 3] = two.q[at : at + 3] - one.q[at : at + 3]
-            back = one.q[at + 3 : at + 7] * [1.0, -1.0, -1.0, -1.0]
-            turn = rotation.multiply(back, two.q[at + 3 : at + 7])
-            out[to + 3 : to + 6] = rotation.log(turn / np.linalg.norm(turn))
-            out[to + 6 : to + 6 + r] = two.q[at + 7 : at + 7 + r] - one.q[at + 7 : at + 7 + r]
-        return out
+        return self.packed.apart(one.q, two.q)
 
 
 @dataclass

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from rom import rotation
 from rom.errors import ConfigError, ModelError, warn
 from rom.mbs.elements.family import Asked, Family, Places, Sampled, integers, rows_of, starts
 from rom.mbs.equations import renewal
@@ -141,6 +142,16 @@ class Packed:
             unit[at : at + 3] = self.length
             unit[at + 6 : at + 6 + r] = self.length * np.sqrt(bodies.mass[b] / modal)
         return unit
+
+    def apart(self, q: Array, other: Array) -> Array:
+        """(n,) motion that leads from coordinates q (n_q,) to other ones, as `retract` takes it."""
+        bodies, out = self.system.bodies, np.zeros(self.v.size)
+        for at, to, r in zip(bodies.q_at, bodies.v_at, bodies.r, strict=True):
+            turn = rotation.multiply(q[at + 3 : at + 7] * [1, -1, -1, -1], other[at + 3 : at + 7])
+            out[to : to + 3] = other[at : at + 3] - q[at : at + 3]
+            out[to + 3 : to + 6] = rotation.log(turn / np.linalg.norm(turn))
+            out[to + 6 : to + 6 + r] = other[at + 7 : at + 7 + r] - q[at + 7 : at + 7 + r]
+        return out
 
     @property
     def graph(self) -> Graph:

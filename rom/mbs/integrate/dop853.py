@@ -12,7 +12,6 @@ from time import perf_counter
 import numpy as np
 from scipy.integrate import DOP853, solve_ivp
 
-from rom import rotation
 from rom.errors import ConfigError, SolverError
 from rom.mbs.elements.family import apply_laws
 from rom.mbs.equations.equations import evaluate, rates
@@ -249,16 +248,4 @@ def _remember(record: Record, W: Work, step: Step, states: Sequence[State], work
     step.lost[:] = W.power
     step.count[STEPS] = len(states) - 1
     for j, state in enumerate(states[-2::-1]):
-        step.past[0, j], step.past[1, j] = _seen(record, now.q, state.q), state.v
-
-
-def _seen(record: Record, q: Array, other: Array) -> Array:
-    """(n,) increment that leads from coordinates q to other ones."""
-    bodies = record.packed.system.bodies
-    out = np.zeros(record.packed.v.size)
-    for at, vt, r in zip(bodies.q_at, bodies.v_at, bodies.r, strict=True):
-        back = q[at + 3 : at + 7] * np.array([1.0, -1.0, -1.0, -1.0])
-        out[vt : vt + 3] = other[at : at + 3] - q[at : at + 3]
-        out[vt + 3 : vt + 6] = rotation.log(rotation.multiply(back, other[at + 3 : at + 7]))
-        out[vt + 6 : vt + 6 + r] = other[at + 7 : at + 7 + r] - q[at + 7 : at + 7 + r]
-    return out
+        step.past[0, j], step.past[1, j] = record.packed.apart(now.q, state.q), state.v
