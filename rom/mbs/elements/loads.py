@@ -42,8 +42,7 @@ from rom.rotation import skew
 
 Axes = Literal["world", "body"]
 Given = npt.ArrayLike | TimeFunction  # constant or not
-# kinds of loads
-FORCE_WORLD, FORCE_BODY, TORQUE_WORLD, TORQUE_BODY = 0, 1, 2, 3
+FORCE_WORLD, FORCE_BODY, TORQUE_WORLD, TORQUE_BODY = range(4)  # kinds of loads
 
 
 @dataclass(frozen=True, slots=True)

@@ -205,17 +205,14 @@ def _closed(packed: Packed, W: Work, q: Array, elastic: float) -> Array:
         weight = _weights(packed, W, elastic) if weight is None else weight
         step = -_least_change(packed, W, W.value, weight, held)
         largest = np.abs(step / weight).max() / np.sqrt(packed.mass) / packed.length
-        retract(packed.system, q.copy(), _limited(packed, step), q)
+        # at most by half a radian, or the size of the mechanism
+        most = max([1.0, *(max(turn / 0.5, shift) for turn, shift in _reach(packed, step))])
+        retract(packed.system, q.copy(), step / most, q)
         if largest < 1e-15 or not np.isfinite(largest):
             break
         if largest < 1e-12 and np.abs(W.value / scale).max() < 1e-14:
             break
     return q
-
-
-def _limited(packed: Packed, step: Array) -> Array:
-    """The step, shortened to half a radian and to the size of the mechanism."""
-    return step / max([1.0, *(max(turn / 0.5, shift) for turn, shift in _reach(packed, step))])
 
 
 def _reach(packed: Packed, step: Array) -> Iterator[tuple[float, float]]:

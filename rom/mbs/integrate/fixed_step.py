@@ -16,13 +16,7 @@ from rom.mbs.integrate.dop853 import first_steps
 from rom.mbs.integrate.events import Noted
 from rom.mbs.integrate.run import Record, standing_at
 from rom.mbs.integrate.sampling import begin_sampled, steps_up_to_sample
-from rom.mbs.integrate.step_memory import (
-    RUN_COUNTS,
-    accelerated,
-    recall,
-    signals_at,
-    state_of,
-)
+from rom.mbs.integrate.step_memory import RUN_COUNTS, accelerated, recall, signals_at, state_of
 from rom.mbs.kernels import work as entry
 from rom.mbs.kernels.system import ANGLE
 from rom.mbs.kernels.work import Step, Work

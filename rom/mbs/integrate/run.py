@@ -20,14 +20,10 @@ from rom.model import Array
 from rom.process.memory import check_memory, free_bytes
 from rom.process.progress import Progress
 
-# a million steps a second, as the fastest mechanisms take, for eleven days
-MAX_STEPS = 10**12
-# of a time that was written in decimals
-ROUND_OFF = 1e-12
-# first step of chosen length, relative to the duration
-FIRST_STEP_RATIO = 1e-4
-# the array by which a memory knows its state
-RUN_KEY = "of"
+MAX_STEPS = 10**12  # a million a second, as the fastest mechanisms take, for eleven days
+ROUND_OFF = 1e-12  # of a time that was written in decimals
+FIRST_STEP_RATIO = 1e-4  # first step of chosen length, relative to the duration
+RUN_KEY = "of"  # the array by which a memory knows its state
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,8 +27,7 @@ FACTOR_FIELDS = (
 )
 # counts that say whether it goes on to be used
 FACTOR_COUNTS = (entry.LAST_ITERATIONS, entry.HAS_FACTOR, entry.FACTOR_USES)
-# counts of a whole run
-RUN_COUNTS = (entry.STEPS, entry.ITERATIONS, entry.FACTORISATIONS)
+RUN_COUNTS = (entry.STEPS, entry.ITERATIONS, entry.FACTORISATIONS)  # of a whole run
 # of the step itself, and what memories call its algorithmic accelerations
 STEP_FIELDS = {name: name for name in ("method", "bdf", "psi", "past", "work", "lost")}
 STEP_FIELDS["before"] = "a"

@@ -22,8 +22,7 @@ from rom.model import Array, Numbers
 
 N_MOTIONS = 4  # journal centre x, y and tilt about x, y
 N_ANSWERS = 5  # what works on them, and the friction torque
-# columns of Cells.size
-RADIUS, LENGTH, CLEARANCE, SLENDER, IMAGES, Z_FIRST = range(6)
+RADIUS, LENGTH, CLEARANCE, SLENDER, IMAGES, Z_FIRST = range(6)  # columns of Cells.size
 # columns of Cells.circle: cosine, sine and bore at the centre of a column, and at the face behind
 COS, SIN, BORE = range(3)
 BEHIND_FACE = 3

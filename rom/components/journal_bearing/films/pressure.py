@@ -21,8 +21,7 @@ from rom.mbs.kernels.compiled import inner
 
 MAX_ITERATIONS = 100  # changes of the cavitated region
 LEAKAGE_RTOL = 1e-13  # of a void all around the bush, whose oil would not be decided otherwise
-# of the conductance, below which no flow decides how far a cell is filled
-LEAST_FLOW = 1e-14
+LEAST_FLOW = 1e-14  # of the conductance, below which no flow decides how far a cell is filled
 # of what the journal drags out of a void that closes, by which the closing counts with its filling
 # where no time has passed: a void does not overtake its oil
 MAX_CLOSING = 0.5

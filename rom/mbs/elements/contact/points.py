@@ -43,8 +43,7 @@ from rom.mbs.kernels.tables import Array2, Index1, Table, table
 from rom.mbs.parts.bodies import Marker
 from rom.model import Array
 
-# kinds of contacts
-PLANE, SPHERE, CYLINDER, BORE, DISC, CAPSULE = range(6)
+PLANE, SPHERE, CYLINDER, BORE, DISC, CAPSULE = range(6)  # kinds of contacts
 COMPLEX_STEP = 1e-30
 # what a contact remembers: whether it touched, ends of its spring in the axes of i and j [m],
 # energy in the spring [J]
