@@ -396,18 +396,14 @@ def asked(laws: Mapping[str, Law], packed: Laws, followed: int) -> list[AskedLaw
     ]
 
 
-def _outside(law: Law) -> bool:
-    """A law knows where things are in the world: only a reaction is sure to conserve momentum."""
-    return not isinstance(law, UserForce) or len(law.markers) == 1
-
-
 LAWS_FAMILY = Family(
     "laws",
     Law,
     pack,
     *(law_wrenches, law_tangents, law_energy),
     ends=lambda law: law.markers,
-    outside=_outside,
+    # a law knows where things are in the world: only a reaction is sure to conserve momentum
+    outside=lambda law: not isinstance(law, UserForce) or len(law.markers) == 1,
     couples=lambda laws, body: [
         body[at[:n]] for at, n in zip(laws.marker, laws.count, strict=True)
     ],

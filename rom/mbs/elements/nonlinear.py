@@ -340,18 +340,14 @@ def nonlinear_energy(s, _W, elements, q, v):
     return total
 
 
-def _outside(whole: Assembly) -> bool:
-    """Elements of one frame alone push it from outside, as wind does."""
-    return any(group.frames.shape[1] == 1 for group in whole.body.elements)
-
-
 NONLINEAR_FAMILY = Family(
     "nonlinear",
     Assembly,
     pack,
     *(nonlinear_residuals, nonlinear_tangents, nonlinear_energy),
     ends=on_joint,
-    outside=_outside,
+    # elements of one frame alone push it from outside, as wind does
+    outside=lambda whole: any(group.frames.shape[1] == 1 for group in whole.body.elements),
     couples=lambda elements, _: [
         bodies[:n] for n, bodies in zip(elements.count, elements.body, strict=True)
     ],
