@@ -10,7 +10,7 @@ Source:
     sizes are ours, lengths of fingers after Chatzioglou and others 2024.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sized
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Annotated
@@ -64,9 +64,7 @@ class Finger:
     n: int = 16
 
     def __post_init__(self) -> None:
-        if len(self.springs) != len(self.phalanges) or not self.springs:
-            both = f"{len(self.springs)} springs and {len(self.phalanges)} phalanges"
-            raise ModelError(f"{both}: each spring carries one phalanx.")
+        check_pairs(self.springs, self.phalanges)
         if min(self.phalanges[:-1], default=1.0) <= 0 or self.phalanges[-1] < 0:
             raise ModelError(f"phalanges of {self.phalanges} m: they must be > 0, the last >= 0.")
 
@@ -137,6 +135,13 @@ class Finger:
             r += STOP_STIFFNESS_RATIO * spring.stiffness * gap * g
             K += STOP_STIFFNESS_RATIO * spring.stiffness * np.outer(g, g)
         return r, K
+
+
+def check_pairs(springs: Sized, phalanges: Sized) -> None:
+    """Refuse a finger that is not springs with a phalanx each."""
+    if len(springs) != len(phalanges) or not phalanges:
+        both = f"{len(springs)} springs and {len(phalanges)} phalanges"
+        raise ModelError(f"{both}: each spring carries one phalanx.")
 
 
 def _angle(shape: Shape, a: int, b: int) -> tuple[float, Array]:

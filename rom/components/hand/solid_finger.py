@@ -15,7 +15,7 @@ from rom.body.flexible import FlexibleBody
 from rom.body.reference import marker_motion
 from rom.components.cosserat import Rod, body
 from rom.components.cosserat.helical_spring import HelicalSpring, plate_compliance, spring_rod
-from rom.errors import ModelError
+from rom.components.hand.compliant_hand import check_pairs
 from rom.mbs.analysis.equilibrium import equilibrium
 from rom.mbs.analysis.linearize import linearize
 from rom.mbs.mechanism import Mechanism
@@ -67,7 +67,7 @@ def solid_finger(
         ModelError: if bodies and springs do not match.
         InterfaceError: naming a marker that a phalanx does not have.
     """
-    _check(bodies, springs)
+    check_pairs(springs, bodies)
     A = np.eye(3) if orientation is None else np.asarray(orientation, dtype=float)
     mech = Mechanism(gravity=gravity)
     marker = mech.ground.marker((0.0, 0.0, 0.0))
@@ -124,7 +124,7 @@ def parts_of_compliance(
     Raises:
         ModelError: if bodies and springs do not match.
     """
-    _check(bodies, springs)
+    check_pairs(springs, bodies)
     A = np.eye(3) if orientation is None else np.asarray(orientation, dtype=float)
     turn = np.kron(np.eye(2), A)
     joints, links, arm = np.zeros((6, 6)), np.zeros((6, 6)), np.zeros(3)
@@ -144,9 +144,3 @@ def _moved(arm: Array) -> Array:
     X = np.eye(6)
     X[:3, 3:] = -rotation.skew(arm)
     return X
-
-
-def _check(bodies: Sequence[FlexibleBody], springs: Sequence[HelicalSpring]) -> None:
-    if len(bodies) != len(springs) or not bodies:
-        both = f"{len(springs)} springs and {len(bodies)} phalanges"
-        raise ModelError(f"{both}: each spring carries one phalanx.")
