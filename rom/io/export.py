@@ -40,10 +40,6 @@ def _nastran(form: InterfaceForm) -> dict[str, Array]:
     return {"KAAX": form.K, "MAAX": form.M, "BAAX": form.D}
 
 
-def _write_op4(body: FlexibleBody, path: str | Path) -> Path:
-    return write_op4(_nastran(interface_form(body)), path)
-
-
 def _write_dmig(body: FlexibleBody, path: str | Path) -> Path:
     form = interface_form(body)
     return write_dmig(_nastran(form), form.dofs, path, nodes=form.points)
@@ -62,7 +58,7 @@ FORMATS: dict[str, tuple[str, Callable[..., Path]]] = {  # name: (ending that ch
     "vtu": (".vtu", write_vtu),
     "sid": (SID_SUFFIX, partial(_write_sid, dialect="fembs")),
     "dmig": (".dmig", _write_dmig),
-    "op4": (".op4", _write_op4),
+    "op4": (".op4", lambda body, path: write_op4(_nastran(interface_form(body)), path)),
     "abaqus": (".inp", _write_abaqus),
     "exudyn": (".py", write_exudyn),
     "mbdyn": (".fem", write_mbdyn),

@@ -169,10 +169,10 @@ class _March:
 
     def go(self, begin: PeriodicMotion, longest: float, n: int) -> None:
         """Follow the path until the parameter leaves the span, or there are n motions."""
-        family = self.family
-        point = self.curve.start(family.member(begin, self.first), self.first, self._forwards)
+        family, forwards = self.family, self.last > self.first
+        point = self.curve.start(family.member(begin, self.first), self.first, forwards)
         self.add(point)
-        point = self.curve.start(point.at, self.first, self._forwards)  # in sizes of the motion
+        point = self.curve.start(point.at, self.first, forwards)  # in sizes of the motion
         low, high = sorted((self.first, self.last))
         try:
             for one, h, two in self.curve.steps(point, longest):
@@ -193,10 +193,6 @@ class _March:
         finally:
             if self.progress:
                 line("")
-
-    @property
-    def _forwards(self) -> bool:
-        return self.last > self.first
 
     def motion(self, point: Point) -> PeriodicMotion:
         """The motion at a point of the path."""

@@ -17,7 +17,7 @@ import numpy as np
 from rom.arguments import Between, Positive, between, not_negative, typed
 from rom.components.compiled import kernel
 from rom.components.wind.blading import LARGEST_ANGLE, Blading, blading, strip_load
-from rom.components.wind.control import GENERATOR_EFFICIENCY, Controller, steady, working
+from rom.components.wind.control import GENERATOR_EFFICIENCY, Controller, Held, steady, working
 from rom.components.wind.momentum import RADIUS_COLUMN, induced
 from rom.components.wind.wake import follow
 from rom.components.wind.wind_turbine import GEAR_RATIO
@@ -78,7 +78,7 @@ def operate(
     dt: Annotated[float, Between(0.0, MAX_STEP, "(]", "s")] = 0.05,
     blades: Blading | None = None,
     dynamic: bool = True,
-    held: Callable[[float], tuple[float, float]] | None = None,
+    held: Held | None = None,
 ) -> Operation:
     """Let the controlled turbine work in a wind over time, from its steady state in the first.
 
@@ -111,13 +111,7 @@ def operate(
 class _Run:
     """Rotor, wake and controller between steps."""
 
-    def __init__(
-        self,
-        blades: Blading,
-        wind: float,
-        dynamic: bool,
-        held: Callable[[float], tuple[float, float]] | None,
-    ) -> None:
+    def __init__(self, blades: Blading, wind: float, dynamic: bool, held: Held | None) -> None:
         self.blades, self.dynamic, self.held = blades, dynamic, held
         self.cosines = math.cos(blades.cone), math.cos(blades.tilt)
         self.given = (blades.strips, *blades.tables, blades.twist)

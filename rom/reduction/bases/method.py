@@ -226,9 +226,8 @@ def lowest_modes(ops: Operators, held: Held, n_modes: int) -> tuple[Array, Array
     if n == n_modes:  # there are no others
         return ops.modes(held, n, finished=True)
     if keep > n_modes and ops.first == 0:
-        message = (
+        warn(
             f"{keep} fixed-interface modes are kept instead of {n_modes}: the last ones share the "
             f"frequency {omega[n_modes - 1] / (2 * np.pi):.6g} Hz."
         )
-        warn(message)
     return omega[:keep], Phi[:, :keep]
