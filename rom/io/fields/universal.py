@@ -52,9 +52,8 @@ class Function:
         if self.kind != FREQUENCY_RESPONSE or self.denominator != FORCE_TYPE:
             raise ConfigError(f"{_name(self)}: the function must be a response to a force.")
         if self.numerator not in PER_RECEPTANCE:
-            raise ConfigError(
-                f"{_name(self)}: {self.numerator} must be of {sorted(PER_RECEPTANCE)}."
-            )
+            text = f"{self.numerator} must be of {sorted(PER_RECEPTANCE)}"
+            raise ConfigError(f"{_name(self)}: {text}.")
         power = PER_RECEPTANCE[self.numerator]
         if power and not self.x.all():
             raise ConfigError(f"{_name(self)}: displacements need frequencies > 0 Hz.")
@@ -80,7 +79,7 @@ def scan(path: str | Path) -> tuple[tuple[Function, ...], dict[str, list[list[st
     data, place = path.read_bytes(), 0
     found: list[Function] = []
     others: dict[str, list[list[str]]] = {}
-    while (place := _mark(data, place)) >= 0:
+    while (place := _mark(data, place)) < len(data):
         place = _line_end(data, place)
         head = data[place : (after := _line_end(data, place))].split()
         kind = head[0].decode("ascii", "replace") if head else ""
@@ -108,13 +107,13 @@ def _line_end(data: bytes, place: int) -> int:
 
 
 def _mark(data: bytes, place: int) -> int:
-    """Start of the next line that is the mark of datasets, or -1."""
+    """Start of the next line that is the mark of datasets, or the end."""
     found = MARK_PATTERN.search(data, place)
-    return found.start() if found else -1
+    return found.start() if found else len(data)
 
 
 def _closed(data: bytes, place: int) -> int:
-    need((end := _mark(data, place)) >= 0, "the closing -1 is missing")
+    need((end := _mark(data, place)) < len(data), "the closing -1 is missing")
     return end
 
 
@@ -122,7 +121,7 @@ def _dataset(data: bytes, place: int, kind: str, head: list[bytes]) -> tuple[int
     """The place behind the dataset whose first record starts here, and what it holds."""
     binary = kind.startswith("58b")
     if not binary and kind != "58":
-        return _behind(data, place), None
+        return _line_end(data, _mark(data, place)), None
     lines = []
     for _ in range(N_HEADER_RECORDS):
         end = _line_end(data, place)
@@ -136,7 +135,7 @@ def _dataset(data: bytes, place: int, kind: str, head: list[bytes]) -> tuple[int
         need(even, "uneven abscissas of double values are not read from binary")
         values, place = _binary(data, place, head, ordinate, n * width)
         closing = _closing(data, place)
-        place = _behind(data, place) if closing < 0 else _line_end(data, closing)
+        place = _line_end(data, _mark(data, place) if closing < 0 else closing)
     else:
         end = _closed(data, place)
         values = _numbers(data[place:end].decode("ascii"), ordinate, spacing == 0, parts)
@@ -207,8 +206,3 @@ def _closing(data: bytes, place: int) -> int:
     while data[place : place + 1] in (b"\r", b"\n"):
         place += 1
     return place if data.startswith(BLOCK_MARK, place) else -1
-
-
-def _behind(data: bytes, place: int) -> int:
-    end = _mark(data, place)
-    return len(data) if end < 0 else _line_end(data, end)
