@@ -262,18 +262,14 @@ def far_away(
 
 def strip_rows(blade: RodBody, far: list[float], cone: float) -> list[Array]:
     """The numbers of the strip of each vertex, see PROFILE_START."""
-    return [_strip_of(*row, far, math.cos(cone)) for row in zip(*strips(blade), strict=True)]
-
-
-def _strip_of(
-    radius: float, length: float, chord: float, twist: float, far: list[float], c: float
-) -> Array:
-    """Numbers of a strip from its middle, length, chord and twist in the frame."""
-    at = np.searchsorted(HUB_RADIUS + np.cumsum(ELEMENT_LENGTH), radius)
-    profile = profiles()[ELEMENT_PROFILE[min(int(at), len(ELEMENT_PROFILE) - 1)]]
-    of_strip = [c * radius, chord, c * ROTOR_RADIUS, c * HUB_RADIUS, N_BLADES]
-    known = [far[0], length, *far[1:], *of_strip, twist, profile.angle.size]
-    return np.concatenate([known, profile.table.ravel()])
+    rows, c, ends = [], math.cos(cone), HUB_RADIUS + np.cumsum(ELEMENT_LENGTH)
+    for radius, length, chord, twist in zip(*strips(blade), strict=True):
+        at = int(np.searchsorted(ends[:-1], radius))
+        profile = profiles()[ELEMENT_PROFILE[at]]
+        of_strip = [c * radius, chord, c * ROTOR_RADIUS, c * HUB_RADIUS, N_BLADES]
+        known = [far[0], length, *far[1:], *of_strip, twist, profile.angle.size]
+        rows.append(np.concatenate([known, profile.table.ravel()]))
+    return rows
 
 
 def strips(blade: RodBody) -> tuple[Array, Array, Array, Array]:
