@@ -75,10 +75,9 @@ def read_archive(
             manifest = _read_manifest(archive, kind)
             digests, there = _digests(manifest, kind), archive.namelist()
             if missing := [name for name in sorted(digests) if f"{name}.npy" not in there]:
-                raise FileFormatError(
-                    f"the file lacks the array {named(missing)} of its manifest.",
-                    hint="It may have been changed after writing; write or copy it again.",
-                )
+                text = f"the file lacks the array {named(missing)} of its manifest."
+                hint = "It may have been changed after writing; write or copy it again."
+                raise FileFormatError(text, hint=hint)
             arrays = {name: read_array(archive, name) for name in sorted(digests)}
     except (zipfile.BadZipFile, OSError, EOFError, KeyError, RuntimeError) as e:
         cut = "It may have been cut in a transfer; write or copy it again."
@@ -86,8 +85,7 @@ def read_archive(
         raise FileFormatError(f"this is not {what}.", where=str(path), hint=hint) from e
     for name, A in arrays.items():
         if digests[name] != digest(A):
-            text = f"the array {name!r} was changed after writing."
-            raise FileFormatError(text, where=str(path))
+            raise FileFormatError(f"the array {name!r} was changed after writing.", where=str(path))
     return manifest, arrays
 
 
@@ -113,10 +111,8 @@ def refuse_hostile(archive: zipfile.ZipFile, limit: int, hint: str = LARGER_HINT
     """What fills the memory, or is written elsewhere by whoever unpacks it by other means."""
     total = sum(info.file_size for info in archive.infolist())
     if total > limit:
-        raise UnsafeFileError(
-            f"the file unpacks to {total / 1e9:.2f} GB, above the limit of {limit / 1e9:.2f} GB.",
-            hint=hint,
-        )
+        text = f"the file unpacks to {total / 1e9:.2f} GB, above the limit of {limit / 1e9:.2f} GB."
+        raise UnsafeFileError(text, hint=hint)
     for name in archive.namelist():
         if name.startswith("/") or "\\" in name or ".." in name.split("/"):
             raise UnsafeFileError(f"the member {name[:60]!r} leads elsewhere.")
@@ -139,9 +135,8 @@ def read_array(archive: zipfile.ZipFile, name: str, *, any_order: bool = False) 
         )
     n_bytes = int(np.prod(shape, dtype=object)) * dtype.itemsize
     if (fortran and not any_order) or n_bytes > info.file_size:
-        raise UnsafeFileError(
-            f"the array {name!r} claims {n_bytes} bytes but has {info.file_size}."
-        )
+        what = f"claims {n_bytes} bytes but has {info.file_size}"
+        raise UnsafeFileError(f"the array {name!r} {what}.")
     with archive.open(info) as member, damaged(f"the array {name!r} is cut"):
         return npy.read_array(member, allow_pickle=False)
 
@@ -158,10 +153,8 @@ def _read_manifest(archive: zipfile.ZipFile, kind: Kind) -> dict[str, Any]:
     numbers = type(major) is int and type(minor) is int and minor >= 0
     if known is None or major != known[0] or not numbers:
         each = " or ".join(f"{name!r} {list(version)}" for name, version in kind.schemas.items())
-        raise FileFormatError(
-            f"the file has the schema {schema!r} {manifest['version']}; it was to be {each}.",
-            hint="Newer files need a newer program." if known else "",
-        )
+        text = f"the file has the schema {schema!r} {manifest['version']}; it was to be {each}."
+        raise FileFormatError(text, hint="Newer files need a newer program." if known else "")
     return manifest
 
 

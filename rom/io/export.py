@@ -107,11 +107,9 @@ def export(
     if held and kind not in HOLDING_FORMATS:
         raise ConfigError(f"{kind} holds no interfaces, {HOLDING_FORMATS[0]} does; leave held out.")
     if body.quartic is not None and kind not in NONLINEAR_FORMATS:
-        raise ConfigError(
-            f"the format {kind!r} has no place for the energy of body {body.name!r} at large "
-            "deflection.",
-            hint="Write the native file, or reduce without nonlinear.",
-        )
+        text = f"the format {kind!r} has no place for the energy of body {body.name!r} at large"
+        hint = "Write the native file, or reduce without nonlinear."
+        raise ConfigError(f"{text} deflection.", hint=hint)
     if body.certificate is not None:
         body.certificate.warn_of_failures(f"the certificate of body {body.name!r}")
     options = {"held": tuple(held)} if held else {}

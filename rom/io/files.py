@@ -36,10 +36,8 @@ def write_whole(path: str | Path, content: bytes | Callable[[IO[bytes]], object]
             os.close(folder)
     except OSError as error:
         free = shutil.disk_usage(path.parent).free / 2**20
-        raise ResourceError(
-            f"{path} was not written: {error.strerror}; {free:.4g} MiB are free there.",
-            hint="Nothing was left behind.",
-        ) from error
+        text = f"{path} was not written: {error.strerror}; {free:.4g} MiB are free there."
+        raise ResourceError(text, hint="Nothing was left behind.") from error
     finally:
         part.unlink(missing_ok=True)
     return path
@@ -117,19 +115,17 @@ def check_writable(path: str | Path) -> Path:
     except UnicodeEncodeError:
         size = MAX_FILE_NAME_BYTES + 1
     if "\0" in str(path) or size > MAX_FILE_NAME_BYTES:
-        raise ConfigError(
-            f"no file can have the name {path.name[:60]!a}, of {len(path.name)} characters.",
-            hint=f"Up to {MAX_FILE_NAME_BYTES - TEMPORARY_BYTES} bytes of text can be written.",
-        )
+        text = f"no file can have the name {path.name[:60]!a}, of {len(path.name)} characters."
+        hint = f"Up to {MAX_FILE_NAME_BYTES - TEMPORARY_BYTES} bytes of text can be written."
+        raise ConfigError(text, hint=hint)
     if path.is_dir():
         raise ConfigError(f"{path} is a folder; a file name is needed.")
     if not path.parent.is_dir():
         raise ConfigError(f"the folder {path.parent} does not exist.", hint="Make it first.")
     if not os.access(path.parent, os.W_OK | os.X_OK):
-        raise ConfigError(
-            f"the folder {path.parent} is not writable.",
-            hint="Choose another folder, or ask for the right to write there.",
-        )
+        text = f"the folder {path.parent} is not writable."
+        hint = "Choose another folder, or ask for the right to write there."
+        raise ConfigError(text, hint=hint)
     return path
 
 
@@ -163,10 +159,9 @@ def h5py(otherwise: str) -> Any:
     try:
         return import_module("h5py")
     except ModuleNotFoundError as error:
-        raise ResourceError(
-            "h5py is not installed.",
-            hint=f"rom doctor says what to type; {otherwise} needs nothing.",
-        ) from error
+        text = "h5py is not installed."
+        hint = f"rom doctor says what to type; {otherwise} needs nothing."
+        raise ResourceError(text, hint=hint) from error
     except (ImportError, ValueError) as error:
         if "dolfinx" in sys.modules:
             cause = ": dolfinx has loaded another HDF5 before"

@@ -128,14 +128,12 @@ def channels(solution: Any) -> Iterator[Channel]:
     for element in solution.elements:
         place, found = ("elements", element), solution.element(element)
         if found.on_joint:
-            yield Channel(
-                (*place, "along"), found.along_unit, ("",), partial(np.asarray, found.along)
-            )
+            along = partial(np.asarray, found.along)
+            yield Channel((*place, "along"), found.along_unit, ("",), along)
             continue
-        yield Channel((*place, "force"), "N", AXIS_LETTERS, partial(np.asarray, found.force[:, -1]))
-        yield Channel(
-            (*place, "moment"), "N m", AXIS_LETTERS, partial(np.asarray, found.moment[:, -1])
-        )
+        for what, unit in (("force", "N"), ("moment", "N m")):
+            last = partial(np.asarray, getattr(found, what)[:, -1])
+            yield Channel((*place, what), unit, AXIS_LETTERS, last)
     for name in ENERGIES:
         energy = partial(getattr, solution, "energy")
         yield Channel(("energy", name), "J", ("",), partial(_got, energy, attrgetter(name)))

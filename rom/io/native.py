@@ -64,19 +64,16 @@ def read(
 
 
 def _check_numbers(manifest: dict[str, Any], arrays: dict[str, Array]) -> None:
-    if manifest.get("units") not in list(SYSTEMS):
-        raise FileFormatError(
-            f"the unit system {manifest.get('units')!r} is unknown; known: {sorted(SYSTEMS)}."
-        )
+    if (units := manifest.get("units")) not in list(SYSTEMS):
+        raise FileFormatError(f"the unit system {units!r} is unknown; known: {sorted(SYSTEMS)}.")
     for name, A in arrays.items():
         with np.errstate(over="ignore"):
             squares = np.square(A, dtype=float)
         if not np.isfinite(squares).all():
             what = "whose square is not" if np.isfinite(A).all() else "that is not"
-            raise QualityGateError(
-                f"{name} holds a number {what} finite.",
-                hint="Look where the body was computed: no force or motion follows from it.",
-            )
+            text = f"{name} holds a number {what} finite."
+            hint = "Look where the body was computed: no force or motion follows from it."
+            raise QualityGateError(text, hint=hint)
 
 
 def body_arrays(body: FlexibleBody) -> dict[str, Array]:
@@ -91,15 +88,11 @@ def body_arrays(body: FlexibleBody) -> dict[str, Array]:
         place = f"marker/{i}/"
         arrays |= _parts(place, marker, MARKER_ARRAYS) | _patch_arrays(place, marker.patch)
         arrays |= _parts(place, marker, ("covariance",))
-    far = isinstance(body.stress, CauchyRecovery)
     arrays |= _parts("surface/", body.surface, SURFACE_ARRAYS)
-    arrays |= _parts(
-        "stress/", body.stress, (*(CAUCHY_ARRAYS if far else ("points", "operator")), "inertial")
-    )
-    return {
-        n: np.asarray(A, dtype=np.int64 if A.dtype.kind == "i" else float)
-        for n, A in arrays.items()
-    }
+    stress = CAUCHY_ARRAYS if isinstance(body.stress, CauchyRecovery) else ("points", "operator")
+    arrays |= _parts("stress/", body.stress, (*stress, "inertial"))
+    whole = {name: A.dtype.kind == "i" for name, A in arrays.items()}
+    return {name: np.asarray(A, np.int64 if whole[name] else float) for name, A in arrays.items()}
 
 
 def _parts(place: str, thing: Any, names: Sequence[str]) -> dict[str, Array]:
@@ -199,9 +192,8 @@ def _stress(arrays: dict[str, Array]) -> StressRecovery | CauchyRecovery | None:
     if "stress/gradient" in arrays:
         parts: Any = {part: arrays[f"stress/{part}"] for part in CAUCHY_ARRAYS}
         return CauchyRecovery(**parts)
-    return StressRecovery(
-        arrays["stress/points"], arrays["stress/operator"], arrays.get("stress/inertial")
-    )
+    operator, inertial = arrays["stress/operator"], arrays.get("stress/inertial")
+    return StressRecovery(arrays["stress/points"], operator, inertial)
 
 
 def _faults(manifest: dict[str, Any], arrays: dict[str, Array]) -> Iterator[str]:

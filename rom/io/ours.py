@@ -59,9 +59,8 @@ def check_replaceable(
     path = check_writable(path)
     for source in inputs:
         if path.exists() and os.path.exists(source) and path.samefile(source):
-            raise ConfigError(
-                f"{path} is read as an input; it would be lost.", hint="Choose another name."
-            )
+            text = f"{path} is read as an input; it would be lost."
+            raise ConfigError(text, hint="Choose another name.")
     if os.path.lexists(path) and not force and not is_ours(path, kind):
         what = (
             f"is no file of the kind {kind} that rom has written"
@@ -104,10 +103,9 @@ def claimed(folder: str | Path) -> Iterator[None]:
     try:
         handle = _locked(folder)
     except OSError as error:
+        text = f"the folder {folder} is not writable: {error.strerror}."
         hint = "Choose another folder, or ask for the right to write there."
-        raise ConfigError(
-            f"the folder {folder} is not writable: {error.strerror}.", hint=hint
-        ) from error
+        raise ConfigError(text, hint=hint) from error
     try:
         yield
     finally:
@@ -152,7 +150,5 @@ def _locked(folder: Path) -> int | None:
 def _taken(folder: Path, handle: int) -> ResourceError:
     owner = os.pread(handle, MAX_OWNER_BYTES, 0).decode(errors="replace")
     os.close(handle)
-    return ResourceError(
-        f"another run is writing into {folder}: {owner or 'it has just begun'}.",
-        hint="Wait for it, or choose another folder.",
-    )
+    text = f"another run is writing into {folder}: {owner or 'it has just begun'}."
+    return ResourceError(text, hint="Wait for it, or choose another folder.")

@@ -34,10 +34,8 @@ def write_vtu(body: FlexibleBody, path: str | Path) -> Path:
         raise ConfigError(f"body {body.name!r} has no surface; to be drawn it needs a meshed one.")
     surface = body.surface
     shapes = surface.shape.reshape(surface.points.shape[0], 3, -1)
-    fields = {
-        f"{label}, {omega / (2 * np.pi):.6g} Hz": shapes[:, :, k]
-        for k, (label, omega) in enumerate(zip(body.labels, body.omega, strict=True))
-    }
+    modes = zip(body.labels, body.omega / (2 * np.pi), strict=True)
+    fields = {f"{name}, {f:.6g} Hz": shapes[:, :, k] for k, (name, f) in enumerate(modes)}
     return write_whole(path, _drawn(surface, fields))
 
 

@@ -62,10 +62,8 @@ def _guid(sources: dict[str, bytes], content: Content) -> str:
 def _library(sources: dict[str, bytes], names: tuple[str, ...]) -> bytes:
     compiler = shutil.which("gcc") or shutil.which("cc")
     if compiler is None:
-        raise ResourceError(
-            "an FMU needs a C compiler, and neither gcc nor cc is here.",
-            hint="On Debian: apt-get install gcc libc6-dev.",
-        )
+        text = "an FMU needs a C compiler, and neither gcc nor cc is here."
+        raise ResourceError(text, hint="On Debian: apt-get install gcc libc6-dev.")
     with scratch("compile") as folder:
         for name, data in sources.items():
             (folder / name).write_bytes(data)

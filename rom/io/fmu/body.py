@@ -65,9 +65,8 @@ def write_body_fmu(body: FlexibleBody, path: str | Path, *, fixed: tuple[str, ..
     step = 1.0 / (STEPS_PER_PERIOD * float(first[0])) if first.size else 1e-3
     about = f"Small motions of the flexible body {path.stem}, inputs held over a step."
     headers, tables = ("shared.h",), _tables(body, omega, V)
-    return write_archive(
-        path, Content(path.stem, about, _variables(body), step, "linear.c", headers, tables)
-    )
+    inside = _variables(body), step, "linear.c", headers, tables
+    return write_archive(path, Content(path.stem, about, *inside))
 
 
 def _tables(body: FlexibleBody, omega: Array, V: Array) -> str:

@@ -127,9 +127,8 @@ def write_exudyn(body: FlexibleBody, path: str | Path) -> Path:
         RomWarning: if the shapes move the mass centre, which gravity in Exudyn does not see.
     """
     path = Path(path)
-    if np.abs(body.S).max(initial=0.0) > MOMENTUM_RTOL * np.sqrt(
-        body.mass * np.abs(body.M).max(initial=0)
-    ):
+    size = np.sqrt(body.mass * np.abs(body.M).max(initial=0))
+    if np.abs(body.S).max(initial=0.0) > MOMENTUM_RTOL * size:
         warn(
             f"the shapes of body {body.name!r} move its mass centre; the gravity of Exudyn 1.13 "
             "turns the body as if they did not. body.with_reference('mean-axis') avoids that."

@@ -70,11 +70,9 @@ def _coordinates(body: FlexibleBody, H: Array, K: Array, M: Array) -> tuple[Arra
     rows = 1 / np.maximum(np.linalg.norm(H * scale, axis=1), 1e-300)
     G = rows[:, None] * H * scale
     if np.linalg.matrix_rank(G, tol=1e-9) < len(G):
-        raise ModelError(
-            f"the {body.n_modes} shapes of body {body.name!r} tie its {len(G)} interface "
-            "coordinates to each other.",
-            hint="Reduce it with CraigBampton, whose shapes move each interface alone.",
-        )
+        text = f"the {body.n_modes} shapes of body {body.name!r} tie its {len(G)} interface"
+        hint = "Reduce it with CraigBampton, whose shapes move each interface alone."
+        raise ModelError(f"{text} coordinates to each other.", hint=hint)
     N = scale[:, None] * null_space(G, rcond=1e-10)
     particular = scale[:, None] * np.linalg.pinv(G) * rows
     if not N.size:

@@ -52,10 +52,8 @@ def write_mbdyn(body: FlexibleBody, path: str | Path) -> Path:
         ConfigError: if there is no shape or no interface, or names differ in blanks alone.
     """
     if not body.n_modes or not body.markers:
-        raise ConfigError(
-            f"body {body.name!r} has {body.n_modes} shapes and {len(body.markers)} interfaces; "
-            "MBDyn needs one of each."
-        )
+        both = f"{body.n_modes} shapes and {len(body.markers)} interfaces"
+        raise ConfigError(f"body {body.name!r} has {both}; MBDyn needs one of each.")
     labels = ["_".join(name.split()) for name in body.markers]
     if len(set(labels)) < len(labels):
         raise ConfigError(f"interfaces need names that differ in more than blanks, got {labels}.")

@@ -78,10 +78,8 @@ def write_radioss(
     points = np.array([form.points[k] for k in sorted(form.points)])
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
     if len(points) < MIN_POINTS or spread[1] < COLLINEAR_RTOL * spread[0]:
-        raise ConfigError(
-            f"body {body.name!r} has {len(points)} interfaces, {form.names}; OpenRadioss needs "
-            f"{MIN_POINTS} that do not lie on one line."
-        )
+        text = f"body {body.name!r} has {len(points)} interfaces, {form.names}; OpenRadioss needs"
+        raise ConfigError(f"{text} {MIN_POINTS} that do not lie on one line.")
     labels = dict(nodes) if nodes else {name: k for k, name in enumerate(form.names, 1)}
     if set(labels) != set(form.names) or len(set(labels.values())) < len(labels):
         raise ConfigError(f"nodes {labels} must be one label for each interface of {form.names}.")

@@ -190,10 +190,8 @@ def _check_inertia(record: StandardInput, Me: Array, Oe1: Array) -> None:
     """Inertia alone has Oe1 xx + yy + zz = -2 Me and Oe1 symmetric, and no Ct1."""
     what, size = record.place("Oe"), max(np.abs(Me).max(initial=0.0), np.abs(Oe1).max(initial=0.0))
     uneven = np.abs(Oe1 - Oe1.swapaxes(0, 1)).max(axis=(0, 1), initial=0.0)
-    columns = [
-        name for name, x in zip(PRODUCT_NAMES, uneven, strict=True) if x > UNEVEN_RTOL * size
-    ]
-    if columns:
+    each = zip(PRODUCT_NAMES, uneven, strict=True)
+    if columns := [name for name, x in each if x > UNEVEN_RTOL * size]:
         raise ConfigError(
             f"{what} of the SID of {record.name!r} has in its columns {', '.join(columns)} a first "
             f"order that is not symmetric, by {uneven.max():.3g} of {size:.3g}: it is no integral "

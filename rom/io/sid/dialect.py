@@ -219,10 +219,8 @@ def _mode_is_second(file: RawFile) -> bool:
             fits[True] &= b <= r and c <= m
             fits[False] &= b <= m and c <= r
         if not any(fits.values()):
-            raise FileFormatError(
-                f"the indices of m1 in {raw.name} fit no order.",
-                where=f"{file.path}, line {raw.line}",
-            )
+            text = f"the indices of m1 in {raw.name} fit no order."
+            raise FileFormatError(text, where=f"{file.path}, line {raw.line}")
     if fits[True] != fits[False]:
         return fits[True]
     tilt = {second: 0.0 for second in fits}

@@ -128,9 +128,8 @@ def _reference(file: RawFile, lines: _Lines) -> None:
     exists = file.mass > 0 and file.n_modes >= 0
     need(exists, f"mass {file.mass:g} and nelastq {file.n_modes} are no body")
     if file.n_modes > MOST_MODES:
-        raise UnsafeFileError(
-            f"nelastq = {file.n_modes} is above the limit of {MOST_MODES}.", where=str(file.path)
-        )
+        text = f"nelastq = {file.n_modes} is above the limit of {MOST_MODES}."
+        raise UnsafeFileError(text, where=str(file.path))
 
 
 def _frames(file: RawFile, lines: _Lines) -> None:
