@@ -343,10 +343,8 @@ def turned_over(name: str, bushing: Bushing, t: Array, axes: Callable[[str], Arr
     """That its rotation vector came near half a turn, where it begins anew on the other side."""
     if not (np.any(bushing.stiffness[3:]) or any(at > 2 for at, _ in bushing.curves)):
         return ""
-    one, other = (
-        axes(marker.body) @ frame
-        for marker, frame in zip((bushing.i, bushing.j), bushing.frames, strict=True)
-    )
+    sides = zip((bushing.i, bushing.j), bushing.frames, strict=True)
+    one, other = (axes(marker.body) @ frame for marker, frame in sides)
     turn = np.arccos(np.clip((np.einsum("tij,tij->t", one, other) - 1) / 2, -1, 1))
     if not np.nanmax(turn) > MAX_TURN:
         return ""

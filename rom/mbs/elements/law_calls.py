@@ -223,10 +223,8 @@ def differences(answer: Callable[[Motion], Array], motion: Motion) -> Array:
     for by_velocity, p in product((0, 1), range(6 * n)):
         field = _moved(motion, p, by_velocity)
         h = DIFFERENCE_STEP * (1.0 + np.abs(field[p // 6]).max())
-        one, other = (
-            answer(shifted(motion, p, side, by_velocity))[: 6 * n].reshape(2, n, 3)
-            for side in (h, -h)
-        )
+        moved = (shifted(motion, p, side, by_velocity) for side in (h, -h))
+        one, other = (answer(x)[: 6 * n].reshape(2, n, 3) for x in moved)
         D[by_velocity, :, p] = np.concatenate(one - other, axis=1).ravel() / (2 * h)
     return D
 

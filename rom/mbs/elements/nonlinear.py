@@ -212,14 +212,11 @@ def _check(name: str, body: NonlinearBody) -> None:
 
 
 def _faults(frames: Frames, elements: Sequence[Elements]) -> Iterator[str]:
-    """What is wrong with a body, in sentences."""
     n, without = len(frames.x), (frames.mass <= 0.0) | (frames.inertia <= 0.0).any(axis=1)
     if without.any():
         k = int(np.argmax(without))
-        yield (
-            f"frame {k} of {n} has mass {frames.mass[k]:g} kg and inertia "
-            f"{frames.inertia[k].tolist()} kg m^2: each must be positive in a motion."
-        )
+        both = f"mass {frames.mass[k]:g} kg and inertia {frames.inertia[k].tolist()} kg m^2"
+        yield f"frame {k} of {n} has {both}: each must be positive in a motion."
     if np.abs(np.linalg.norm(frames.p, axis=1) - 1.0).max() > QUATERNION_ATOL:
         yield "each quaternion of a frame must have the length one."
     for group in elements:

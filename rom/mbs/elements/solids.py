@@ -284,12 +284,10 @@ def deflection_of(part: Part) -> tuple[LargeDeflection, Family]:
     body = part.flexible
     if body.K_geo:
         text = f"body {body.name!r} has the energy of large deflection, in which all loads stiffen"
-        raise ModelError(
-            f"{text}; the geometric stiffness {listed(body.K_geo)} would be counted twice."
-        )
+        twice = f"the geometric stiffness {listed(body.K_geo)} would be counted twice"
+        raise ModelError(f"{text}; {twice}.")
     if part.spin.any():
         text = "a body of large deflection does not spin in a frame that rests; turn it by omega."
         raise ModelError(text, where=part.name)
-    by_points = hasattr(body.quartic, "gradients")
-    family = SAMPLES_FAMILY if by_points else QUARTICS_FAMILY
+    family = SAMPLES_FAMILY if hasattr(body.quartic, "gradients") else QUARTICS_FAMILY
     return LargeDeflection(part.name, body.quartic), family

@@ -48,8 +48,7 @@ def spring_damper(
         free_length: length without force [m]; None for the length at the start.
     """
     if free_length is None:
-        gap = self.design_point(m2) - self.design_point(m1)
-        free_length = float(np.linalg.norm(gap))
+        free_length = float(np.linalg.norm(self.design_point(m2) - self.design_point(m1)))
     doubt(name, stiffness, damping)
     self.add(name, Spring(m1, m2, stiffness, damping, free_length), SPRINGS_FAMILY)
 

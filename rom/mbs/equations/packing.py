@@ -295,11 +295,8 @@ def loaded_by(elements: Mapping[Family, Table]) -> Index:
 
 def _renewed(elements: Mapping[Family, Any], n: int) -> Index:
     """(k, 2) markers of elements with tangents renewed in a step; none where it does not pay."""
-    pairs = [
-        np.column_stack([table.i, table.j])
-        for family, table in elements.items()
-        if family.pair_tangents
-    ]
+    tables = [table for family, table in elements.items() if family.pair_tangents]
+    pairs = [np.column_stack([table.i, table.j]) for table in tables]
     found = np.concatenate([np.zeros((0, 2), dtype=np.int64), *pairs])
     pays = n >= renewal.MIN_VELOCITIES and len(found) <= renewal.MAX_RENEWED
     return found if pays else found[:0]

@@ -71,8 +71,7 @@ def run_explicit(record: Record, W: Work, state: State) -> None:
     if not goes_on:
         equations(state.t, y, accepted=True)
         state = _state_of(equations, state.t, y)
-    work = state.memory.arrays["y"][-3:] if goes_on else np.zeros(3)
-    record.start(state, work)
+    record.start(state, state.memory.arrays["y"][-3:] if goes_on else np.zeros(3))
     record.clock, record.compiled = perf_counter(), 0.0
     solver, due, steps = _solver(equations, state if goes_on else replace(state, memory=None))
     while solver.status == "running" and not record.stopped:
@@ -219,9 +218,8 @@ def first_steps(record: Record, W: Work, step: Step) -> tuple[Array, tuple[Array
         if not found.success:
             text = f"the first steps failed after t = {t[0]:.9g} s: {found.message}"
             raise SolverError(text, hint="Take bdf of order two, or generalized-alpha.")
-        past += [
-            _instant(record, equations, float(x), y) for x, y in zip(t[1:], found.y.T, strict=True)
-        ]
+        ends = zip(t[1:].tolist(), found.y.T, strict=True)
+        past += [_instant(record, equations, x, y) for x, y in ends]
     states, works = zip(*past, strict=True)
     _remember(record, W, step, states, works[-1])
     rows = [[getattr(x, name) for x in states[1:]] for name in ("q", "v", "a", "lam")]

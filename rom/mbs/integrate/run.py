@@ -54,37 +54,26 @@ class Settings:
         """What cannot be run, and what to do instead."""
         duration = self.t_end - self.t_start
         if duration <= 0.0:
-            yield (
-                f"t_end = {self.t_end:g} s is not after {self.t_start:g} s.",
-                "It is the time at the end, not how long the motion lasts.",
-            )
+            text = f"t_end = {self.t_end:g} s is not after {self.t_start:g} s."
+            yield text, "It is the time at the end, not how long the motion lasts."
         if self.order != 2 and self.method != "bdf":
             yield f"order = {self.order} is for bdf only.", 'Leave it out, or take method="bdf".'
         if self.order != 2 and self.dt is None:
-            yield (
-                f"order = {self.order} needs steps of one length dt; chosen ones have order two.",
-                "",
-            )
+            text = f"order = {self.order} needs steps of one length dt; chosen ones have order two."
+            yield text, ""
         if self.stabilised and self.method == "dop853":
-            yield (
-                "stabilised is for implicit methods; dop853 keeps the constraints of velocities "
-                "to the tolerance of its steps.",
-                "Leave it out.",
-            )
+            text = "stabilised is for implicit methods; dop853 keeps the constraints of velocities"
+            yield f"{text} to the tolerance of its steps.", "Leave it out."
         if self.dt is not None and not duration / self.dt <= MAX_STEPS:
-            yield (
-                f"dt = {self.dt:g} s takes {duration / self.dt:.3g} steps to t_end = "
-                f"{self.t_end:g} s; at most {MAX_STEPS:.0e} are taken.",
-                "Take longer steps. They need to resolve what moves, not more.",
-            )
+            many = f"{duration / self.dt:.3g} steps to t_end = {self.t_end:g} s"
+            text = f"dt = {self.dt:g} s takes {many}; at most {MAX_STEPS:.0e} are taken."
+            yield text, "Take longer steps. They need to resolve what moves, not more."
         end = max(abs(self.t_start), abs(self.t_end))
         step = FIRST_STEP_RATIO * duration if self.dt is None else self.dt
         if end + step == end or not np.isfinite(duration):
             what = "the first step" if self.dt is None else "dt"
-            yield (
-                f"{what} = {step:g} s is lost beside t = {end:g} s: numbers have sixteen digits.",
-                "Take longer steps, or count the time from the start of the run.",
-            )
+            text = f"{what} = {step:g} s is lost beside t = {end:g} s: numbers have sixteen digits."
+            yield text, "Take longer steps, or count the time from the start of the run."
 
     @property
     def arguments(self) -> dict[str, object]:

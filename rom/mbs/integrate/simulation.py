@@ -225,15 +225,12 @@ def _go_on(record: Record, keeping: Keeping) -> None:
 def _translated(raised: BaseException, record: Record) -> Any:
     """The error by which a run ends."""
     if isinstance(raised, KeyboardInterrupt):
-        return InterruptedRun(
-            f"interrupted at t = {record.t:.6g} s of {record.settings.t_end:g} s.",
-            hint="The motion up to there is kept in error.solution.",
-        )
+        text = f"interrupted at t = {record.t:.6g} s of {record.settings.t_end:g} s."
+        return InterruptedRun(text, hint="The motion up to there is kept in error.solution.")
     if isinstance(raised, MemoryError):
-        return ResourceError(
-            f"the memory ran out at t = {record.t:.6g} s.",
-            hint="Keep fewer instants (save_every). error.solution is the motion up to there.",
-        )
+        text = f"the memory ran out at t = {record.t:.6g} s."
+        hint = "Keep fewer instants (save_every). error.solution is the motion up to there."
+        return ResourceError(text, hint=hint)
     return raised
 
 

@@ -55,11 +55,9 @@ class Impact:
         if fault := next(self._faults(), ""):
             raise ConfigError(fault)
         if self.restitution is not None and self.impact_speed is not None:
-            factor = damping_of(self.restitution, self.impact_speed)
-            object.__setattr__(self, "damping", factor)
+            object.__setattr__(self, "damping", damping_of(self.restitution, self.impact_speed))
 
     def _faults(self) -> Iterator[str]:
-        """What numbers say against each other, in sentences."""
         k, e, v = self.tangential_stiffness, self.restitution, self.impact_speed
         if k is None and self.tangential_damping:
             yield f"tangential_damping = {self.tangential_damping:g} needs a tangential_stiffness."
