@@ -172,9 +172,8 @@ class Assembly:
         table = {"reduced": few.tolist(), "full": self._elastic(few.size, fixed).tolist()}
         rows = tuple(frequency_rows(f"{n} interface functions", table))
         report = Report("certificate of the condensed assembly", rows)
-        return CondensedAssembly(
-            level, n, omega, basis, M, K, self._widths(), n_rigid, report, self
-        )
+        found = level, n, omega, basis, M, K, self._widths(), n_rigid, report
+        return CondensedAssembly(*found, self)
 
     def body(
         self,
@@ -242,8 +241,7 @@ class Assembly:
             full = self._elastic(found.size, tuple(fixed.values()))
             support = f"{' + '.join(fixed)} held" if fixed else "free"
             if found.size:
-                table = {"reduced": found.tolist(), "full": full.tolist()}
-                rows += frequency_rows(support, table)
+                rows += frequency_rows(support, {"reduced": found.tolist(), "full": full.tolist()})
         return rows
 
     def _elastic(self, n: int, fixed: tuple[Place, ...]) -> Array:

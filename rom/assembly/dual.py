@@ -213,10 +213,8 @@ class DualAssembly:
         diagonal = [np.r_[np.zeros(k), b.omega**2] for k, b in zip(n_rigid, bodies, strict=True)]
         B = self._differences(fixed)
         Psi = B @ block_diag(*(np.hstack([b.rigid, b.shapes]) for b in bodies))
-        Gamma, H = (
-            B @ block_diag(*parts) @ B.T
-            for parts in zip(*((b.flexibility, b.mass) for b in bodies), strict=True)
-        )
+        both = zip(*((b.flexibility, b.mass) for b in bodies), strict=True)
+        Gamma, H = (B @ block_diag(*parts) @ B.T for parts in both)
         return np.diag(np.concatenate(diagonal)), Psi, Gamma, H
 
     def _differences(self, fixed: tuple[Place, ...]) -> Array:
@@ -266,8 +264,7 @@ def substructure(
         Rixen, A dual Craig-Bampton method for dynamic substructuring, J. Comput. Appl. Math.
         168 (2004) 383; see docs/theory/other_bases.md.
     """
-    how = Rubin(n_modes)
-    draft = Draft(model=model, method=how, interfaces=interfaces)
+    draft = Draft(model=model, method=Rubin(n_modes), interfaces=interfaces)
     return run(wanted((True, connect), (True, release), (certify, hold_in_turn)), draft)
 
 

@@ -126,15 +126,10 @@ class Repeated:
             shift = (model.points - other.points).mean(axis=0)
             gaps = np.abs(model.points - other.points - shift).max()
             pairs = product(model.interfaces.values(), other.interfaces.values())
-            same = {
-                one.name: two.name for one, two in pairs if np.array_equal(one.nodes, two.nodes)
-            }
+            same = {a.name: b.name for a, b in pairs if np.array_equal(a.nodes, b.nodes)}
             paired = len(same) == len(model.interfaces) == len(other.interfaces)
-            if (
-                gaps > SAME_RTOL * np.ptp(model.points)
-                or not paired
-                or same[seen[key]] != seen[name]
-            ):
+            near = gaps <= SAME_RTOL * np.ptp(model.points)
+            if not (near and paired and same[seen[key]] == seen[name]):
                 continue
             if _equal(model.K, other.K) and _equal(model.M, other.M):
                 return cls(name, shift, same)

@@ -76,9 +76,8 @@ def modes_up_to(ops: Any, held: Any, f_max: float, tol: float) -> Modes:
     n_below = body.count_below(rho)
     if n_below is None:  # an iterative solver has no factor
         K, M = (ops.gathered(A) for A in (ops.K, ops.M))
-        return modes_up_to(
-            SciPyOperators(K, M, ops.rigid), () if still else support.held, f_max, tol
-        )
+        held = () if still else support.held
+        return modes_up_to(SciPyOperators(K, M, ops.rigid), held, f_max, tol)
     need, there = 8.0 * body.n * (2 * capacity(n_below) + 3 * n_below), free_bytes()
     hint = "Ask for modes up to a lower frequency, or use a coarser mesh."
     check_memory(f"finding {n_below} modes of {body.n} dofs", need, there, hint)

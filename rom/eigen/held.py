@@ -122,7 +122,6 @@ def _part(ops: Searched, loose: Index) -> str:
 
 
 def _words(point: Array) -> str:
-    """A place as it is printed."""
     return f"({', '.join(f'{x:.4g}' for x in point + 0.0)}) m"
 
 

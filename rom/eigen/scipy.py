@@ -130,9 +130,8 @@ class SciPyOperators(ModeSearch):
         if bad.any() or not (diagonal > 0.0).any():
             at = int(np.flatnonzero(bad | (diagonal <= 0.0))[0])
             text = f"M has {diagonal[at]:.3g} on the diagonal of dof {at}"
-            raise QualityGateError(
-                f"{text}; without mass it needs stiffness, and no coupling in M."
-            )
+            cure = "without mass it needs stiffness, and no coupling in M"
+            raise QualityGateError(f"{text}; {cure}.")
 
     def comparison_pays(self, n_supports: int, n_interface: int, n_modes: int) -> bool:
         """Always: matrices whose origin is unknown are compared in every support."""
@@ -218,8 +217,7 @@ class SciPyOperators(ModeSearch):
 
     def first_elastic(self, R: Array) -> float:
         """Estimate of the first elastic eigenvalue by inverse iteration on a small block."""
-        lu = self.shift_inverse(-ESTIMATE_SHIFT * self.largest())
-        return estimated_by_iteration(self, lu, R)
+        return estimated_by_iteration(self, self.shift_inverse(-ESTIMATE_SHIFT * self.largest()), R)
 
     @property
     def stiffness_diagonal(self) -> Array:

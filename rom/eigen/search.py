@@ -174,10 +174,8 @@ class ModeSearch(Searched):
             shift = -SHIFT_RATIO * self.first_elastic(R) if sigma is None else sigma
 
             def seek(k: int, found: Array) -> tuple[Array, Array, bool]:
-                inverse = self.shift_inverse(shift)
-                lam, Phi, _ = self._sought(
-                    k, shift, inverse, found, blocks=found.shape[1] > n_rigid
-                )
+                inverse, again = self.shift_inverse(shift), found.shape[1] > n_rigid
+                lam, Phi, _ = self._sought(k, shift, inverse, found, blocks=again)
                 inverse.release()  # counting needs its memory
                 self._refuse_mechanisms(lam, Phi, n_rigid)
                 return np.where(self._at_rest(Phi, lam), 0.0, lam), Phi, False
@@ -321,10 +319,8 @@ def refined(ops: Searched, lam: Array, Phi: Array) -> Array:
 
 def indefinite(name: str, n_negative: int, meaning: str) -> QualityGateError:
     """The error of a matrix that should be positive definite, and what it means that it is not."""
-    return QualityGateError(
-        f"{name} has {n_negative} negative eigenvalues: {meaning}.",
-        hint="Check signs and supports where the matrix was made.",
-    )
+    text = f"{name} has {n_negative} negative eigenvalues: {meaning}."
+    return QualityGateError(text, hint="Check signs and supports where the matrix was made.")
 
 
 def shift_is_eigenvalue(shift: float) -> SolverError:

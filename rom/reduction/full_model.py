@@ -136,9 +136,8 @@ def _residual(ops: Operators, held: Index, omega: Array, Phi: Array) -> Array:
     for few in column_blocks(omega.size):
         inertia = ops.apply_M(Phi[:, few])
         residual = ops.apply_K(Phi[:, few]) - inertia * omega[few] ** 2
-        norms[:, few] = [
-            np.sqrt(np.diag(ops.gram(X * free, X * free))) for X in (residual, inertia)
-        ]
+        seen = residual * free, inertia * free
+        norms[:, few] = [np.sqrt(np.diag(ops.gram(X, X))) for X in seen]
     scale = np.maximum(omega, omega[omega > 0].min(initial=np.inf)) ** 2
     scale[~np.isfinite(scale)] = 1.0
     return norms[0] / (scale * norms[1])

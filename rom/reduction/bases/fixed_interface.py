@@ -98,9 +98,8 @@ def numbered(what: str, n: int) -> list[str]:
 def check_interfaces(boundary: Index, n: int) -> None:
     """Refuse no interface, or dofs (n_b,) of one beyond the n of the model."""
     if boundary.size == 0:
-        raise ConfigError(
-            'the method needs interfaces, and none is given: interfaces={"a": "rbe2"}.'
-        )
+        text = "the method needs interfaces, and none is given"
+        raise ConfigError(f'{text}: interfaces={{"a": "rbe2"}}.')
     finite("boundary", boundary, (None,))
     check_places("boundary", boundary, n)
 

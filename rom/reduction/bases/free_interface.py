@@ -149,10 +149,9 @@ def _determinate(ops: Operators, boundary: Index, R: Array) -> Index:
     _, U, pivots = qr(rows.T, mode="economic", pivoting=True)
     size = np.abs(np.diag(U))
     if rows.shape[0] < R.shape[1] or size[-1] < 1e-9 * size[0]:
-        raise InterfaceError(
-            f"the {boundary.size} boundary dofs leave a rigid motion free.",
-            hint="Name an interface with at least three nodes that do not lie on one line.",
-        )
+        text = f"the {boundary.size} boundary dofs leave a rigid motion free."
+        hint = "Name an interface with at least three nodes that do not lie on one line."
+        raise InterfaceError(text, hint=hint)
     return np.sort(boundary[pivots[: R.shape[1]]])
 
 

@@ -197,8 +197,7 @@ class WithLoads:
                 raise ConfigError("gravity needs the coordinates of the nodes.")
             return ops.apply_M(ops.rigid[:, :3])
         n = ops.expand(np.zeros((ops.n_local, 1))).shape[0]
-        F = finite("loads", self.loads, (n, None))
-        return ops.restrict(F)
+        return ops.restrict(finite("loads", self.loads, (n, None)))
 
 
 def judged_in(method: Any, supports: tuple[Index, ...]) -> Any:

@@ -58,10 +58,8 @@ class Characteristic:
         """
         names = [name for name, tie in connection.ties.items() if tie.label == "full"]
         if not names:
-            hint = 'Name one, for example interfaces={"pin_a": "full"}.'
-            raise ConfigError(
-                "Characteristic reduces full interfaces, and none is given.", hint=hint
-            )
+            text = "Characteristic reduces full interfaces, and none is given."
+            raise ConfigError(text, hint='Name one, for example interfaces={"pin_a": "full"}.')
         sizes = [connection.parts[name].size for name in names]
         least = names[int(np.argmin(sizes))]
         whole("n", self.n, 0, min(sizes), reason=f"the coordinates of interface {least!r}")

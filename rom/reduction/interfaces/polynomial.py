@@ -57,10 +57,9 @@ class Polynomial:
             ConfigError: if the order is still open, or far beyond what the nodes can tell apart.
         """
         if self.order is None:
+            text = f"the order of the polynomials on {interface.name!r} is open."
             hint = "Give one: only rom.reduce with CraigBampton(f_max=…, tol=…) chooses it."
-            raise ConfigError(
-                f"the order of the polynomials on {interface.name!r} is open.", hint=hint
-            )
+            raise ConfigError(text, hint=hint)
         p = self.order
         _refuse_many((p + 1) * (p + 2) * (p + 3) // 6, interface, f"order {p}")
         x = _local(interface)

@@ -80,10 +80,8 @@ def _number(kind: Snapshots, sigma: Array, name: str) -> int:
         return min(int(np.searchsorted(share, kind.energy * (1 - 1e-14))) + 1, sigma.size)
     if kind.n > 6 + sigma.size:
         text = f"n = {kind.n}, but the {kind.values.shape[1]} snapshots of interface {name!r} hold"
-        hint = "Ask for fewer, or take more snapshots."
-        raise ConfigError(
-            f"{text} {6 + sigma.size} independent functions with six rigid ones.", hint=hint
-        )
+        there = f"{6 + sigma.size} independent functions with six rigid ones."
+        raise ConfigError(f"{text} {there}", hint="Ask for fewer, or take more snapshots.")
     return kind.n - 6
 
 
