@@ -323,9 +323,8 @@ class Bar:
         """Watched: (k,) vertex, (k,) share of the way to the next, (k, 2) shares of both [1]."""
         n = finger.rod.h.size
         links = [top for (_, _, top, _) in finger.joints if top < n]
-        vertex = np.concatenate(
-            [np.arange(n), *(np.full(ON_A_LINK.size, i) for i in links), [n - 1]]
-        )
+        on_links = np.repeat(np.array(links, dtype=int), ON_A_LINK.size)
+        vertex = np.concatenate([np.arange(n), on_links, [n - 1]])
         share = np.concatenate([np.zeros(n), np.tile(ON_A_LINK, len(links)), [1.0]])
         return vertex, share, np.column_stack([1 - share, share])
 

@@ -146,6 +146,5 @@ def simulate(  # noqa: PLR0913  all that a run needs
 
 
 def _first(found: Motion, k: int, cuts: int) -> Motion:
-    """The first k saved steps."""
     rows = {name: getattr(found, name)[:k] for name in ("t", "q", "v", "energy", "broken")}
     return replace(found, **rows, cuts=cuts)

@@ -256,5 +256,4 @@ def _touching(B: Blocks, law: Law, q: Array) -> Contacts:
     V, m = len(B.corner), B.load.shape[1]
     C, none = (contacts(room, m, len(B.size)) for room in (8 * V, 0))
     find_contacts(B, law, q, none, C, np.zeros((V, 2)), np.zeros((V, 2, m)))
-    used = {name: getattr(C, name)[: C.used[0]] for name in C._fields[1:-2]}
-    return C._replace(**used)
+    return C._replace(**{name: getattr(C, name)[: C.used[0]] for name in C._fields[1:-2]})

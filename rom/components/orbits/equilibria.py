@@ -176,10 +176,8 @@ class _Equilibria:
         self.now.W.base[:] = at.base
         here, d = self.balance(at, p), TIME_STEP * self.span
         later, before = self.balance(at, p + d), self.balance(at, p - d)
-        force, gap = (
-            -np.stack([x, (y - z) / (2 * d)], axis=1)
-            for x, y, z in zip(here, later, before, strict=True)
-        )
+        each = zip(here, later, before, strict=True)
+        force, gap = (-np.stack([x, (y - z) / (2 * d)], axis=1) for x, y, z in each)
         pencil = self.pencil(replace(at, t=p))
         u, l = pencil.inverse(pencil.K).solve(pencil.basis.T @ force, gap / pencil.row[:, None])
         step = np.concatenate([pencil.basis @ u, l / pencil.row[:, None]])

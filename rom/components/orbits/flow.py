@@ -248,9 +248,8 @@ class Beside:
         still_q = back @ self.q + turn @ psi
         M, C, K, G = self._matrices(step, base, signal)
         by_v, by_q = gamma * h * share, beta * h * h * share * turn
-        x = _bordered(
-            M + by_v * C + K @ by_q, G, G @ by_q, -K @ still_q - C @ still_v, -G @ still_q
-        )
+        force, gap = -K @ still_q - C @ still_v, -G @ still_q
+        x = _bordered(M + by_v * C + K @ by_q, G, G @ by_q, force, gap)
         self.q, self.v, self.vd = still_q + by_q @ x, still_v + by_v * x, x
         self.a = known + share * x
 

@@ -150,9 +150,8 @@ class Shooting:
             try:
                 flow, y = found.flow, answer
                 if free:
-                    change = np.clip(
-                        answer[-1] / (2 * np.pi), -MAX_PERIOD_CHANGE, MAX_PERIOD_CHANGE
-                    )
+                    most = MAX_PERIOD_CHANGE
+                    change = np.clip(answer[-1] / (2 * np.pi), -most, most)
                     flow, y = flow.lasting(flow.period * (1 + float(change))), answer[:-1]
                 return Return.of(flow, found.turns, moved_by(found, y), tangent.around.chart)
             except (SolverError, ModelError) as error:
@@ -349,7 +348,6 @@ def _near(
     settle: int,
     conservative: bool,
 ) -> PeriodicMotion:
-    """The motion near a state."""
     turning = turns_of(shooting.mechanism, shooting.turns, begin)
     at = flow.begun(begin) if known is None else known.ready(flow.begun(begin))
     refuse_what_changes(flow, turning, at, shooting.period is not None)

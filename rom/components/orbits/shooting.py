@@ -78,9 +78,7 @@ class Turns:
 
     def angles(self, one: State, two: State) -> tuple[float, ...]:
         """By how much each advances from one state to another [rad]."""
-        return tuple(
-            turn.advanced(one, two) if turn.angle is None else turn.angle for turn in self.every
-        )
+        return tuple(x.advanced(one, two) if x.angle is None else x.angle for x in self.every)
 
     def back(self, state: State, angles: tuple[float, ...]) -> State:
         """The state with all turned back."""

@@ -185,8 +185,7 @@ def steady(
     rated = partial(load, RATED_SPEED)
 
     def excess(speed: float) -> float:
-        turned = load(speed).torque
-        return turned - GEAR_RATIO * generator_torque(GEAR_RATIO * speed)
+        return load(speed).torque - GEAR_RATIO * generator_torque(GEAR_RATIO * speed)
 
     if rated().power <= RATED_POWER:
         slowest, top = CUT_IN_GENERATOR / GEAR_RATIO, RATED_GENERATOR / GEAR_RATIO

@@ -140,7 +140,6 @@ def profile(
 
 
 def _check(name: str, a: Array, cl: Array, cd: Array) -> None:
-    """Refuse a table that is none."""
     if a.size < 2 or a.shape != cl.shape or a.shape != cd.shape:
         sizes = f"{a.size} angles, {cl.size} lifts and {cd.size} drags"
         why = f"has {sizes}; as many of each, two or more."

@@ -252,9 +252,8 @@ def _hub(mech: Mechanism, solid: FlexibleBody | None, at: Array, lean: Array, sp
     if not (part.mass < HUB_MASS and own < HUB_INERTIA):
         has, whole = f"{part.mass:g} kg and {own:g} kg m^2", f"{HUB_MASS:g} and {HUB_INERTIA:g}"
         raise ConfigError(f"the hub {solid.name!r} has {has}; all of the hub has {whole}.")
-    inside = mech.add_rigid(
-        "in the hub", mass=HUB_MASS - part.mass, inertia=(HUB_INERTIA - own,) * 3, **pose
-    )
+    pose |= {"mass": HUB_MASS - part.mass, "inertia": (HUB_INERTIA - own,) * 3}
+    inside = mech.add_rigid("in the hub", **pose)
     flange = part.marker("shaft")
     mech.fixed("drives", flange, inside.marker(part.point(flange)))
     return part
