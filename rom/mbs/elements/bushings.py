@@ -45,7 +45,8 @@ from rom.model import Array
 
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 MAX_TURN = 0.95 * np.pi  # [rad]
-Curves = dict[str, tuple[npt.ArrayLike, npt.ArrayLike]]
+Curve = tuple[npt.ArrayLike, npt.ArrayLike]  # displacements and forces
+Curves = dict[str, Curve]
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,9 +111,7 @@ def _matrix66(name: str, value: npt.ArrayLike) -> Array:
     return 0.5 * (A + A.T)
 
 
-def _curve(
-    name: str, direction: str, table: tuple[npt.ArrayLike, npt.ArrayLike]
-) -> tuple[int, Array]:
+def _curve(name: str, direction: str, table: Curve) -> tuple[int, Array]:
     """Direction and pieces (n, 7) of a tabulated force, see `Bushings`."""
     one_of(f"curve of bushing {name!r}", direction, DIRECTIONS)
     x = ascending(f"displacements of curve {direction} of bushing {name!r}", table[0])

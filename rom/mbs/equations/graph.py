@@ -225,12 +225,10 @@ def _plan(system: System, neighbours: list[list[int]], groups: list[Group]) -> P
     """The elimination plan, or None if whole matrices are quicker."""
     ordering = Ordering(6 + system.bodies.r, neighbours, groups)
     limit = 2 / 3 * sum(ordering.size) ** 3 / BLOCK_GAIN
-    return _tables(system, ordering, neighbours, groups) if ordering.run(limit) else None
+    return _tables(system, ordering, neighbours) if ordering.run(limit) else None
 
 
-def _tables(
-    system: System, ordering: Ordering, neighbours: list[list[int]], groups: list[Group]
-) -> Plan:
+def _tables(system: System, ordering: Ordering, neighbours: list[list[int]]) -> Plan:
     """Where everything is in the factor."""
     sequence, n_bodies = ordering.sequence, len(neighbours)
     place = {node: k for k, node in enumerate(sequence)}
@@ -261,7 +259,7 @@ def _tables(
         position[v_at[b] + np.arange(width[b])] = start[place[b]] + np.arange(width[b])
     row_to, back, stride = (np.zeros((m, 4), dtype=np.int64) for _ in range(3))
     corner = np.zeros(m, dtype=np.int64)
-    for g, group in enumerate(groups):
+    for g, group in enumerate(ordering.groups):
         mine = place[n_bodies + g] if group.rows else -1
         for i, k in enumerate(group.rows):
             position[n + k] = start[mine] + i

@@ -174,9 +174,7 @@ def counts(step: Step) -> dict[str, float]:
     return dict(zip(names, step.count[list(RUN_COUNTS)].tolist(), strict=True))
 
 
-def _note(
-    record: Record, W: Work, step: Step, forces: Laws, t: Array, out: tuple[Array, ...]
-) -> None:
+def _note(record: Record, W: Work, step: Step, forces: Laws, t: Array, out: Instant) -> None:
     """Keep the saved steps of a chunk, finished or not."""
     record.counts = counts(step)
     done = int(step.count[entry.STEPS_BEFORE])
