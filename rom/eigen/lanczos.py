@@ -120,9 +120,7 @@ class BlockLanczos:
         W, V = np.asfortranarray(W), self.V[:, these]
         return dgemm(-1.0, V, G, 1.0, W, overwrite_c=True) if W.size and V.size else W
 
-    def _normalised(
-        self, W: Array, MW: Array, R: Array, length: float
-    ) -> tuple[Array, Array, Array, Array]:
+    def _normalised(self, W: Array, MW: Array, R: Array, length: float) -> tuple[Array, ...]:
         """W made M-orthonormal, M W, R with W R as it was, and what of a length was left of W.
 
         What is round-off counts as nothing.

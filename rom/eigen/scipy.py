@@ -113,9 +113,7 @@ class SciPyOperators(ModeSearch):
     affordable = True
     held_kind = HeldSciPy
 
-    def __init__(
-        self, K: Matrix, M: Matrix, rigid: Array | None = None, T: csr_matrix | None = None
-    ):
+    def __init__(self, K: Matrix, M: Matrix, rigid: Array | None = None, T: Matrix | None = None):
         self.K, self.M = _symmetric("K", K), _symmetric("M", M)
         if self.K.shape != self.M.shape:
             raise ConfigError(f"K is {self.K.shape} and M is {self.M.shape}; they must be equal.")
