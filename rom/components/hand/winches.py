@@ -12,7 +12,7 @@ import numpy.typing as npt
 from scipy.interpolate import PchipInterpolator
 
 from rom.arguments import finite, positive, whole
-from rom.components.hand.moving_hand import Drive
+from rom.components.hand.moving_hand import Course, Drive
 from rom.mbs.results.solution import Solution
 from rom.model import Array
 
@@ -116,9 +116,7 @@ def motor_force(solution: Solution, name: str) -> Array:
     return np.linalg.norm(first, axis=1)
 
 
-def _pulled(
-    drive: Drive | None, pulls: Mapping[str, Callable[[float], float]]
-) -> Mapping[str, Drive]:
+def _pulled(drive: Drive | None, pulls: Mapping[str, Course]) -> Mapping[str, Drive]:
     base = replace(drive or Drive(), tension=None)
     return {name: replace(base, pull=pull) for name, pull in pulls.items()}
 

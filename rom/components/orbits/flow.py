@@ -253,9 +253,7 @@ class Beside:
         self.q, self.v, self.vd = still_q + by_q @ x, still_v + by_v * x, x
         self.a = known + share * x
 
-    def _matrices(
-        self, step: Step, base: Array, signal: Array
-    ) -> tuple[Array, Array, Array, Array]:
+    def _matrices(self, step: Step, base: Array, signal: Array) -> tuple[Array, ...]:
         """Derivatives by accelerations, velocities and positions; gradient of the constraints."""
         now, W = self.now, self.now.W
         W.base[:], W.signal[:] = base, signal

@@ -123,7 +123,6 @@ class Blading:
     density: Annotated[float, Positive("kg/m^3")] = AIR_DENSITY
 
     def __post_init__(self) -> None:
-        """Refuse blades that cannot be."""
         size = len(self.profile)
         for name in ("radius", "length", "chord", "twist"):
             one_each(f"of {name}", getattr(self, name).shape, "profiles", (size,))

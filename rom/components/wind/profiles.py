@@ -53,7 +53,6 @@ class Profile:
     drag: Array
 
     def __post_init__(self) -> None:
-        """Refuse a table beyond which flow would have no lift and drag."""
         a = self.angle
         _check(self.name, a, self.lift, self.drag)
         if a[0] > ROUND_ATOL - np.pi or a[-1] < np.pi - ROUND_ATOL:

@@ -299,15 +299,13 @@ def _blade(mech: Mechanism, k: int, one: RodBody, place: Pose) -> Assembly:
     return mech.add_nonlinear(f"blade {k + 1}", one, at=centre, orientation=A, omega=turning)
 
 
-def _mount(
-    mech: Mechanism, k: int, hub: Part, added: Assembly, turns: bool
-) -> tuple[Marker, Marker]:
+def _mount(mech: Mechanism, k: int, hub: Part, rod: Assembly, turns: bool) -> tuple[Marker, Marker]:
     """Bolt blade k to the hub, or set it on a bearing along its axis; both ends."""
-    root = added.marker("start")
+    root = rod.marker("start")
     arm = rotation.matrix(hub.p).T @ (mech.design_point(root) - hub.at)
     flange = hub.marker(arm if hub.flexible is None else f"blade_{k + 1}")
     if turns:
-        axis = rotation.matrix(added.parts[0].p)[:, 2]
+        axis = rotation.matrix(rod.parts[0].p)[:, 2]
         mech.revolute(f"root {k + 1}", flange, root, axis=axis)
     else:
         mech.fixed(f"root {k + 1}", flange, root)
