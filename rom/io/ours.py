@@ -134,7 +134,10 @@ def _locked(folder: Path) -> int | None:
         try:
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            raise _taken(folder, handle) from None
+            owner = os.pread(handle, MAX_OWNER_BYTES, 0).decode(errors="replace")
+            os.close(handle)
+            text = f"another run is writing into {folder}: {owner or 'it has just begun'}."
+            raise ResourceError(text, hint="Wait for it, or choose another folder.") from None
         except OSError:
             os.close(handle)
             return None
@@ -145,10 +148,3 @@ def _locked(folder: Path) -> int | None:
     os.ftruncate(handle, 0)
     os.pwrite(handle, f"process {os.getpid()} on {platform.node()}".encode(), 0)
     return handle
-
-
-def _taken(folder: Path, handle: int) -> ResourceError:
-    owner = os.pread(handle, MAX_OWNER_BYTES, 0).decode(errors="replace")
-    os.close(handle)
-    text = f"another run is writing into {folder}: {owner or 'it has just begun'}."
-    return ResourceError(text, hint="Wait for it, or choose another folder.")
