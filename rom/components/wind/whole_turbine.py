@@ -195,8 +195,10 @@ def turbine(  # noqa: PLR0913  one keyword per choice, all with defaults
     axis, hub = lean @ [1.0, 0.0, 0.0], np.array([0.0, 0.0, TOWER_HEIGHT + SHAFT_HEIGHT])
     hub = hub - HUB_OVERHANG * axis
     nacelle = _nacelle(mech, top)
+    way = nacelle.at - hub
+    bearing = nacelle.marker(axis * (axis @ way) - way)  # on the axis of the shaft
     turning = _hub(mech, hub_body, hub, lean, speed)
-    _train(mech, nacelle, turning, (hub, axis), shaft, speed)
+    _train(mech, bearing, axis, shaft, speed)
     one = body(blade(segments, damped=damped, **factors))
     if wind is not None and not late_wake:
         if not isinstance(wind, int | float):
@@ -210,7 +212,7 @@ def turbine(  # noqa: PLR0913  one keyword per choice, all with defaults
     ends = [_mount(mech, k, turning, each, controlled) for k, each in enumerate(blades)]
     if controlled:
         generator = mech.part("generator").marker(NO_VELOCITY)
-        markers = _bearing(nacelle, hub, axis), generator, *(m for pair in ends for m in pair)
+        markers = bearing, generator, *(m for pair in ends for m in pair)
         add_control(mech, markers, axis, (speed, pitch))
     return Turbine(mech, blades, standing, axis, hub)
 
@@ -259,24 +261,11 @@ def _hub(mech: Mechanism, solid: FlexibleBody | None, at: Array, lean: Array, sp
     return part
 
 
-def _bearing(nacelle: Part, hub: Array, axis: Array) -> Marker:
-    """The place of the nacelle on the axis of the shaft."""
-    way = nacelle.at - hub
-    return nacelle.marker(axis * (axis @ way) - way)
-
-
 def _train(
-    mech: Mechanism,
-    nacelle: Part,
-    turning: Part,
-    place: tuple[Array, Array],
-    shaft: tuple[float, float],
-    speed: float,
+    mech: Mechanism, bearing: Marker, axis: Array, shaft: tuple[float, float], speed: float
 ) -> None:
     """Gear wheel and generator, and the shaft to the hub."""
-    hub, axis = place
-    bearing = _bearing(nacelle, hub, axis)
-    at = mech.design_point(bearing)
+    at, hub = mech.design_point(bearing), mech.part("hub")
     for name, turns, mass, inertia, omega in (
         ("wheel", "slow", WHEEL_MASS, WHEEL_INERTIA, speed * axis),
         ("generator", "fast", GENERATOR_MASS, GENERATOR_INERTIA, GEAR_RATIO * speed * axis),
@@ -284,7 +273,7 @@ def _train(
         part = mech.add_rigid(name, mass=mass, inertia=(inertia,) * 3, at=at, omega=omega)
         mech.revolute(turns, bearing, part.marker(NO_VELOCITY), axis=axis)
     mech.gear("gear", "slow", "fast", ratio=GEAR_RATIO)
-    end = turning.marker(NO_VELOCITY if turning.flexible is None else "shaft")
+    end = hub.marker(NO_VELOCITY if hub.flexible is None else "shaft")
     mech.revolute("shaft", mech.part("wheel").marker(mech.design_point(end) - at), end, axis=axis)
     mech.rotational_spring("twist", "shaft", stiffness=shaft[0], damping=shaft[1])
 
