@@ -287,12 +287,7 @@ def driver(masonry: Masonry, actions: Sequence[Action]) -> Callable[[Array], Dri
 
 
 def _forces(
-    block: npt.ArrayLike,
-    corner: npt.ArrayLike,
-    share: npt.ArrayLike,
-    force: Array,
-    *,
-    turns: int = 0,
+    block: npt.ArrayLike, corner: npt.ArrayLike, share: npt.ArrayLike, force: Array, turns: int = 0
 ) -> Forces:
     """Forces (n, L, 2) at places that are given for each of the n times, or for all of them."""
     n, count = force.shape[:2]

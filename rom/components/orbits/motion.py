@@ -333,29 +333,18 @@ def periodic_motion(  # noqa: PLR0913  one keyword per choice, most have default
         begin = flow.initial() if state is None else state
         check_state(begin, flow.packed)
         try:
-            return _near(shooting, flow, begin, known, settle, conservative)
+            turning = turns_of(mechanism, turns, begin)
+            at = flow.begun(begin) if known is None else known.ready(flow.begun(begin))
+            refuse_what_changes(flow, turning, at, period is not None)
+            for _ in range(settle):
+                at = Return.of(flow, turning, at).back
+            if conservative:
+                shooting = replace(shooting, energy=energy(mechanism, at))
+            return recorded(shooting, *shooting.closed(flow, at, turning, known))
         except SolverError:
             if not flow.failed[0] or more == MAX_TRIALS - 1:
                 raise
     raise AssertionError
-
-
-def _near(
-    shooting: Shooting,
-    flow: Flow,
-    begin: State,
-    known: Derivatives | None,
-    settle: int,
-    conservative: bool,
-) -> PeriodicMotion:
-    turning = turns_of(shooting.mechanism, shooting.turns, begin)
-    at = flow.begun(begin) if known is None else known.ready(flow.begun(begin))
-    refuse_what_changes(flow, turning, at, shooting.period is not None)
-    for _ in range(settle):
-        at = Return.of(flow, turning, at).back
-    if conservative:
-        shooting = replace(shooting, energy=energy(shooting.mechanism, at))
-    return recorded(shooting, *shooting.closed(flow, at, turning, known))
 
 
 def _guessed(mechanism: Mechanism, state: State | None) -> float:

@@ -337,9 +337,7 @@ def scaled(g: Gallery, factors: dict[str, float]) -> Gallery:
     return g
 
 
-def _scaled(g: Gallery, path: str, factor: float) -> Gallery:
-    part, _, name = path.rpartition(".")
-    if not part:
-        return replace(g, **{name: factor * getattr(g, name)})
-    record = getattr(g, part)
-    return replace(g, **{part: replace(record, **{name: factor * getattr(record, name)})})
+def _scaled(record: Any, path: str, factor: float) -> Any:
+    name, _, rest = path.partition(".")
+    value = getattr(record, name)
+    return replace(record, **{name: _scaled(value, rest, factor) if rest else factor * value})
