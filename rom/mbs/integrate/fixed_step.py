@@ -30,6 +30,7 @@ CHUNK_SECONDS, FIRST_CHUNK, LARGEST_CHUNK = 0.2, 16, 4096
 # change of a law by the last correction, of its size, that keeps a step from ending
 RESTLESS_LAW_RTOL = 1e-2
 Instant = tuple[Array, ...]  # q, v, a, lam, work and base
+Ends = tuple[Point, Point]  # of a step
 Chunk = tuple[Array, Array, Instant]  # times, signals, and room for what is kept
 LOSING_SHARE = 0.9  # of half a turn a step, from where on one that gains speed may exceed it
 
@@ -279,7 +280,7 @@ def kept_before_the_end(
     return True
 
 
-def _projected(record: Record, W: Work, ends: tuple[Point, Point], t: float) -> tuple[Array, Array]:
+def _projected(record: Record, W: Work, ends: Ends, t: float) -> tuple[Array, Array]:
     """Coordinates and velocities between two instants that satisfy the constraints."""
     packed = record.packed
     q, v, _ = between(packed.system, *ends, t)
@@ -302,7 +303,7 @@ def _look(
                 return right.q, right.v
             return between(record.packed.system, left, right, x)[:2]
 
-        def exact(x: float, ends: tuple[Point, Point] = (left, right)) -> tuple[Array, Array]:
+        def exact(x: float, ends: Ends = (left, right)) -> tuple[Array, Array]:
             return _projected(record, W, ends, x)
 
         W.base[:] = base
@@ -316,12 +317,7 @@ def _look(
 
 
 def _finish(
-    record: Record,
-    W: Work,
-    forces: Laws,
-    state: State,
-    ends: tuple[Point, Point],
-    works: tuple[Array, Array],
+    record: Record, W: Work, forces: Laws, state: State, ends: Ends, works: tuple[Array, Array]
 ) -> None:
     """Keep the instant of the event: in between, corrected to satisfy the constraints."""
     (left, right), t = ends, record.stopped
