@@ -224,8 +224,7 @@ def contact_forces(solution: Solution, name: str) -> dict[str, Array]:
 
 def grip(solution: Solution, name: str, fingers: Iterable[str]) -> dict[str, Array]:
     """{finger: (n_t,) sizes of the forces of its phalanges on an object, added up [N]}."""
-    forces = contact_forces(solution, name)
-    sizes = {key: np.linalg.norm(f, axis=1) for key, f in forces.items()}
+    sizes = {k: np.linalg.norm(f, axis=1) for k, f in contact_forces(solution, name).items()}
     none, found = np.zeros(solution.t.size), {}
     for one in fingers:
         found[one] = sum((f for key, f in sizes.items() if key.startswith(f"{one} phalanx")), none)
