@@ -40,7 +40,7 @@ class System:
         away = np.hypot(x, y)
         around = np.where(away > 0.0, np.arctan2(y, x), 0.0)
         if self.kind == "C":
-            return self.axes @ Rotation.from_euler("z", around).as_matrix()
+            return self.axes @ Rotation.from_euler("z", around[:, None]).as_matrix()
         tilted = Rotation.from_euler("ZY", np.column_stack([around, np.arctan2(away, z)]))
         return self.axes @ tilted.as_matrix() @ np.array([[0.0, 1, 0], [0, 0, 1], [1, 0, 0]])
 
