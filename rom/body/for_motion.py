@@ -9,13 +9,13 @@ from scipy.linalg import null_space
 from rom.body.frame import on_normal_modes, recombined
 from rom.body.records import Body
 from rom.body.recovery import N_FRAME_LOADS, PRODUCTS, StressRecovery
-from rom.body.reference import moved_integrals, rigid_elastic, rigid_mass
+from rom.body.reference import moved_integrals
+from rom.eigen.verbs import dofs_of
 from rom.errors import ConfigError, ModelError
 from rom.model import Array, Mask
 
 LOOKS = 400  # instants that are compared
 POINTS = 400  # of the surface, those of largest stress or spread over it
-EXACT_RTOL = 1e-9  # of the largest, of a mode that does not move
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ def _deformation_felt(body: Body, motion: Any, name: str, held: Held) -> tuple[A
     if body.surface is None:
         raise ModelError(f"body {name!r} carries no surface.")
     nodes = np.unique(np.linspace(0, len(body.surface.points) - 1, POINTS).astype(int))
-    shape = body.surface.shape[(3 * nodes[:, None] + np.arange(3)).ravel()]
+    shape = body.surface.shape[dofs_of(nodes)]
     whole = motion.elastic(name) @ shape.T
     return held.y, shape @ held.V[6:], float(np.abs(whole).max())
 
@@ -110,8 +110,7 @@ def _with_static_share(
     """The stress of the smaller body, with that of modes left out as statics of their loads."""
     if recovery.inertial is None:
         return recovery.recombined(T)
-    V, rigid, mixed = held.V[:, out], rigid_mass(body), rigid_elastic(body)
-    M = np.block([[rigid, mixed], [mixed.T, body.M]])
+    V, M = held.V[:, out], body.full_matrices()[0]  # type: ignore[attr-defined]
     _, Ibar = moved_integrals(recombined(body, V[6:]), -V[:6])
     pull = np.array(
         [np.trace(Ibar) - Ibar[i, i] if i == j else -(Ibar[i, j] + Ibar[j, i]) for i, j in PRODUCTS]

@@ -27,9 +27,8 @@ from rom.components.families.parameters import Density, YoungsModulus
 from rom.components.updating.models import Modal, ParametricModel, modal
 from rom.eigen.supports import Fixed, spring_matrices
 from rom.errors import ConfigError, ParameterError
-from rom.model import Array, Index, Mask
+from rom.model import Array, Index, Mask, moved_rigidly
 from rom.names import check_known, named
-from rom.rotation import skew
 
 BAND_RATIO = 1.5  # modes up to here, over the highest line, have damping that lines can see
 HELD_RTOL = 1e-9  # singular value of a motion that nothing holds
@@ -193,8 +192,7 @@ class JointSpring(UnknownPart):
         one_each("places of the other side", len(sides[1]), "places of one", len(sides[0]))
         motions = []
         for one, other in zip(*sides, strict=True):
-            arm = np.eye(6)
-            arm[:3, 3:] = -skew(parts.marker(one)[1].point - parts.marker(other)[1].point)
+            arm = moved_rigidly(parts.marker(one)[1].point - parts.marker(other)[1].point)
             motions.append(parts.motion(one) - arm @ parts.motion(other))
         k = _stiffness(sides[0][0], self.stiffness)
         return np.vstack(motions), block_diag(*[k] * len(motions))

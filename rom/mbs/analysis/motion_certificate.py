@@ -19,12 +19,12 @@ from rom.errors import ConfigError, ModelError
 from rom.mbs.analysis.small_errors import axes_of_bodies, corrected
 from rom.mbs.equations.packing import pack
 from rom.mbs.parts.bodies import Part
+from rom.mbs.results.audit import at_rows
 from rom.mbs.results.recomputed import residuals_along
 from rom.mbs.results.solution import Solution
 from rom.model import Array, Index, Report, Row
 from rom.names import check_known
 
-MOTION = ("t", "q", "v", "a", "lam", "work", "base", "signals")  # a row for each instant
 NESTED_RTOL = 1e-4  # distance of a shape from the span of richer ones that still counts as none
 REPLAY_RTOL = 1e-5  # of elastic forces, by which the motion may miss its own equations
 MAX_INSTANTS = 2000  # to which longer motions are thinned out
@@ -104,7 +104,8 @@ def certify_motion(
         The residual in an enriched space as an estimate of the error: Bank and Smith, A posteriori
         error estimates based on hierarchical bases, SIAM J. Numer. Anal. 30 (1993) 921.
     """
-    seen = _thinned(solution, every)
+    step = every or max(1, -(-solution.t.size // MAX_INSTANTS))
+    seen = at_rows(solution, np.arange(0, solution.t.size, step))
     into = dict(_nested(seen, richer))
     rich = _embedded(seen, richer, into)
     R = residuals_along(rich)
@@ -133,12 +134,6 @@ def _curve(name: str, goal: Goal, less: Solution, more: Solution) -> Curve:
         text = f"goal {name!r} gives shapes {value.shape} and {better.shape} at {less.t.size} times"
         raise ConfigError(f"{text}; it must give (n_t,) or (n_t, k) numbers.")
     return Curve(less.t, value, better - value)
-
-
-def _thinned(solution: Solution, every: int | None) -> Solution:
-    step = every or max(1, -(-solution.t.size // MAX_INSTANTS))
-    kept = {x: getattr(solution, x)[::step].copy() for x in MOTION}
-    return replace(solution, **kept, _tracks={})
 
 
 def _nested(solution: Solution, richer: Mapping[str, AnyBody]) -> Iterator[tuple[str, Array]]:

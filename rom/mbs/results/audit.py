@@ -15,7 +15,7 @@ from rom.mbs.mechanism import Mechanism
 from rom.mbs.results.recomputed import axes_of
 from rom.mbs.results.solution import Solution
 from rom.mbs.results.state import State
-from rom.model import BUCKLING_LOADS, Array, Report, Row
+from rom.model import BUCKLING_LOADS, Array, Index, Report, Row
 
 # limits; energy counts relative to the largest amount of energy that was exchanged
 ENERGY_RTOL = 1e-2
@@ -63,12 +63,17 @@ def audit(solution: Solution) -> Report:
     return Report(f"audit of {solution.t[-1] - solution.t[0]:g} s of motion", tuple(rows))
 
 
+def at_rows(solution: Solution, rows: Index) -> Solution:
+    """The motion at some of its instants alone."""
+    motion = {name: getattr(solution, name)[rows] for name in MOTION_ARRAYS}
+    return replace(solution, **motion, _tracks={})
+
+
 def warn_of_failures(solution: Solution) -> None:
     """Warn once of a motion whose balances, joints or steps the audit finds wrong."""
     n = solution.t.size
     seen = np.unique([*range(0, n, LOOK_EVERY), n - 1])
-    motion = {name: getattr(solution, name)[seen] for name in MOTION_ARRAYS}
-    rows = _of_steps(replace(solution, **motion, _tracks={}))
+    rows = _of_steps(at_rows(solution, seen))
     failures = [f"{row.quantity} {row.value:.2g}" for row in rows if not row.ok]
     if failures:
         warn(
